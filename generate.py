@@ -18,6 +18,7 @@ from typing import Any
 
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 from hybridsep.predict import start_in_motion, uncertainty
 from hybridsep.predict.trust import disturbances, experts, model, stack
@@ -29,6 +30,7 @@ SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h
 CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "trust" / "hsep_trust_constants.h"
 LEARNED_HEADER = CONSTANTS_HEADER.with_name("hsep_trust_learned.h")
 DECLARED_HEADER = SETTINGS_HEADER.with_name("hsep_predict_constants.h")
+RANGES_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_ranges.h"
 
 DECLARED = {
     "uncertainty": uncertainty,
@@ -52,6 +54,7 @@ def generated() -> dict[Path, str]:
     """Return the files that are generated, as they must be."""
     headers = {
         SETTINGS_HEADER: settings_header(),
+        RANGES_HEADER: ranges_header(),
         CONSTANTS_HEADER: constants_header(),
         LEARNED_HEADER: learned_header(),
         DECLARED_HEADER: declared_header(),
@@ -85,6 +88,30 @@ typedef struct {{
 typedef struct {{
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 }} hsep_compensator_settings;
+
+#endif
+"""
+
+
+def ranges_header() -> str:
+    """Return the C header of the ranges and defaults of the library's parameters."""
+    modes = {name: PARAMETERS[name] for name in ("f_n", "zeta", "alpha", "beta")}
+    lists = (
+        ("PREDICTOR", PREDICTOR_SETTINGS),
+        ("TRUST", TRUST_SETTINGS),
+        ("COMPENSATOR", COMPENSATOR_SETTINGS),
+        ("MODE", modes),
+    )
+    return f"""/* Ranges of the library's parameters, generated from hybridsep/base/settings.py.
+ *
+ * RANGE(type, name, usual, least, most, nonzero, automatic, learned): the default; closed bounds; the least magnitude
+ * of what is not 0, 0 if there is none; a value beside the range that stands for an automatic choice, or least again;
+ * whether weights that were learned with another value mean something else. */
+#ifndef HSEP_RANGES_H
+#define HSEP_RANGES_H
+
+/* clang-format off */
+{"".join(_ranges(name, settings) for name, settings in lists)}/* clang-format on */
 
 #endif
 """
@@ -175,6 +202,18 @@ def _list(name: str, settings: Mapping[str, Parameter]) -> str:
         meaning = parameter.description.replace("·", " ") + (f": {items}" if items else unit)
         rows += [f"    /* {meaning} */", f"    SETTING({kind}, {setting})"]
     return f"#define HSEP_{name}_SETTINGS(SETTING) \\\n" + " \\\n".join(rows) + "\n\n"
+
+
+def _ranges(name: str, settings: Mapping[str, Parameter]) -> str:
+    rows = []
+    for setting, parameter in settings.items():
+        kind = "double" if parameter.kind is float else "uint64_t"
+        usual = 0.0 if parameter.default is None else parameter.to_fmi(parameter.default)
+        automatic = parameter.minimum if parameter.automatic is None else parameter.automatic
+        numbers = (usual, parameter.minimum, parameter.maximum, parameter.nonzero, automatic)
+        values = ", ".join(repr(float(number)) for number in numbers)
+        rows.append(f"    RANGE({kind}, {setting}, {values}, {int(parameter.learned)})")
+    return f"#define HSEP_{name}_RANGES(RANGE) \\\n" + " \\\n".join(rows) + "\n\n"
 
 
 if __name__ == "__main__":

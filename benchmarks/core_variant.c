@@ -48,15 +48,15 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 /* Return whether both runs were predicted without divergence. */
 int replay(const hsep_predictor_parameters *parameters, const replayed_run *first, const replayed_run *second)
 {
-    const size_t size = (size_t)hsep_predictor_size(parameters);
+    const size_t size = (size_t)hsep_predictor_block_size(parameters);
     hsep_predictor *trained = malloc(size), *predictor = malloc(size);
     int sound = trained != NULL && predictor != NULL;
     if (sound) {
-        hsep_predictor_init(trained, parameters, first->x_d[0]);
+        hsep_predictor_block_init(trained, parameters, first->x_d[0]);
         sound = replay_run(trained, first);
     }
     if (sound && second->n > 0) {
-        hsep_predictor_init(predictor, parameters, second->x_d[0]);
+        hsep_predictor_block_init(predictor, parameters, second->x_d[0]);
         replay_take_over(predictor, trained);
         sound = replay_run(predictor, second);
     }

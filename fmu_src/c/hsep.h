@@ -1,63 +1,159 @@
-/* Public header of the C core, for C99 and C++11.
+/* hsep: prediction and pre-compensation of a feed drive's servo error, for C99 and C++11. README.md says how to use it.
  *
- * The objects are blocks of memory that the caller provides, aligned for double, of the size that hsep_*_size returns:
- * plain data without pointers, so a copy of a block is a saved state, and hsep_*_valid judges bytes from elsewhere.
+ * A predictor, or a compensator, is a block of memory that the caller provides: aligned for double, of the size that
+ * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state, and hsep_*_valid judges
+ * bytes from elsewhere.
  *
- * Real-time contract. All functions are reentrant: threads may use different blocks at once, one block is used by one
- * thread at a time. None allocates, locks, or throws; none but those of hsep_model.h that say so touch a file.
- * Parameters must be in the ranges given at their structs, which hsep_model_size checks; arguments must be finite.
+ * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
+ * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.
+ * Arguments are as said at each function: positions are finite and within +- 1000 m, pointers are not NULL unless said
+ * so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it returns 0 for those
+ * that are out of their ranges, and no other function may be called with them.
  *
- *   function                          | bounded cost                                    | what may fail
- *   hsep_*_size                       | constant                                        | nothing
- *   hsep_*_init                       | the block's size, and the modes' exponentials   | nothing
- *   hsep_*_valid                      | constant; the predictor's, its windows          | returns 0 if invalid
- *   hsep_predictor_sample             | hsep_regression_fold; at a window's end         | divergence is set, latched
- *                                     | Np (p + q) + n^2 / 2 on top; with trust, then   |
- *                                     | alone, for each expert Np n^2, n^3 / 3 and      |
- *                                     | Np n^2 / 2; 6 Np tanh; one more in a warm run;  |
- *                                     | in a compensator preview for all Np but folds   |
- *   hsep_compensator_begin            | a window's end                                  | divergence is set, latched
- *   hsep_compensator_sample           | as the predictor's; at a window's end a plan,   | divergence is set, latched
- *                                     | m^3 / 6; hsep_interior_step after a bounded one |
- *                                     | or, with trust, hsep_trusted_planner_advance    |
- *   hsep_compensator_change           | constant; 10 spacing at the next window's end   | nothing
- *   hsep_*_read                       | constant                                        | nothing
- *   hsep_regression_fold              | n^2 / 2 times 7 operations, 2 n divisions       | nothing
- *   hsep_regression_solve             | n^2 / 2                                         | nothing
- *   hsep_regression_load              | n divisions a row                               | returns 0 for no factor
- *   hsep_physics_forced_response      | 9 a mode and sample                             | nothing
- *   hsep_discretise                   | 2 000, 64 a doubling of the norm                | nothing
- *   hsep_feed_drive_step, _stage_step | 4 slopes an internal step, at most 10^6 of them | returns 0, state unchanged
- *   hsep_encoder_measure              | constant                                        | nothing
- *   hsep_trajectory_position          | constant                                        | nothing
- *   hsep_clock_init, _count           | constant                                        | returns 0 for a wrong time
- *   hsep_model_*                      | see hsep_model.h                                | HSEP_REFUSED, with a message
+ *   function                 | bounded cost                                          | what may fail
+ *   hsep_defaults            | constant                                              | nothing
+ *   hsep_*_size              | constant                                              | returns 0: refused
+ *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
+ *   hsep_*_valid             | constant; the predictor's, its windows                | returns 0: invalid
+ *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
+ *                            | window's end Np (p + q) + n^2 / 2 on top; with trust, |
+ *                            | then alone, for each expert Np n^2, n^3 / 3 and       |
+ *                            | Np n^2 / 2, 6 Np tanh; one more in a warm run         |
+ *   hsep_compensator_sample  | as the predictor's with preview for Np but in folds;  | divergence is set, latched
+ *                            | at a window's end a plan, m^3 / 6, and a bounded share|
+ *                            | of its solution in each of the samples that follow    |
+ *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | nothing
+ *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
- * Costs are multiply-adds; n: features, m: splines in a plan. The exact ones stand at each function.
+ * Costs are multiply-adds; n: features, p + q and a few more with trust; m: splines in a plan, preview / spacing. The
+ * dearest sample is bounded by the parameters, and is the same at the first and at the 10^9th sample.
  */
 #ifndef HSEP_H
 #define HSEP_H
 
-/* The C library's headers come first: they are not for the linkage below. */
-#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <string.h>
+
+#include "hsep_api.h"
+#include "hsep_settings.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#include "hsep_clock.h"
-#include "hsep_compensator.h"
-#include "hsep_encoder.h"
-#include "hsep_model.h"
-#include "hsep_physics.h"
-#include "hsep_plant.h"
-#include "hsep_predictor.h"
-#include "hsep_range.h"
-#include "hsep_regression.h"
-#include "hsep_trajectory.h"
+/* One mode of the drive's linear model, eq. (15):
+ * (alpha + beta s) / (s^2 + 2 zeta omega s + omega^2) with omega = 2 pi f_n, from command to position. */
+typedef struct {
+    double f_n;   /* natural frequency, Hz, > 0 */
+    double zeta;  /* damping ratio, 1, > 0; 1 is critical, more is over-damped */
+    double alpha; /* numerator, 1/s^2 */
+    double beta;  /* numerator, 1/s */
+} hsep_mode;
+
+/* How the command runs between samples, of the setting input_hold. */
+typedef enum { HSEP_ZERO_ORDER_HOLD = 0, HSEP_FIRST_ORDER_HOLD = 1 } hsep_hold;
+
+/* Settings, each with unit and meaning in hsep_settings.h, its range in hsep_ranges.h. */
+typedef struct {
+    hsep_predictor_settings predictor;
+    hsep_trust_settings trust;
+    hsep_compensator_settings compensator; /* of no meaning for a predictor */
+    uint64_t n_modes;                      /* >= 1 */
+    const hsep_mode *modes;                /* (n_modes,), read while a function runs, not kept */
+} hsep_parameters;
+
+/* Fill in every setting's default; modes: none. */
+HSEP_API void hsep_defaults(hsep_parameters *parameters);
+
+/* How hsep_*_init began. */
+typedef enum {
+    HSEP_BEGAN = 0,           /* as asked */
+    HSEP_WEIGHTS_DAMAGED = 1, /* cold: the weights are damaged, truncated or of another version */
+    HSEP_WEIGHTS_OTHER = 2    /* cold: they were learned with other settings or modes */
+} hsep_began;
+
+/* Signal of a window that is out of range (1e100 m), because the learned recursion diverges. */
+typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_DIVERGES_X_DM } hsep_divergence;
+
+/* ------------------------------------------------------------------------------------------------ The predictor --
+ *
+ * It is a look-ahead buffer between interpolator and drive. Sample k brings x_d_ahead, the command r(k) that the drive
+ * is to have Np samples later, and x_meas, the position measured now; after it the outputs are those of sample k + 1,
+ * with x_d(k) = r(k - Np). Before r(0) arrives at the drive, the drive is at rest at start. Where the measurement is
+ * late by measurement_delay samples, x_meas = x(k - measurement_delay).
+ */
+typedef struct hsep_predictor hsep_predictor;
+
+typedef struct {
+    double x_d, x_pb, x_h;                 /* m, now: command, predictions by the physics model and by the hybrid one */
+    double x_h_std;                        /* m, standard deviation of the error of x_h; 0 where it is not known */
+    double rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init: of the servo error and of predictions' errors */
+    uint64_t batch;                        /* floor(k / Np) */
+    uint64_t n_rejected;                   /* measurements that were missing or not plausible, with trust */
+    int hybrid_active;                     /* whether x_h is the hybrid prediction now */
+    hsep_divergence divergence;            /* HSEP_CONVERGES, or the outputs are invalid until hsep_*_init */
+} hsep_predictor_outputs;
+
+/* Bytes of the block; 0 if a parameter is out of its range, p > Np, q >= Np, there are no modes, or the block would not
+ * fit into memory. */
+HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
+
+/* Begin with the drive at rest at start, m. weights: content of a file weights.bin in any alignment, so many bytes, as
+ * `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing: the
+ * block has begun cold. */
+HSEP_API hsep_began hsep_predictor_init(
+    hsep_predictor *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size);
+
+/* Whether bytes in any alignment are a block for these parameters that has processed k samples: size is its, and every
+ * index lies within it. Bytes that were changed on purpose may be valid and mean nothing. */
+HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k);
+
+/* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
+
+/* Read the outputs of the next sample. */
+HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
+
+/* Standard deviation of the error of x_h at sample i of the window, i < Np, m; 0 where it is not known. */
+HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
+
+/* ---------------------------------------------------------------------------------------------- The compensator --
+ *
+ * A predictor whose commands are modified, x_dm, so that the drive follows x_d within the limits of its settings.
+ * Sample k brings x_d_ahead, the command that the drive is to follow preview samples later, and x_meas, as above.
+ */
+typedef struct hsep_compensator hsep_compensator;
+
+/* Model that plans the commands of a window; of the setting compensate, the best one allowed. */
+typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
+
+typedef struct {
+    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
+    double x_dm;                      /* m, now */
+    hsep_sep_state state;             /* of the plan that x_dm follows now */
+} hsep_compensator_outputs;
+
+/* Bytes of the block; 0 as the predictor's, and if spacing does not divide Np, preview < Np + 4 spacing + 3, or a
+ * measurement is late without trust. */
+HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters);
+
+/* Begin, and plan the first window; as hsep_predictor_init. */
+HSEP_API hsep_began hsep_compensator_init(
+    hsep_compensator *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size);
+
+/* As hsep_predictor_valid. */
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k);
+
+/* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
+ * Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at x_d: with compensate off
+ * that rest is followed, and where it is larger than change_max it is the bound. */
+HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max);
+
+/* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
+HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
+
+/* Read the outputs of the next sample. */
+HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
 
 #ifdef __cplusplus
 }

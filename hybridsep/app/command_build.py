@@ -48,6 +48,13 @@ def build(
             help="Whether a HybridPredictor shows its whole window, 4·Np scalars or four arrays.",
         ),
     ] = True,
+    embed_weights: Annotated[
+        bool,
+        typer.Option(
+            "--embed-weights",
+            help="Compile the weights into the sources of a native FMU too, for targets without files (HSEP_NO_FILES).",
+        ),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -56,6 +63,7 @@ def build(
 
     The same machine gives the same bytes.
     """
+    from ..base.errors import ParameterError
     from ..fmi.archive import build_fmu
     from ..fmi.jobs import extras_of, jobs_of, libraries_of
     from ..fmi.libraries import library_paths, missing
@@ -64,8 +72,10 @@ def build(
     from .progress import progress_bar
     from .tables import console, print_json
 
+    if embed_weights and flavour != "native":
+        raise ParameterError(f"--embed-weights is for native FMUs; with --flavour {flavour} leave it out")
     jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
-    extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows)
+    extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows, embed_weights=embed_weights)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs],

@@ -35,6 +35,7 @@ def hal(
     from ..base.output import written_whole
     from ..fmi.hal import COMPONENTS, axis_files, component_files
     from ..fmi.warm_start import load_trained
+    from ..fmi.weights import WEIGHTS_FILE
     from ..machines.machine import load_machine
     from .overwrite import HAL_FILES, Output, check_outputs
 
@@ -50,8 +51,11 @@ def hal(
     files = {out / name: content for name, content in component_files(model).items()}
     for axis in axes:
         files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
+    # of an earlier call: the axis would start with them
+    stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
+    written = [path for path in files if path.parent.name != f"{component}_sources"]
     check_outputs(
-        [Output("--out", path, HAL_FILES) for path in files if path.parent.name != f"{component}_sources"],
+        [Output("--out", path, HAL_FILES) for path in (*written, *stale)],
         {"saved predictor": weights},
         force=force,
     )
@@ -59,6 +63,9 @@ def hal(
         make_folder(path.parent)
         with written_whole(path) as file:
             file.write(content)
+    for path in stale:
+        path.unlink()
+        typer.echo(f"{path} removed: without --weights the axis starts cold")
     typer.echo(
         f"{out / component}.c written, with its sources; install it: sudo halcompile --install {out / component}.c"
     )

@@ -77,6 +77,7 @@ def build_fmu(
     fmi: str = FMI_VERSIONS[0],
     origin: Mapping[str, Any] | None = None,
     windows: bool = True,
+    embed_weights: bool = False,
 ) -> Path:
     """Build one FMU.
 
@@ -104,6 +105,8 @@ def build_fmu(
         What the FMU was made from, plain values: the FMU carries it as meta data (SRMD, SSP Traceability).
     windows : bool
         Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
+    embed_weights : bool
+        Whether a native FMU's sources have the weights compiled in, for targets without files.
 
     Returns
     -------
@@ -130,7 +133,10 @@ def build_fmu(
     for given, what, models in users:
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
+    if embed_weights and (weights is None or flavour != "native"):
+        raise FmuError("embed_weights is for a native FMU with weights")
     how: dict[str, Any] = {} if flavour == "python" else {"targets": targets, "samples": samples, "fmi": fmi}
+    how |= {"embed_weights": True} if embed_weights else {}
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:

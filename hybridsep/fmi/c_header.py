@@ -98,7 +98,9 @@ def kind_header(kind: str) -> str:
     return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
 
 
-def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0]) -> str:
+def c_header(
+    description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0], weights: bytes | None = None
+) -> str:
     """Return the header of one FMU, with its table.
 
     Parameters
@@ -109,6 +111,8 @@ def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIO
         The modelDescription's.
     fmi : {"2", "3"}
         Version of FMI.
+    weights : bytes, optional
+        Content of the weights file, with which the FMU starts instead of with the resources' file.
     """
     name, layout = str(description["name"]), layout_of(variables_of(description))
     starts = ",\n".join(
@@ -130,7 +134,7 @@ def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIO
 static const double hsep_starts[HSEP_N_STARTS] = {{
 {starts}}};
 
-static const hsep_context hsep_table = {{
+{_weights(weights)}static const hsep_context hsep_table = {{
     .variables = hsep_variables,
     .n_scalars = HSEP_N_SCALARS,
     .n_modes = HSEP_N_MODES,
@@ -138,7 +142,7 @@ static const hsep_context hsep_table = {{
     .n_variables = HSEP_N_VARIABLES,
     .starts = hsep_starts,
     .guid = HSEP_GUID,
-    .angular = {int(description.get("unit", "m") != "m")}}};
+    .angular = {int(description.get("unit", "m") != "m")}{_EMBEDDED if weights else ""}}};
 """
     return _header(kind_of(description), name, table)
 
@@ -200,6 +204,22 @@ enum {{
 static const hsep_variable hsep_variables[{len(rows)}] = {{
 {table}
 }};
+"""
+
+
+_EMBEDDED = ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights"
+
+
+def _weights(content: bytes | None) -> str:
+    """Return the definition of the weights' bytes; empty if there are none."""
+    if not content:
+        return ""
+    rows = [", ".join(map(str, content[i : i + 32])) for i in range(0, len(content), 32)]
+    text = ",\n    ".join(rows)
+    return f"""/* What was learned before, weights.bin: no file is needed for a warm start. */
+static const unsigned char hsep_embedded_weights[{len(content)}] = {{
+    {text}}};
+
 """
 
 

@@ -31,7 +31,7 @@ def c_sources(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
     """
     root = data_folder("fmu_src") / "c"
     others = [f"fmi{version}" for version in FMI_VERSIONS if version not in versions]
-    paths = sorted(path for path in root.rglob("*.[ch]") if path.parent.name not in others)
+    paths = sorted(path for path in root.rglob("*.[ch]") if path.parent.name not in ("examples", *others))
     ours = {path.name: path.read_bytes() for path in paths}
     return {"all.c": all_c([file for file in ours if file.endswith(".c")]).encode(), **ours}
 

@@ -67,17 +67,21 @@ def extras_of(
     T_s: float | None,
     *,
     windows: bool = True,
+    embed_weights: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
 
-    Weights and the samples of a trajectory are for one of them; ``windows=False`` for all that have windows.
+    Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them;
+    ``windows=False`` for all that have windows.
     """
     extras: dict[str, dict[str, Any]] = {}
     check_reading(unit, T_s)
     if weights is not None:
         axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
         load_trained(weights, axis, model)
-        extras[model] = {"weights": weights}
+        extras[model] = {"weights": weights, **({"embed_weights": True} if embed_weights else {})}
+    elif embed_weights:
+        raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
     if trajectory is not None:
         axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
         samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)

@@ -75,6 +75,7 @@ def files(
     trained: HybridPredictor | None = None,
     origin: Mapping[str, Any] | None = None,
     fmi: str = FMI_VERSIONS[0],
+    embed_weights: bool = False,
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
@@ -83,7 +84,7 @@ def files(
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples, fmi
+    targets, samples, fmi, embed_weights
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
@@ -113,13 +114,14 @@ def files(
         content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
+    weights = None
     if trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
-        content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
+        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     guid = content_guid(content, description)
     content[f"resources/{TABLE_FILE}"] = table_file(description, guid)
-    content["sources/hsep_fmu.h"] = c_header(description, guid, fmi).encode()
+    content["sources/hsep_fmu.h"] = c_header(description, guid, fmi, weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
     tool = f"hybridsep {__version__}"
     if fmi == "3":

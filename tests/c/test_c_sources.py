@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import c_core
@@ -47,6 +46,8 @@ def test_the_core_needs_libm_alone() -> None:
         "memmove",
         "memset",
         "memcmp",
+        "strcmp",
+        "strncmp",
         "bcmp",  # what a compiler makes of memcmp where only equality counts
         "sqrt",
         "log",
@@ -84,26 +85,6 @@ def test_everything_compiles_as_one_file(name: str) -> None:
     everything.write_text(all_c(c_core.sources()))
     level = "-O3" if name == "compensator_2" else "-O0"
     run_compiler([level, f"-I{folder}", *include_flags(), "-c", everything, "-o", folder / "all.o"])
-
-
-def cpp_compiler() -> list[str]:
-    """Return the command of a C++ compiler; empty if there is none."""
-    found = next((path for name in ("c++", "g++", "clang++") if (path := shutil.which(name))), None)
-    return [found] if found else [sys.executable, "-m", "ziglang", "c++"] if find_spec("ziglang") else []
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not cpp_compiler(), reason="no C++ compiler here; install g++, clang++ or the ziglang package")
-def test_one_header_serves_c_plus_plus() -> None:
-    """Compiled as C++11, it links with the core that C compiled, and predicts a window."""
-    program = build_folder() / "header"
-    source = ROOT / "tests" / "c" / "header.cpp"
-    flags = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", *include_flags()]
-    arguments = [*cpp_compiler(), *flags, str(source), *c_core.object_files(), "-lm", "-o", str(program)]
-    built = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    assert built.returncode == 0, built.stderr
-    done = subprocess.run([program], capture_output=True, text=True, check=True)
-    assert done.stdout == "9 1\n"
 
 
 def sanitised_program(driver: str, folder: Path) -> Path:

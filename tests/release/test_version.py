@@ -59,5 +59,9 @@ def test_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_file_that_states_the_version_states_the_same() -> None:
-    for file, form in (("pyproject.toml", r'^version = "(.+)"$'), ("CITATION.cff", r"^version: (.+)$")):
+    for file, form in (
+        ("pyproject.toml", r'^version = "(.+)"$'),
+        ("CITATION.cff", r"^version: (.+)$"),
+        ("fmu_src/c/CMakeLists.txt", r"^  VERSION (.+)$"),
+    ):
         assert re.findall(form, (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE) == [__version__]

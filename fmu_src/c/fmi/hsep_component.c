@@ -2,9 +2,9 @@
 
 #include "hsep_check.h"
 #include "hsep_opening.h"
+#include "hsep_text.h"
 
 #include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 
 enum { COMPONENT_N_CATEGORIES = 5, COMPONENT_LOG_EVERYTHING = 31 };
@@ -31,7 +31,7 @@ static void component_log(const hsep_instance *instance, hsep_category category,
     if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
         return;
     }
-    (void)vsnprintf(text, sizeof text, format, arguments);
+    (void)hsep_text_list(text, sizeof text, format, arguments);
     component->hand(component, component_status[place], component_categories[place], text);
 }
 
@@ -99,7 +99,7 @@ HSEP_API hsep_component *hsep_component_new(
     hsep_component *component = hsep_new(&filled->instance, sizeof *component);
     if (component == NULL) {
         char text[HSEP_MESSAGE_SIZE];
-        (void)snprintf(
+        (void)hsep_text(
             text, sizeof text, "%s: no memory for an instance of %lu bytes", filled->instance.words->instantiate,
             (unsigned long)sizeof *component);
         if (filled->logger != NULL) {

@@ -22,6 +22,18 @@ typedef enum { HSEP_INSTANTIATED = 1, HSEP_INITIALIZATION = 2, HSEP_STEPPING = 4
 typedef void *(*hsep_allocate)(size_t count, size_t size);
 typedef void (*hsep_release)(void *block);
 
+#ifdef HSEP_NO_MALLOC
+/* The target's own, as calloc and free, for what is compiled without them. */
+void *hsep_target_calloc(size_t count, size_t size);
+void hsep_target_free(void *block);
+#define HSEP_CALLOC hsep_target_calloc
+#define HSEP_FREE hsep_target_free
+#else
+#include <stdlib.h>
+#define HSEP_CALLOC calloc
+#define HSEP_FREE free
+#endif
+
 /* Where a simulation is. */
 typedef struct {
     uint32_t phase; /* hsep_phase */

@@ -3,6 +3,7 @@
 #ifdef HSEP_TABLE_IN_RESOURCES
 
 #include "hsep_check.h"
+#include "hsep_crc.h"
 #include "hsep_layout.h"
 #include "hsep_library.h"
 #include "hsep_resource.h"

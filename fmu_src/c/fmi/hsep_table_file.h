@@ -17,6 +17,10 @@
 
 #ifdef HSEP_TABLE_IN_RESOURCES
 
+#ifdef HSEP_NO_FILES
+#error "the table of this FMU is in its resources, which HSEP_NO_FILES leaves out: take the header of a source FMU"
+#endif
+
 /* Read the file from the instance's resources, or where there is none from those beside the library, which then are the
  * instance's; fill the context, but its resources. Fails if there is none, or it is not one of this binary, damaged or
  * out of a range; HSEP_WARNED: the instance's resources had none. */

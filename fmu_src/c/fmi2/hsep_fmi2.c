@@ -1,8 +1,6 @@
 /* FMI 2.0 for co-simulation: instances, experiments, steps and saved states. Every number comes from the model. */
 #include "hsep_fmi2_calls.h"
 
-#include <stdlib.h>
-
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return "2.0"; }
@@ -32,8 +30,8 @@ fmi2Component fmi2Instantiate(
     hsep_component filled = {.hand = fmi2_hand, .categories = HSEP_LOG_ERROR};
     (void)visible;
     filled.instance.words = hsep_fmi2_words();
-    filled.instance.allocate = own_memory ? calloc : functions->allocateMemory;
-    filled.instance.release = own_memory ? free : functions->freeMemory;
+    filled.instance.allocate = own_memory ? HSEP_CALLOC : functions->allocateMemory;
+    filled.instance.release = own_memory ? HSEP_FREE : functions->freeMemory;
     if (functions != NULL) {
         filled.logger = (void (*)(void))functions->logger;
         filled.environment = functions->componentEnvironment;

@@ -1,8 +1,6 @@
 /* FMI 3.0 for co-simulation: instances, experiments, steps and saved states. Every number comes from the model. */
 #include "hsep_fmi3_calls.h"
 
-#include <stdlib.h>
-
 const char *fmi3GetVersion(void) { return "3.0"; }
 
 static void fmi3_hand(const hsep_component *component, int status, const char *category, const char *text)
@@ -22,8 +20,8 @@ fmi3Instance fmi3InstantiateCoSimulation(
     /* An early return is allowed, never needed; without intermediate updates there is nothing to ask for in them. */
     (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
     filled.instance.words = hsep_fmi3_words();
-    filled.instance.allocate = calloc;
-    filled.instance.release = free;
+    filled.instance.allocate = HSEP_CALLOC;
+    filled.instance.release = HSEP_FREE;
     filled.logger = (void (*)(void))logMessage;
     filled.environment = instanceEnvironment;
     if (eventModeUsed) {

@@ -1,8 +1,7 @@
 /* FMI 3.0's words; single variables and modes have a value reference for each value, windows one each, then comes the
  * time. */
 #include "hsep_fmi3_calls.h"
-
-#include <stdio.h>
+#include "hsep_text.h"
 
 /* Value references before the windows, which are the places of the values. */
 static size_t fmi3_before_windows(const hsep_context *context)
@@ -39,7 +38,7 @@ static const char *fmi3_name(const hsep_context *context, size_t reference, char
     if (reference < fmi3_before_windows(context)) {
         return hsep_table_name(context, reference, text);
     }
-    snprintf(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
+    hsep_text(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
     return text;
 }
 

@@ -1,16 +1,13 @@
 #include "hsep_check.h"
 
 #include "hsep_table.h"
+#include "hsep_text.h"
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-static const double check_warm_up_tolerance = 1e-6; /* samples */
-static const double check_warm_up = 0.3;            /* s, where it is automatic */
-static const double check_position_max = 1e3;       /* m */
+static const double check_position_max = 1e3; /* m */
 
 HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
 {
@@ -21,7 +18,7 @@ HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
     }
     va_list arguments;
     va_start(arguments, format);
-    const int wanted = vsnprintf(message + used, HSEP_MESSAGE_SIZE - used, format, arguments);
+    const int wanted = hsep_text_list(message + used, HSEP_MESSAGE_SIZE - used, format, arguments);
     va_end(arguments);
     if (wanted < 0) {
         message[used] = '\0';
@@ -45,15 +42,12 @@ HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep
         memcpy(text, isnan(value) ? "nan\0" : value > 0.0 ? "inf\0" : "-inf", 5);
         return text;
     }
-    int digits = 0;
-    do { /* the fewest digits behind the first one that read back as the same number */
-        snprintf(text, HSEP_NUMBER_SIZE, "%.*e", digits, value);
-    } while (strtod(text, NULL) != value && ++digits < 17); /* 17 digits always do */
-    const char *mark = strchr(text, 'e');
-    const int exponent = mark != NULL ? (int)strtol(mark + 1, NULL, 10) : 0;
-    const int decimals = digits > exponent ? digits - exponent : 0;
+    int exponent = 0;
+    const int digits = hsep_text_digits(value, &exponent), decimals = digits > exponent ? digits - exponent : 0;
     if (exponent >= -4 && exponent < 16) {
-        snprintf(text, HSEP_NUMBER_SIZE, "%.*f", decimals > 0 || kind != HSEP_REAL ? decimals : 1, value);
+        hsep_text(text, HSEP_NUMBER_SIZE, "%.*f", decimals > 0 || kind != HSEP_REAL ? decimals : 1, value);
+    } else {
+        hsep_text(text, HSEP_NUMBER_SIZE, "%.*e", digits, value);
     }
     return text;
 }
@@ -65,9 +59,9 @@ static void check_range_text(char text[], size_t size, const hsep_variable *v, c
     const char *zero = v->nonzero > 0.0 ? "0 or " : "";
     char automatic[HSEP_NUMBER_SIZE] = "";
     if (isfinite(v->automatic)) {
-        snprintf(automatic, sizeof automatic, "%g (automatic) or ", v->automatic);
+        hsep_text(automatic, sizeof automatic, "%g (automatic) or ", v->automatic);
     }
-    snprintf(
+    hsep_text(
         text, size, "%s%s%g " HSEP_TO " %.10g%s%s", automatic, zero, v->nonzero > 0.0 ? v->nonzero : v->minimum,
         v->maximum, space, unit);
 }
@@ -126,17 +120,6 @@ HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
     return problems;
 }
 
-HSEP_API double hsep_warm_up(double t_init, int trust)
-{
-    const double automatic = trust ? 0.0 : check_warm_up;
-    return t_init < 0.0 ? automatic : t_init;
-}
-
-HSEP_API double hsep_warm_up_samples(double t_init, double T_s)
-{
-    return fmax(0.0, ceil(t_init / T_s - check_warm_up_tolerance));
-}
-
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[])
 {
     static const char *const names[] = {"", "x_pb", "x_h", "x_dm"};
@@ -156,7 +139,7 @@ HSEP_API hsep_status hsep_check_position(const char *name, double value, const c
     if (fabs(value) <= check_position_max) {
         return HSEP_OK;
     }
-    snprintf(end, sizeof end, where, at);
+    hsep_text(end, sizeof end, where, at);
     if (isfinite(value)) {
         hsep_message_add(
             message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g%s", name, check_position_max, value, end);

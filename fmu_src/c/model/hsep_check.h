@@ -3,7 +3,7 @@
 #ifndef HSEP_CHECK_H
 #define HSEP_CHECK_H
 
-#include "hsep_api.h"
+#include "hsep.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_range.h"
@@ -32,12 +32,6 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
 
 /* Check 1 <= p <= Np and 0 <= q < Np; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_lags(double Np, double p, double q, char message[]);
-
-/* Warm-up, s: t_init, or where that is automatic none with trust and 0.3 s without. */
-HSEP_API double hsep_warm_up(double t_init, int trust);
-
-/* Return how many samples have t < t_init, counted in samples so that rounding of times cannot tell; whole, >= 0. */
-HSEP_API double hsep_warm_up_samples(double t_init, double T_s);
 
 /* Refuse outputs of a window that diverges. */
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);

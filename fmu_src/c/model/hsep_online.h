@@ -3,7 +3,7 @@
 #ifndef HSEP_ONLINE_H
 #define HSEP_ONLINE_H
 
-#include "hsep_api.h"
+#include "hsep.h"
 #include "hsep_fmu.h"
 #include "hsep_model.h"
 
@@ -32,8 +32,8 @@ typedef hsep_compensator_parameters hsep_online_parameters; /* the predictor's a
 /* Check the settings of this model alone; return how many settings are wrong, each added to message. */
 HSEP_API int hsep_online_check(const double values[], char message[]);
 
-/* Read the settings of this model alone, after all parameters were checked and the common ones read. */
-HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters);
+/* Derive the parameters of this model, after all were checked and the common ones read; its own are read. */
+HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_parameters *common);
 
 /* Check the tunable parameters; return how many are out of their range, each added to message. */
 HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[]);

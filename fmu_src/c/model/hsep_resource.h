@@ -1,9 +1,12 @@
-/* Files of the FMU's resources folder: a magic word of 8 bytes, then 8-byte numbers, little-endian. */
+/* Files of the FMU's resources folder: a magic word of 8 bytes, then 8-byte numbers, little-endian. There are none with
+ * HSEP_NO_FILES. */
 #ifndef HSEP_RESOURCE_H
 #define HSEP_RESOURCE_H
 
 #include "hsep_api.h"
 #include "hsep_model.h"
+
+#ifndef HSEP_NO_FILES
 
 #include <stdint.h>
 #include <stdio.h>
@@ -16,7 +19,6 @@ HSEP_API FILE *hsep_resource_open(const hsep_context *context, const char *name)
  * them in the file, which is then read up to there; -1 if it is not such a file. */
 HSEP_API double hsep_resource_head(FILE *file, const char magic[8], uint64_t head[], size_t n_head);
 
-/* CRC-32 as in zlib, of bytes behind those that gave crc; 0 before the first. */
-HSEP_API uint32_t hsep_crc(uint32_t crc, const void *bytes, size_t size);
+#endif
 
 #endif

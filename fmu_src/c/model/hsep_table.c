@@ -1,8 +1,8 @@
 #include "hsep_table.h"
 
 #include "hsep_layout.h"
+#include "hsep_text.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* The numbers of the modes are read in place. */
@@ -33,12 +33,12 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
     const char *name = hsep_table_row(context, place)->name;
     if (place >= before) {
         const size_t sample = (place - before) % context->window + 1;
-        snprintf(text, HSEP_NAME_SIZE, "%.40s[%lu]", name, (unsigned long)sample);
+        hsep_text(text, HSEP_NAME_SIZE, "%.40s[%lu]", name, (unsigned long)sample);
     } else if (place >= context->n_scalars) {
         const size_t mode = (place - context->n_scalars) / HSEP_MODE_NUMBERS + 1;
-        snprintf(text, HSEP_NAME_SIZE, "mode[%lu].%.30s", (unsigned long)mode, name);
+        hsep_text(text, HSEP_NAME_SIZE, "mode[%lu].%.30s", (unsigned long)mode, name);
     } else {
-        snprintf(text, HSEP_NAME_SIZE, "%.60s", name);
+        hsep_text(text, HSEP_NAME_SIZE, "%.60s", name);
     }
     return text;
 }

@@ -5,6 +5,7 @@
 
 #include "hsep_check.h"
 #include "hsep_model.h"
+#include "hsep_parameters.h"
 
 HSEP_API int hsep_online_check(const double values[], char message[])
 {
@@ -12,14 +13,10 @@ HSEP_API int hsep_online_check(const double values[], char message[])
     return 0;
 }
 
-HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
+HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_parameters *common)
 {
     (void)values;
-    parameters->preview = parameters->settings.Np;
-    /* The warm-up counts from the end of the first fill. */
-    const hsep_predictor_settings *settings = &parameters->settings;
-    const double t_init = hsep_warm_up(settings->t_init, parameters->trust.trust != 0);
-    parameters->n_init = (double)settings->Np + hsep_warm_up_samples(t_init, settings->T_s);
+    return hsep_predictor_derive(common);
 }
 
 HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[])

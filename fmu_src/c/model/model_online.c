@@ -37,15 +37,14 @@ static hsep_status online_checked(
     if (hsep_online_check(values, message) + lags > 0) {
         return HSEP_REFUSED;
     }
-    hsep_predictor_parameters *predictor = (hsep_predictor_parameters *)parameters;
-    *predictor = (hsep_predictor_parameters){.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
-#define READ(type, name) predictor->settings.name = (type)values[HSEP_VR_##name];
+    hsep_parameters common = {.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
+#define READ(type, name) common.predictor.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
 #undef READ
-#define READ(type, name) predictor->trust.name = (type)values[HSEP_VR_##name];
+#define READ(type, name) common.trust.name = (type)values[HSEP_VR_##name];
     HSEP_TRUST_SETTINGS(READ)
 #undef READ
-    hsep_online_read(values, parameters);
+    *parameters = hsep_online_derive(values, &common);
     return HSEP_OK;
 }
 
@@ -56,7 +55,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
         return HSEP_REFUSED;
     }
     const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
-    return hsep_state_size(before + HSEP_ONLINE(size)(&parameters), size, message);
+    return hsep_state_size(before + HSEP_ONLINE(block_size)(&parameters), size, message);
 }
 
 HSEP_API hsep_status hsep_model_initialise(
@@ -73,7 +72,7 @@ HSEP_API hsep_status hsep_model_initialise(
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    HSEP_ONLINE(init)(&self->online, &parameters, start);
+    HSEP_ONLINE(block_init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
     if (hsep_weights_load(context, values, context->n_modes, predictor, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -138,7 +137,7 @@ HSEP_API hsep_status hsep_model_check_state(
     memcpy(&head, state, sizeof head);
     const char *online = (const char *)state + (sizeof head - sizeof head.online);
     if (!hsep_inputs_valid(&head.inputs, values[HSEP_VR_T_s]) ||
-        !HSEP_ONLINE(valid)(online, &parameters, (uint64_t)head.inputs.clock.k)) {
+        !HSEP_ONLINE(block_valid)(online, &parameters, (uint64_t)head.inputs.clock.k)) {
         return hsep_state_damaged(message);
     }
     return HSEP_OK;

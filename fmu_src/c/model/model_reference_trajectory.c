@@ -9,11 +9,16 @@
 
 #if defined(HSEP_MODEL_REFERENCE_TRAJECTORY)
 
+#ifdef HSEP_NO_FILES
+#error "ReferenceTrajectory plays files of its resources, which HSEP_NO_FILES leaves out"
+#endif
+
 #include "hsep_check.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_resource.h"
 #include "hsep_state.h"
+#include "hsep_text.h"
 #include "hsep_trajectory.h"
 
 #include <math.h>
@@ -41,7 +46,7 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
     if (hsep_check_parameters(context, values, message) > 0) {
         return NULL;
     }
-    snprintf(name, sizeof name, "trajectory_%.0f.bin", values[HSEP_VR_trajectory]);
+    hsep_text(name, sizeof name, "trajectory_%.0f.bin", values[HSEP_VR_trajectory]);
     FILE *file = hsep_resource_open(context, name);
     if (file == NULL) {
         hsep_message_add(

@@ -5,6 +5,7 @@
 
 #include "hsep_check.h"
 #include "hsep_model.h"
+#include "hsep_parameters.h"
 
 #include <math.h>
 
@@ -34,31 +35,12 @@ HSEP_API int hsep_online_check(const double values[], char message[])
     return problems;
 }
 
-HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
+HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_parameters *common)
 {
-    hsep_compensator_settings settings;
-#define READ(type, name) settings.name = (type)values[HSEP_VR_##name];
+#define READ(type, name) common->compensator.name = (type)values[HSEP_VR_##name];
     HSEP_COMPENSATOR_SETTINGS(READ)
 #undef READ
-    hsep_predictor_parameters *predictor = &parameters->predictor;
-    const int trust = predictor->trust.trust != 0;
-    const double T_s = predictor->settings.T_s, t_init = hsep_warm_up(predictor->settings.t_init, trust);
-    predictor->preview = settings.preview;
-    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
-     * known. */
-    predictor->n_init = hsep_warm_up_samples(t_init > 0.0 ? t_init + (double)settings.preview * T_s : 0.0, T_s);
-    predictor->planned = 1;
-    parameters->planner = (hsep_planner_parameters){
-        .Np = predictor->settings.Np,
-        .preview = settings.preview,
-        .spacing = settings.spacing,
-        .jerk_weight = settings.jerk_weight,
-        .limit =
-            {settings.change_max, settings.v_max * T_s, settings.a_max * (T_s * T_s),
-             settings.j_max * (T_s * T_s * T_s)},
-        .no_reversal = settings.no_reversal != 0,
-        .pinned = trust ? HSEP_PINNED_WITH_TRUST : HSEP_PINNED};
-    parameters->compensate = (hsep_sep_state)settings.compensate;
+    return hsep_compensator_derive(common);
 }
 
 HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[])

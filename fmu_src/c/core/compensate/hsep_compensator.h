@@ -23,7 +23,7 @@
 #ifndef HSEP_COMPENSATOR_H
 #define HSEP_COMPENSATOR_H
 
-#include "hsep_api.h"
+#include "hsep.h"
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
@@ -31,16 +31,13 @@
 
 #include <stdint.h>
 
-/* Model that plans the commands of a window; of the parameter compensate, the best one allowed. */
-typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
-
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
     hsep_sep_state compensate;
 } hsep_compensator_parameters;
 
-typedef struct {
+struct hsep_compensator {
     uint64_t compensate;      /* hsep_sep_state, the best model allowed in the window, */
     uint64_t compensate_next; /* and from the next one on */
     double change_max_next;   /* m, of the command, likewise */
@@ -56,24 +53,18 @@ typedef struct {
     uint64_t trial;     /* the physics model of a trial */
     uint64_t planner, predictor;
     uint64_t trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
-} hsep_compensator;
+};
 
 HSEP_ASSERT_WORDS(hsep_compensator, 15);
 
-typedef struct {
-    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
-    double x_dm;                      /* m, now */
-    hsep_sep_state state;             /* of the plan that x_dm follows now */
-} hsep_compensator_outputs;
-
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters);
+HSEP_API double hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
-HSEP_API void hsep_compensator_init(
+HSEP_API void hsep_compensator_block_init(
     hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
 
-/* The predictor, for a warm start between hsep_compensator_init and _begin. */
+/* The predictor, for a warm start between hsep_compensator_block_init and hsep_compensator_begin. */
 HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
 
 HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self);
@@ -84,20 +75,8 @@ HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self);
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
-/* Whether a block, in any alignment and of hsep_compensator_size(parameters) bytes, is a valid state for these
- * parameters at sample k: its layout is that of hsep_compensator_init, and every index lies within it. */
-HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
-
-/* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
- * Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at x_d: with compensate off
- * that rest is followed, and where it is larger than change_max it is the bound. Constant cost; where change_max
- * differs 10 spacing operations more at the window's end. */
-HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max);
-
-/* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
-HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
-
-/* Read the outputs of the next sample. Constant cost. */
-HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
+/* Whether a block, in any alignment and of hsep_compensator_block_size(parameters) bytes, is a valid state for these
+ * parameters at sample k: its layout is that of hsep_compensator_block_init, and every index lies within it. */
+HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
 
 #endif

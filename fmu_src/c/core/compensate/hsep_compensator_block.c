@@ -37,23 +37,24 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     self->spline_pb = hsep_take(&end, preview);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
-    self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));
+    self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
     self->trusted =
         predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&trusted, &parameters->planner)) : 0;
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
+HSEP_API double hsep_compensator_block_size(const hsep_compensator_parameters *parameters)
 {
     return compensator_lay_out(&(hsep_compensator){0}, parameters);
 }
 
-HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
+HSEP_API void hsep_compensator_block_init(
+    hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    memset(self, 0, (size_t)hsep_compensator_size(parameters));
+    memset(self, 0, (size_t)hsep_compensator_block_size(parameters));
     (void)compensator_lay_out(self, parameters);
-    hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
+    hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
     if (self->trusted) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
@@ -75,7 +76,7 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
 }
 
-HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
+HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
@@ -95,5 +96,5 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
            hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
            (!got.trusted ||
             hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &trusted, &parameters->planner)) &&
-           hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
+           hsep_predictor_block_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }

@@ -8,6 +8,13 @@
 #ifndef HSEP_API_H
 #define HSEP_API_H
 
+#ifdef __FAST_MATH__
+#error "hsep needs IEEE 754 arithmetic, NaN and the order of operations as written: compile without -ffast-math"
+#endif
+#ifdef _M_FP_FAST
+#error "hsep needs IEEE 754 arithmetic, NaN and the order of operations as written: compile without /fp:fast"
+#endif
+
 #ifndef HSEP_API
 #define HSEP_API
 #endif

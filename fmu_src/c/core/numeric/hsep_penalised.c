@@ -15,10 +15,10 @@ static void penalised_copy_leading(const hsep_regression *self, hsep_regression 
     const double *from = hsep_at_const(self, self->tiles);
     double *tile = hsep_at(to, to->tiles);
     memcpy(hsep_at(to, to->inverse_d), hsep_at_const(self, self->inverse_d), (size_t)n * sizeof(double));
-    for (uint64_t I = 0; I < kept; I++) { /* a row of tiles has those from the diagonal on */
-        memcpy(tile, from, (size_t)(HSEP_TILE_STRIDE * (kept - I)) * sizeof(double));
-        from += HSEP_TILE_STRIDE * (all - I);
-        tile += HSEP_TILE_STRIDE * (kept - I);
+    for (uint64_t band = 0; band < kept; band++) { /* a row of tiles has those from the diagonal on */
+        memcpy(tile, from, (size_t)(HSEP_TILE_STRIDE * (kept - band)) * sizeof(double));
+        from += HSEP_TILE_STRIDE * (all - band);
+        tile += HSEP_TILE_STRIDE * (kept - band);
     }
     for (uint64_t i = 0; i < n; i++) {
         *hsep_regression_entry(to, i, n) = *hsep_regression_entry_const(self, i, self->n);

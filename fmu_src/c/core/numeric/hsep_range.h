@@ -8,9 +8,6 @@
 
 #define HSEP_PREDICTION_MAX 1e100 /* m: sums of squares of smaller values cannot overflow */
 
-/* Signal of a window that exceeds it, because the learned recursion diverges. */
-typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_DIVERGES_X_DM } hsep_divergence;
-
 /* Whether all entries of a, (n,) doubles in any alignment, are numbers within +- limit. */
 static inline int hsep_within(const void *a, uint64_t n, double limit)
 {

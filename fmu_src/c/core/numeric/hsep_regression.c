@@ -180,9 +180,9 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
     const uint64_t n = self->n, n_tiles = self->n_tiles;
     const double *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
-    for (uint64_t I = n_tiles; I-- > 0;) {
-        const uint64_t first = HSEP_TILE * I, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
-        tile -= HSEP_TILE_STRIDE * (n_tiles - I);
+    for (uint64_t band = n_tiles; band-- > 0;) {
+        const uint64_t first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
+        tile -= HSEP_TILE_STRIDE * (n_tiles - band);
         double sum[4] = {0.0, 0.0, 0.0, 0.0};
         const double *t = tile + HSEP_TILE_STRIDE;
         for (uint64_t j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
@@ -192,7 +192,7 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
         }
         for (uint64_t r = height; r-- > 0;) {
             /* w_r = z_r - sum_j>r u_rj w_j: the target's tile has the last features and z, and may be this one. */
-            const double *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - I) + 4 * r;
+            const double *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
             double w_r = last[n % HSEP_TILE] - sum[r];
             for (uint64_t c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
                 w_r -= last[c] * w[n - n % HSEP_TILE + c];

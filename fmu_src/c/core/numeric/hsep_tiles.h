@@ -17,8 +17,8 @@
 /* Place of entry (i, j), i <= j, of [U z] in tiles for 4 n_tiles columns. */
 static inline uint64_t hsep_tile_place(uint64_t n_tiles, uint64_t i, uint64_t j)
 {
-    const uint64_t I = i / HSEP_TILE, J = j / HSEP_TILE;
-    const uint64_t tile = I * n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
+    const uint64_t row = i / HSEP_TILE, column = j / HSEP_TILE;
+    const uint64_t tile = row * n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
     return HSEP_TILE_STRIDE * tile + 4 * (i % HSEP_TILE) + j % HSEP_TILE;
 }
 

@@ -237,4 +237,5 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->batch = self->k / self->Np;
     outputs->n_rejected = hsep_residual_n_rejected((const hsep_residual_model *)hsep_at_const(self, self->model));
     outputs->hybrid_active = i >= self->n_physics;
+    outputs->divergence = (hsep_divergence)self->divergence;
 }

@@ -24,7 +24,7 @@
 #ifndef HSEP_PREDICTOR_H
 #define HSEP_PREDICTOR_H
 
-#include "hsep_api.h"
+#include "hsep.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
@@ -45,7 +45,7 @@ typedef struct {
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 
-typedef struct {
+struct hsep_predictor {
     uint64_t Np, late, n, preview; /* n = Np + late */
     uint64_t p, q;                 /* lags of e_pb and of x_pb */
     double n_init;
@@ -73,28 +73,20 @@ typedef struct {
     uint64_t physics, uncertainty;
     uint64_t model;  /* the residual model */
     uint64_t motion; /* the motion before the run; with trust, alone */
-} hsep_predictor;
+};
 
 HSEP_ASSERT_WORDS(hsep_predictor, 33);
 
-typedef struct {
-    double x_d, x_pb, x_h;                 /* m, now */
-    double x_h_std;                        /* m, standard deviation of the error of x_h; 0 where it is not known */
-    double rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init */
-    uint64_t batch;                        /* floor(k / Np) */
-    uint64_t n_rejected;                   /* measurements that were missing or not plausible, with trust */
-    int hybrid_active;                     /* whether x_h is the hybrid prediction now */
-} hsep_predictor_outputs;
-
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters);
+HSEP_API double hsep_predictor_block_size(const hsep_predictor_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
-HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
+HSEP_API void hsep_predictor_block_init(
+    hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
 
-/* Whether a block, in any alignment and of hsep_predictor_size(parameters) bytes, is a valid state for these parameters
- * at sample k: its layout is that of hsep_predictor_init, and every index lies within it. */
-HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k);
+/* Whether a block, in any alignment and of hsep_predictor_block_size(parameters) bytes, is a valid state for these
+ * parameters at sample k: its layout is that of hsep_predictor_block_init, and every index lies within it. */
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k);
 
 /* The residual model, and its parameters. */
 HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
@@ -104,15 +96,6 @@ HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 
 /* What is known of the errors of x_h. */
 HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
-
-/* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
-HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
-
-/* Read the outputs of the next sample. Constant cost. */
-HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
-
-/* Standard deviation of the error of x_h at sample i of the window, m; 0 where it is not known. */
-HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
 
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);

@@ -91,14 +91,14 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+HSEP_API double hsep_predictor_block_size(const hsep_predictor_parameters *parameters)
 {
     return predictor_lay_out(&(hsep_predictor){0}, parameters);
 }
 
-HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+HSEP_API void hsep_predictor_block_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
 {
-    memset(self, 0, (size_t)hsep_predictor_size(parameters));
+    memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
     (void)predictor_lay_out(self, parameters);
     self->start = start;
     self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
@@ -119,7 +119,7 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     }
 }
 
-HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
 {
     hsep_predictor got;
     memcpy(&got, block, sizeof got);

@@ -6,21 +6,11 @@
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
 
-#include "hsep_api.h"
+#include "hsep.h"
 #include "hsep_layout.h"
 
 #include <stddef.h>
 #include <stdint.h>
-
-/* One mode of eq. (15), (alpha + beta s) / (s^2 + 2 zeta omega s + omega^2) with omega = 2 pi f_n. */
-typedef struct {
-    double f_n;   /* natural frequency, Hz, > 0 */
-    double zeta;  /* damping ratio, 1, > 0; 1 is critical, more is over-damped */
-    double alpha; /* numerator, 1/s^2 */
-    double beta;  /* numerator, 1/s */
-} hsep_mode;
-
-typedef enum { HSEP_ZERO_ORDER_HOLD = 0, HSEP_FIRST_ORDER_HOLD = 1 } hsep_hold;
 
 /* A mode between two samples: s(k+1) = A s(k) + b u(k), its part of x_pb(k) is c s(k) + d u(k); s in m. */
 typedef struct {

@@ -1,0 +1,192 @@
+#include "hsep_learned.h"
+
+#include "hsep_crc.h"
+#include "hsep_ranges.h"
+
+#include <string.h>
+
+#define LEARNED_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
+
+/* As hsep_learned_source's: from memory. */
+static size_t learned_read_memory(hsep_learned_source *self, void *to, size_t size)
+{
+    const size_t read = size < self->left ? size : self->left;
+    memcpy(to, self->bytes, read);
+    self->bytes += read;
+    self->left -= read;
+    return read;
+}
+
+HSEP_API hsep_learned_source hsep_learned_in_memory(const void *bytes, size_t size)
+{
+    return (hsep_learned_source){.read = learned_read_memory, .bytes = bytes, .left = size};
+}
+
+HSEP_API int hsep_learned_read(hsep_learned_source *source, void *to, size_t size)
+{
+    return source->read(source, to, size) == size;
+}
+
+HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
+{
+    unsigned char bytes[LEARNED_CHUNK + sizeof(uint64_t)];
+    uint32_t crc = 0;
+    uint64_t sum = 0;
+    size_t held = 0; /* of the bytes: the last 8 so far may be the checksum */
+    *size = 0.0;
+    for (;;) {
+        const size_t read = source->read(source, bytes + held, sizeof bytes - held);
+        *size += (double)read;
+        held += read;
+        if (held < sizeof bytes) {
+            break;
+        }
+        crc = hsep_crc(crc, bytes, LEARNED_CHUNK);
+        held -= LEARNED_CHUNK;
+        memcpy(bytes, bytes + LEARNED_CHUNK, held);
+    }
+    if (held < sizeof sum) {
+        return 0;
+    }
+    memcpy(&sum, bytes + held - sizeof sum, sizeof sum);
+    return sum == hsep_crc(crc, bytes, held - sizeof sum);
+}
+
+/* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
+static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
+{
+    for (uint64_t i = 0; i < hsep_residual_n_learned(model); i++) {
+        if (!hsep_learned_read(source, hsep_residual_learned(model, i), sizeof(double))) {
+            return 0;
+        }
+    }
+    double *errors = hsep_uncertainty_learned(uncertainty);
+    return hsep_learned_read(source, errors, HSEP_N_UNCERTAINTY * sizeof(double)) &&
+           hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
+}
+
+/* Read a factor row after row through the regression's own row: 0 if it is damaged. */
+static int learned_take_factor(hsep_learned_source *source, hsep_regression *regression, uint64_t n_samples)
+{
+    for (uint64_t i = 0; i <= regression->n; i++) {
+        const size_t left = (size_t)(regression->n + 1 - i);
+        if (!hsep_learned_read(source, hsep_regression_row(regression), left * sizeof(double)) ||
+            !hsep_regression_load(regression, i)) {
+            return 0;
+        }
+    }
+    regression->n_samples = n_samples;
+    return 1;
+}
+
+/* Bytes of a file with this head. */
+static double learned_size(const hsep_learned_head *head, hsep_residual_model *model)
+{
+    double words = 4.0 * (double)head->n_settings + (double)head->n_learned + 1.0;
+    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
+        const double n = (double)hsep_residual_factor(model, i)->n;
+        words += 0.5 * (n + 1.0) * (n + 2.0);
+    }
+    return (double)sizeof *head + words * (double)sizeof(double);
+}
+
+HSEP_API int hsep_learned_take(
+    hsep_learned_source *source, const hsep_learned_head *head, double size, hsep_predictor *predictor)
+{
+    hsep_residual_model *model = hsep_predictor_model(predictor);
+    if (head->n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) || size != learned_size(head, model) ||
+        !learned_take_numbers(source, model, hsep_predictor_uncertainty(predictor))) {
+        return 0;
+    }
+    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
+        if (!learned_take_factor(source, hsep_residual_factor(model, i), head->n_samples)) {
+            return 0;
+        }
+    }
+    hsep_residual_restart(model);
+    return 1;
+}
+
+/* The number of a mode by the name that the file has it under, mode[1].f_n; NULL if there is none. */
+static const double *learned_mode_number(const hsep_parameters *parameters, const char *name)
+{
+    uint64_t mode = 0;
+    if (strncmp(name, "mode[", 5) != 0) {
+        return NULL;
+    }
+    for (name += 5; *name >= '0' && *name <= '9'; name++) {
+        mode = 10 * mode + (uint64_t)(*name - '0');
+    }
+    if (strncmp(name, "].", 2) != 0 || mode < 1 || mode > parameters->n_modes) {
+        return NULL;
+    }
+    const hsep_mode *found = &parameters->modes[mode - 1];
+#define NUMBER(type, number, usual, least, most, nonzero, automatic, learned) \
+    if (strcmp(name + 2, #number) == 0) { \
+        return &found->number; \
+    }
+    HSEP_MODE_RANGES(NUMBER)
+#undef NUMBER
+    return NULL;
+}
+
+/* Whether a setting of the file is one that weights depend on, and has this value now. */
+static int learned_agrees(const hsep_learned_setting *setting, const hsep_parameters *parameters)
+{
+    const double *number = learned_mode_number(parameters, setting->name);
+    if (number != NULL) {
+        return *number == setting->value;
+    }
+#define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
+    if (learned && strcmp(setting->name, #own) == 0) { \
+        return (double)parameters->predictor.own == setting->value; \
+    }
+    HSEP_PREDICTOR_RANGES(SAME)
+#undef SAME
+#define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
+    if (learned && strcmp(setting->name, #own) == 0) { \
+        return (double)parameters->trust.own == setting->value; \
+    }
+    HSEP_TRUST_RANGES(SAME)
+#undef SAME
+    return 0;
+}
+
+/* Settings that weights depend on, the modes' numbers among them. */
+static uint64_t learned_n_settings(const hsep_parameters *parameters)
+{
+#define COUNT(type, own, usual, least, most, nonzero, automatic, learned) +(learned)
+    const uint64_t n = 0 HSEP_PREDICTOR_RANGES(COUNT) HSEP_TRUST_RANGES(COUNT);
+    const uint64_t n_mode = 0 HSEP_MODE_RANGES(COUNT);
+#undef COUNT
+    return n + n_mode * parameters->n_modes;
+}
+
+HSEP_API hsep_began
+hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, const void *bytes, size_t size)
+{
+    hsep_learned_source source = hsep_learned_in_memory(bytes, size);
+    hsep_learned_head head;
+    double counted = 0.0;
+    if (!hsep_learned_whole(&source, &counted)) {
+        return HSEP_WEIGHTS_DAMAGED;
+    }
+    source = hsep_learned_in_memory(bytes, size);
+    if (!hsep_learned_read(&source, &head, sizeof head) ||
+        memcmp(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic) != 0) {
+        return HSEP_WEIGHTS_DAMAGED;
+    }
+    if (head.n_modes != parameters->n_modes || head.n_settings != learned_n_settings(parameters)) {
+        return HSEP_WEIGHTS_OTHER;
+    }
+    for (uint64_t i = 0; i < head.n_settings; i++) {
+        hsep_learned_setting setting;
+        if (!hsep_learned_read(&source, &setting, sizeof setting) || setting.name[sizeof setting.name - 1] != '\0') {
+            return HSEP_WEIGHTS_DAMAGED;
+        }
+        if (!learned_agrees(&setting, parameters)) {
+            return HSEP_WEIGHTS_OTHER;
+        }
+    }
+    return hsep_learned_take(&source, &head, counted, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
+}

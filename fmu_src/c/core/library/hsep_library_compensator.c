@@ -1,0 +1,38 @@
+/* The library's compensator: its size, beginning and check from the settings; the rest is hsep_compensator.c's. */
+#include "hsep_compensator.h"
+#include "hsep_learned.h"
+#include "hsep_parameters.h"
+
+HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters)
+{
+    if (!hsep_compensator_allows(parameters)) {
+        return 0;
+    }
+    const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
+    return hsep_block_bytes(hsep_compensator_block_size(&derived));
+}
+
+HSEP_API hsep_began hsep_compensator_init(
+    hsep_compensator *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size)
+{
+    const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
+    hsep_compensator_block_init(self, &derived, start);
+    const hsep_began began =
+        weights == NULL ? HSEP_BEGAN
+                        : hsep_learned_load(hsep_compensator_predictor(self), parameters, weights, weights_size);
+    if (began != HSEP_BEGAN) {
+        hsep_compensator_block_init(self, &derived, start);
+    }
+    hsep_compensator_begin(self);
+    return began;
+}
+
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k)
+{
+    const size_t expected = hsep_compensator_size(parameters);
+    if (expected == 0 || size != expected) {
+        return 0;
+    }
+    const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
+    return hsep_compensator_block_valid(bytes, &derived, k);
+}

@@ -1,0 +1,35 @@
+/* The library's predictor: its size, beginning and check from the settings; the rest is hsep_predictor.c's. */
+#include "hsep_learned.h"
+#include "hsep_parameters.h"
+#include "hsep_predictor.h"
+
+HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
+{
+    if (!hsep_predictor_allows(parameters)) {
+        return 0;
+    }
+    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
+    return hsep_block_bytes(hsep_predictor_block_size(&derived));
+}
+
+HSEP_API hsep_began hsep_predictor_init(
+    hsep_predictor *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size)
+{
+    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
+    hsep_predictor_block_init(self, &derived, start);
+    const hsep_began began = weights == NULL ? HSEP_BEGAN : hsep_learned_load(self, parameters, weights, weights_size);
+    if (began != HSEP_BEGAN) {
+        hsep_predictor_block_init(self, &derived, start);
+    }
+    return began;
+}
+
+HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k)
+{
+    const size_t expected = hsep_predictor_size(parameters);
+    if (expected == 0 || size != expected) {
+        return 0;
+    }
+    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
+    return hsep_predictor_block_valid(bytes, &derived, k);
+}

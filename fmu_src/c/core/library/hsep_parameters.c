@@ -1,0 +1,125 @@
+#include "hsep_parameters.h"
+
+#include "hsep_ranges.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
+static const double parameters_warm_up = 0.3;            /* s, where it is automatic, without trust */
+
+HSEP_API void hsep_defaults(hsep_parameters *parameters)
+{
+    memset(parameters, 0, sizeof *parameters);
+#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->predictor.name = (type)usual;
+    HSEP_PREDICTOR_RANGES(USUAL)
+#undef USUAL
+#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->trust.name = (type)usual;
+    HSEP_TRUST_RANGES(USUAL)
+#undef USUAL
+#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->compensator.name = (type)usual;
+    HSEP_COMPENSATOR_RANGES(USUAL)
+#undef USUAL
+}
+
+/* Whether a value is in a range, in which nonzero is the least magnitude but 0; NaN is not. */
+static int parameters_within(double value, double least, double most, double nonzero, double automatic)
+{
+    const int tiny = fabs(value) > 0.0 && fabs(value) < nonzero;
+    return (value >= least && value <= most && !tiny) || value == automatic;
+}
+
+static int parameters_mode_allowed(const hsep_mode *mode)
+{
+    int allowed = 1;
+#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
+    allowed &= parameters_within(mode->name, least, most, nonzero, automatic);
+    HSEP_MODE_RANGES(ALLOWED)
+#undef ALLOWED
+    return allowed;
+}
+
+HSEP_API int hsep_predictor_allows(const hsep_parameters *parameters)
+{
+    const hsep_predictor_settings *settings = &parameters->predictor;
+    int allowed = parameters->n_modes >= 1 && parameters->modes != NULL;
+#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
+    allowed &= parameters_within((double)settings->name, least, most, nonzero, automatic);
+    HSEP_PREDICTOR_RANGES(ALLOWED)
+#undef ALLOWED
+#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
+    allowed &= parameters_within((double)parameters->trust.name, least, most, nonzero, automatic);
+    HSEP_TRUST_RANGES(ALLOWED)
+#undef ALLOWED
+    for (uint64_t i = 0; allowed && i < parameters->n_modes; i++) {
+        allowed = parameters_mode_allowed(&parameters->modes[i]);
+    }
+    return allowed && settings->p <= settings->Np && settings->q < settings->Np;
+}
+
+HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters)
+{
+    const hsep_compensator_settings *settings = &parameters->compensator;
+    const hsep_predictor_settings *predictor = &parameters->predictor;
+    int allowed = hsep_predictor_allows(parameters);
+#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
+    allowed &= parameters_within((double)settings->name, least, most, nonzero, automatic);
+    HSEP_COMPENSATOR_RANGES(ALLOWED)
+#undef ALLOWED
+    return allowed && predictor->Np % settings->spacing == 0 &&
+           settings->preview >= predictor->Np + 4 * settings->spacing + 3 &&
+           (predictor->measurement_delay == 0 || parameters->trust.trust);
+}
+
+/* Warm-up, s. */
+static double parameters_t_init(const hsep_parameters *parameters)
+{
+    const double automatic = parameters->trust.trust ? 0.0 : parameters_warm_up;
+    return parameters->predictor.t_init < 0.0 ? automatic : parameters->predictor.t_init;
+}
+
+/* How many samples have t < t_init; whole, >= 0. */
+static double parameters_samples(double t_init, double T_s)
+{
+    return fmax(0.0, ceil(t_init / T_s - parameters_warm_up_tolerance));
+}
+
+HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters)
+{
+    const hsep_predictor_settings *settings = &parameters->predictor;
+    return (hsep_predictor_parameters){
+        .settings = *settings,
+        .trust = parameters->trust,
+        .preview = settings->Np,
+        /* The warm-up counts from the end of the first fill. */
+        .n_init = (double)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
+        .planned = 0,
+        .n_modes = parameters->n_modes,
+        .modes = parameters->modes};
+}
+
+HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters)
+{
+    const hsep_compensator_settings *settings = &parameters->compensator;
+    const double T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
+    hsep_compensator_parameters derived = {.predictor = hsep_predictor_derive(parameters)};
+    derived.predictor.preview = settings->preview;
+    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
+     * known. */
+    derived.predictor.n_init = parameters_samples(t_init > 0.0 ? t_init + (double)settings->preview * T_s : 0.0, T_s);
+    derived.predictor.planned = 1;
+    derived.planner = (hsep_planner_parameters){
+        .Np = parameters->predictor.Np,
+        .preview = settings->preview,
+        .spacing = settings->spacing,
+        .jerk_weight = settings->jerk_weight,
+        .limit =
+            {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
+             settings->j_max * (T_s * T_s * T_s)},
+        .no_reversal = settings->no_reversal != 0,
+        .pinned = parameters->trust.trust ? HSEP_PINNED_WITH_TRUST : HSEP_PINNED};
+    derived.compensate = (hsep_sep_state)settings->compensate;
+    return derived;
+}
+
+HSEP_API size_t hsep_block_bytes(double bytes) { return bytes < 0.5 * (double)SIZE_MAX ? (size_t)bytes : 0; }

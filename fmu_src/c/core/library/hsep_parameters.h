@@ -1,0 +1,20 @@
+/* Parameters of the library: their ranges, and what predictor and compensator derive from them. Reentrant. */
+#ifndef HSEP_PARAMETERS_H
+#define HSEP_PARAMETERS_H
+
+#include "hsep.h"
+#include "hsep_compensator.h"
+#include "hsep_predictor.h"
+
+/* Whether all of a predictor's, or a compensator's, are in their ranges, alone and together. */
+HSEP_API int hsep_predictor_allows(const hsep_parameters *parameters);
+HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters);
+
+/* What the block is laid out by; the modes are not copied. */
+HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters);
+HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters);
+
+/* Bytes of a block as an object's size; 0 if it cannot be one. */
+HSEP_API size_t hsep_block_bytes(double bytes);
+
+#endif

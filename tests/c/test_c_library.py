@@ -1,0 +1,224 @@
+"""The C core as a library: its package, its interface (hsep.h) and the examples beside it."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+import staircase_data as staircase
+from c_compiler import C_SOURCES, compiler, include_flags
+from c_core import SPRING_MASS_DAMPER, STAGE_MODES, CModel
+from c_library import Library, configured, installed
+from library_models import trained_predictor
+from places import ROOT
+
+from hybridsep import backtest
+from hybridsep.base.settings import PARAMETERS, PredictorSettings
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.fmi.weights import weights_file
+from hybridsep.logs.example import write_example
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.predictor import HybridPredictor
+
+CONSUMER = ROOT / "tests" / "c" / "consumer"
+KINDS = {"predictor": {**PREDICTOR_SETTINGS, **TRUST_SETTINGS}}
+KINDS["compensator"] = {**KINDS["predictor"], **COMPENSATOR_SETTINGS}
+
+
+def library(kind: str = "predictor", modes: list[dict[str, float]] | None = None, **settings: float) -> Library:
+    return Library(kind, settings, [SPRING_MASS_DAMPER] if modes is None else modes)
+
+
+def program(path: Path, *arguments: str | Path) -> str:
+    return subprocess.run([path, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.slow
+def test_other_projects_find_the_package(tmp_path: Path) -> None:
+    configured(
+        CONSUMER, tmp_path, f"CMAKE_PREFIX_PATH={installed()}", "CMAKE_CXX_FLAGS=-Wall -Wextra -pedantic -Werror"
+    )
+    assert [program(tmp_path / name) for name in ("in_c", "in_cpp")] == ["9 1\n", "9 1\n"]
+    cache = (tmp_path / "CMakeCache.txt").read_text(encoding="utf-8")
+    assert f"hsep_DIR:PATH={installed()}/" in cache  # and no other one
+
+
+@pytest.mark.slow
+def test_pkg_config_tells_where_it_is(tmp_path: Path) -> None:
+    (file,) = installed().rglob("lib*/pkgconfig/hsep.pc")
+    fields = dict(re.findall(r"^(Cflags|Libs): (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE))
+    prefix = str(file.parent / ".." / "..")
+    cflags, libs = (fields[name].replace("${prefix}", prefix).split() for name in ("Cflags", "Libs"))
+    subprocess.run([*compiler(), *cflags, CONSUMER / "main.c", *libs, "-o", tmp_path / "main"], check=True)
+    assert program(tmp_path / "main") == "9 1\n"
+
+
+@pytest.mark.slow
+def test_a_log_is_replayed(tmp_path: Path) -> None:
+    """The example prints what the library's replay finds, of the log that hybridsep writes."""
+    log = tmp_path / "log.csv"
+    write_example(log)
+    lines = log.read_text(encoding="utf-8").splitlines()[:6002]  # 6 s of it
+    log.write_text("\n".join(lines), encoding="utf-8")
+    said = program(installed() / "build" / "replay", log, 100, 25.0, 0.05)
+    _, x_d, x = 1e-3 * np.array([list(map(float, line.split(","))) for line in lines[2:]]).T
+    model = ModalModel([Mode(25.0, 0.05, (50.0 * math.pi) ** 2, 0.0)])
+    found = backtest(HybridPredictor(model, PredictorSettings(Np=100)), x_d, x).summary()
+    printed = [float(number) for number in re.findall(r"\d+\.\d+", said)]
+    assert printed == pytest.approx([found[name] for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")], abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the example of a loop in real time is Linux's alone")
+def test_a_loop_in_real_time_prints_its_histogram() -> None:
+    said = program(installed() / "build" / "realtime", "0.3")
+    for title in ("step", "late by"):
+        _, _, histogram = said.partition(f"\n{title}: ")
+        counts = re.match(r".*\n((?:  from .*\n)+)", histogram)
+        assert counts is not None, said
+        assert sum(int(line.split()[-1]) for line in counts.group(1).splitlines()) == 300
+    error = re.search(r"rms of the servo error: (\S+) um over 300 samples", said)
+    assert error is not None
+    assert 0.0 < float(error.group(1)) < 100.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parameters_out_of_their_ranges_are_refused(kind: str) -> None:
+    """One by one, at either end and as no number, and only then."""
+    for trust in (0, 1):
+        assert library(kind, trust=trust).size() > 0
+    least = {"p": 1, "q": 0}
+    for name, parameter in KINDS[kind].items():
+        most, whole = parameter.maximum, parameter.kind is not float
+        wrong = [most + 1 if whole else math.nextafter(most, math.inf)]
+        if whole:
+            wrong += [parameter.minimum - 1] if parameter.minimum > 0 else [2**64 - 1]
+        else:
+            beneath = math.nextafter(parameter.minimum, -math.inf)
+            wrong += [math.nan, math.inf, -math.inf, beneath, *([0.5 * parameter.nonzero] if parameter.nonzero else [])]
+        refused = [library(kind, **{**least, name: value}).size() for value in wrong]
+        assert refused == [0] * len(wrong), name
+        if parameter.automatic is not None:
+            assert library(kind, **{name: parameter.automatic}).size() > 0, name
+
+
+def test_parameters_that_do_not_fit_together_are_refused() -> None:
+    assert library(Np=20, p=20, q=19).size() > 0
+    assert [library(Np=20, p=21, q=0).size(), library(Np=20, p=20, q=20).size()] == [0, 0]
+    fits = {"Np": 20, "p": 20, "spacing": 2, "preview": 31}
+    assert library("compensator", **fits).size() > 0
+    wrong: list[dict[str, float]] = [
+        {"spacing": 3, "preview": 200},
+        {"preview": 30},
+        {"trust": 0, "measurement_delay": 1},
+    ]
+    assert [library("compensator", **{**fits, **one}).size() for one in wrong] == [0, 0, 0]
+    assert library("compensator", **{**fits, "measurement_delay": 1}).size() > 0
+    assert library("predictor", [], Np=20, p=20).size() == 0
+    for name in ("f_n", "zeta", "alpha", "beta"):
+        for value in (math.nan, 2 * PARAMETERS[name].maximum):
+            assert library("predictor", [SPRING_MASS_DAMPER, {**SPRING_MASS_DAMPER, name: value}]).size() == 0
+
+
+def test_defaults_are_the_declared_ones() -> None:
+    given = library("compensator").parameters
+    parts = (
+        (given.predictor, PREDICTOR_SETTINGS),
+        (given.trust, TRUST_SETTINGS),
+        (given.compensator, COMPENSATOR_SETTINGS),
+    )
+    for part, settings in parts:
+        found = {name: getattr(part, name) for name in settings}
+        assert found == {name: parameter.to_fmi(parameter.default) for name, parameter in settings.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trust", [0, 1])
+def test_outputs_are_the_models(trust: int) -> None:
+    """The interface without FMI computes what an FMU does, to the last bit."""
+    x_d = staircase.commanded()[:700]
+    settings = {"Np": 50, "p": 10, "preview": 100, "trust": trust}
+    compensator = library("compensator", STAGE_MODES, **settings)
+    assert compensator.begin(float(x_d[0])) == 0
+    model = CModel("compensator_2", {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
+    for k, x_d_ahead in enumerate(x_d):
+        x_meas = x_d[max(0, k - 101)] + 1e-5 * math.sin(0.1 * k)
+        model["x_d_ahead"], model["x_meas"] = x_d_ahead, x_meas
+        model.step(k * 1e-3)
+        outputs = compensator.sample(x_d_ahead, x_meas)
+        found = (outputs.x_dm, outputs.predicted.x_h, outputs.predicted.x_h_std, outputs.state)
+        assert found == tuple(model[name] for name in ("x_dm", "x_h", "x_h_std", "sep_state")), k
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_weights_from_memory(kind: str) -> None:
+    trained = trained_predictor("HybridPredictor")
+    content = weights_file(trained)
+    modes = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")} for mode in trained.model.modes]
+    settings = {name: float(value) for name, value in trained.settings.to_fmi().items()}
+    given = library(kind, modes)
+    for name, value in settings.items():
+        given.parameters[name] = value if KINDS[kind][name].kind is float else int(value)
+    assert given.begin(0.0, content) == 0
+    warm = bytes(given.block)
+    assert given.begin(0.0) == 0
+    cold = bytes(given.block)
+    assert warm != cold
+    assert given.is_valid(warm, 0)
+    for damaged in (b"", content[:-1], content[:200] + bytes([content[200] ^ 1]) + content[201:]):
+        assert given.begin(0.0, damaged) == 1
+        assert bytes(given.block) == cold
+    given.parameters["q"] = int(settings["q"]) + 1
+    other = given.begin(0.0, content), bytes(given.block)
+    assert given.begin(0.0) == 0
+    assert other == (2, bytes(given.block))
+
+
+def test_saved_blocks_are_judged() -> None:
+    predictor = library(Np=10, p=3)
+    assert predictor.begin(0.1) == 0
+    for _ in range(25):
+        predictor.sample(0.1, 0.1)
+    saved = bytes(predictor.block)
+    assert predictor.is_valid(saved, 25)
+    assert not predictor.is_valid(saved, 24)
+    assert not predictor.is_valid(saved[:-8], 25)
+    assert not predictor.is_valid(saved[:8] + b"\xff" * 8 + saved[16:], 25)
+    predictor.parameters["Np"] = 11
+    assert not predictor.is_valid(saved, 25)
+
+
+def test_fast_math_is_refused(tmp_path: Path) -> None:
+    command = [*compiler(), "-ffast-math", *include_flags(), "-fsyntax-only", "-xc", str(C_SOURCES / "hsep.h")]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode != 0
+    assert "hsep needs IEEE 754 arithmetic" in refused.stderr
+
+
+COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
+STANDARDS = ("c99", "c11", "c17", "c2x", "gnu17")
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "standard"), list(product(COMPILERS, STANDARDS)))
+def test_compilers_take_it_without_a_warning(name: str, standard: str, tmp_path: Path) -> None:
+    """Also where a system's headers define the short names that some of them do (complex.h, termios.h, sys/param.h)."""
+    command = COMPILERS[name]
+    if not shutil.which(command[0]):
+        pytest.skip(f"{name} is not installed here")
+    (tmp_path / "short_names.h").write_text("#define I short names\n#define N short names\n#define B0 short names\n")
+    flags = [f"-std={standard}", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off", "-c"]
+    sources = sorted(C_SOURCES.glob("core/**/*.c"))
+    included = ["-include", str(tmp_path / "short_names.h"), *include_flags()]
+    arguments = [*command, *flags, *included, *sources]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

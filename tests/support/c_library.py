@@ -1,0 +1,187 @@
+"""The C core as an installed CMake package, and its interface (hsep.h) through ctypes."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from built_once import SHARED_BUILDS, built_once
+from c_compiler import C_SOURCES, build_folder
+from c_core import library as core_library
+
+from hybridsep.base.parameters import Parameter
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+
+STRICT = "-Wall -Wextra -Wconversion -pedantic -Werror"
+
+
+def cmake(*arguments: str | Path) -> str:
+    """Run the package's cmake, a dependency of the tests, on Ninja; return what it printed."""
+    environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
+    done = subprocess.run(
+        [sys.executable, "-m", "cmake", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def configured(source: Path, folder: Path, *definitions: str) -> None:
+    """Configure and build a project."""
+    cmake("-G", "Ninja", "-S", source, "-B", folder, *(f"-D{one}" for one in definitions))
+    cmake("--build", folder)
+
+
+def installed() -> Path:
+    """Return the prefix of the installed package; its build folder, with the examples, is ``build`` in it."""
+
+    def build(prefix: Path) -> None:
+        flags = f"CMAKE_C_FLAGS={STRICT}"
+        # unoptimised: what is tested is how it is built, and what it returns
+        configured(
+            C_SOURCES, prefix / "build", flags, "CMAKE_BUILD_TYPE=Debug", "CMAKE_C_FLAGS_DEBUG=-O1", "HSEP_EXAMPLES=ON"
+        )
+        cmake("--install", prefix / "build", "--prefix", prefix)
+
+    return built_once(Path(os.environ.get(SHARED_BUILDS) or build_folder()) / "hsep_package", build)
+
+
+def _fields(settings: dict[str, Parameter]) -> tuple[tuple[str, Any], ...]:
+    return tuple(
+        (name, ctypes.c_double if parameter.kind is float else ctypes.c_uint64) for name, parameter in settings.items()
+    )
+
+
+class Mode(ctypes.Structure):
+    """hsep_mode."""
+
+    _fields_ = tuple((name, ctypes.c_double) for name in ("f_n", "zeta", "alpha", "beta"))
+
+
+class PredictorPart(ctypes.Structure):
+    """hsep_predictor_settings."""
+
+    _fields_ = _fields(dict(PREDICTOR_SETTINGS))
+
+
+class TrustPart(ctypes.Structure):
+    """hsep_trust_settings."""
+
+    _fields_ = _fields(dict(TRUST_SETTINGS))
+
+
+class CompensatorPart(ctypes.Structure):
+    """hsep_compensator_settings."""
+
+    _fields_ = _fields(dict(COMPENSATOR_SETTINGS))
+
+
+class Parameters(ctypes.Structure):
+    """hsep_parameters."""
+
+    _fields_ = (
+        ("predictor", PredictorPart),
+        ("trust", TrustPart),
+        ("compensator", CompensatorPart),
+        ("n_modes", ctypes.c_uint64),
+        ("modes", ctypes.POINTER(Mode)),
+    )
+
+    def __setitem__(self, name: str, value: float) -> None:
+        """Set a setting, whichever part has it."""
+        parts = (("predictor", PREDICTOR_SETTINGS), ("trust", TRUST_SETTINGS), ("compensator", COMPENSATOR_SETTINGS))
+        part = next(part for part, settings in parts if name in settings)
+        setattr(getattr(self, part), name, value)
+
+
+class PredictorOutputs(ctypes.Structure):
+    """hsep_predictor_outputs."""
+
+    _fields_ = (
+        *(
+            (name, ctypes.c_double)
+            for name in ("x_d", "x_pb", "x_h", "x_h_std", "rms_e", "rms_pb", "rms_h", "rms_hold")
+        ),
+        ("batch", ctypes.c_uint64),
+        ("n_rejected", ctypes.c_uint64),
+        ("hybrid_active", ctypes.c_int),
+        ("divergence", ctypes.c_int),
+    )
+
+
+class CompensatorOutputs(ctypes.Structure):
+    """hsep_compensator_outputs."""
+
+    _fields_ = (("predicted", PredictorOutputs), ("x_dm", ctypes.c_double), ("state", ctypes.c_int))
+
+
+@cache
+def interface() -> ctypes.CDLL:
+    """Return the core's functions, from a shared library that other tests need as well."""
+    loaded = core_library("compensator_2")
+    for kind in ("predictor", "compensator"):
+        getattr(loaded, f"hsep_{kind}_size").restype = ctypes.c_size_t
+    return loaded
+
+
+class Library:
+    """A predictor or a compensator of the C library.
+
+    Parameters
+    ----------
+    kind : {"predictor", "compensator"}
+    settings : mapping
+        Those that differ from the defaults.
+    modes : list of mappings
+    """
+
+    def __init__(self, kind: str, settings: dict[str, float], modes: list[dict[str, float]]) -> None:
+        self.kind, self.core = kind, interface()
+        self.modes = (Mode * len(modes))(*(Mode(**mode) for mode in modes))
+        self.parameters = Parameters()
+        self.core.hsep_defaults(ctypes.byref(self.parameters))
+        self.parameters.n_modes = len(modes)
+        self.parameters.modes = self.modes
+        for name, value in settings.items():
+            self.parameters[name] = value
+        self.outputs = CompensatorOutputs()
+        self.block: Any = None
+
+    def size(self) -> int:
+        """Return the bytes of the block; 0: refused."""
+        return int(self._call("size", ctypes.byref(self.parameters)))
+
+    def begin(self, start: float, weights: bytes | None = None) -> int:
+        """Begin; return hsep_began."""
+        self.block = (ctypes.c_double * (self.size() // 8))()
+        arguments = (
+            ctypes.byref(self.parameters),
+            ctypes.c_double(start),
+            weights,
+            ctypes.c_size_t(len(weights or b"")),
+        )
+        return int(self._call("init", self.block, *arguments))
+
+    def sample(self, x_d_ahead: float, x_meas: float) -> CompensatorOutputs:
+        """Process a sample and return the outputs of the next one; of a predictor in ``predicted``."""
+        self._call("sample", self.block, ctypes.c_double(x_d_ahead), ctypes.c_double(x_meas))
+        outputs = self.outputs.predicted if self.kind == "predictor" else self.outputs
+        self._call("read", self.block, ctypes.byref(outputs))
+        return self.outputs
+
+    def is_valid(self, block: bytes, k: int) -> bool:
+        """Return whether bytes are a block after k samples."""
+        return bool(
+            self._call("valid", block, ctypes.c_size_t(len(block)), ctypes.byref(self.parameters), ctypes.c_uint64(k))
+        )
+
+    def _call(self, function: str, *arguments: Any) -> Any:
+        return getattr(self.core, f"hsep_{self.kind}_{function}")(*arguments)
