@@ -1,19 +1,19 @@
 """Look-ahead buffer between interpolator and drive, sample by sample.
 
 Timing contract, that of the FMUs. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs
-are those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is ``Np``, or a planner's preview. When ``k + 1``
-is a multiple of ``Np``, all commands of the next window (of its preview) and every measurement before it have arrived:
-the weights are solved and the window is predicted, or planned, in that sample.
+are those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is the planner's preview: ``Np`` with a predictor
+alone, which is the planner that changes nothing (:mod:`hybridsep.online.planner`). When ``k + 1`` is a multiple of
+``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights are solved
+and the window is planned in that sample.
 
-During the first fill (``k < delay``) the commanded position is the start. Without a planner it is neither predicted nor
-learned. A planner plans from the beginning, so that it can act ahead of a move within its preview; what is measured
-over the fill is not learned. ``t_init`` counts from its end.
+During the first fill (``k < delay``) the commanded position is the start. A predictor alone neither predicts nor learns
+it. A compensator plans from the beginning, so that it can act ahead of a move within its preview; it does not learn
+what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
@@ -24,48 +24,15 @@ from ..base.signals import Array, as_measured, check_position
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import PublishedWindow
+from .planner import Planner, Unmodified, WindowPlanner
 
-__all__ = ["LookAhead", "Planner"]
+__all__ = ["LookAhead"]
 
 _KIND = "look-ahead"
 
 
-class Planner(Protocol):
-    """Interface of a planner, which modifies the commands of a window before they are predicted; holds the predictor.
-
-    Attributes
-    ----------
-    predictor : HybridPredictor
-    preview : int
-        Samples of a plan, at least ``Np``.
-    """
-
-    predictor: HybridPredictor
-    preview: int
-
-    def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run, at rest at ``start``, m; what was learned is kept."""
-
-    def plan(self, x_d: Array) -> PublishedWindow:
-        """Plan the next window from ``(preview,)`` commands, m."""
-
-    def update(self, x: Array) -> None:
-        """Learn from the positions measured over the planned window, ``(Np,)``, m."""
-
-    @property
-    def is_planned(self) -> bool:
-        """Whether a planned window is pending measurement."""
-
-    def to_bytes(self) -> bytes:
-        """Return parameters and state, the predictor's included."""
-
-    @classmethod
-    def from_bytes(cls, blob: bytes) -> Planner:
-        """Return the planner of :meth:`to_bytes`."""
-
-
 class LookAhead:
-    """Delay line of commands, with the position predicted ahead, and the commands modified if there is a planner.
+    """Delay line of commands, with the position predicted ahead, and the commands modified by a planner.
 
     Parameters
     ----------
@@ -83,6 +50,8 @@ class LookAhead:
     Np, delay : int
         Samples in a window; samples by which commands are delayed.
     model : HybridPredictor or Planner
+    planner : WindowPlanner
+        The model, or the predictor as the planner that changes nothing.
     window : PublishedWindow
         The window that ``k`` is part of.
     diverged : str
@@ -97,11 +66,11 @@ class LookAhead:
     diverged: str = ""
 
     def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
+        self.k = 0
         self._hold(model)
         warm_up = self.predictor.settings.warm_up if t_init is None else t_init
         check_position("the start value of x_d_ahead", start)
         self.start = start
-        self.k = 0
         late = self.predictor.settings.measurement_delay
         self._first_scored = self._first_compared + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(4)
@@ -110,20 +79,17 @@ class LookAhead:
         self._compared = np.full((4, late + self.Np), self.start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
-        if self.planner is None:
-            self.predictor.restart(self.start, t_init=warm_up)
-            self.window = PublishedWindow.at_rest(self.start, self.Np)
-        else:
-            self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
-            self.window = self.planner.plan(self._ahead.copy())
-            self._compare()
+        self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
+        self.window = self.planner.plan(self._ahead.copy())
+        self._compare()
 
     def _hold(self, model: HybridPredictor | Planner) -> None:
         self.model = model
-        self.planner = None if isinstance(model, HybridPredictor) else model
-        self.predictor = model if isinstance(model, HybridPredictor) else model.predictor
-        self.Np = self.predictor.Np
-        self.delay = self.Np if self.planner is None else self.planner.preview
+        self.planner: WindowPlanner = (
+            Unmodified(model, at_rest=self.k < model.Np) if isinstance(model, HybridPredictor) else model
+        )
+        self.predictor = self.planner.predictor
+        self.Np, self.delay = self.predictor.Np, self.planner.preview
 
     @property
     def may_miss(self) -> bool:
@@ -142,7 +108,7 @@ class LookAhead:
 
     @property
     def x_dm(self) -> float:
-        """Modified command now, m; ``x_d`` without a planner."""
+        """Modified command now, m; ``x_d`` with a predictor alone."""
         return self._now(self.window.x_dm)
 
     @property
@@ -177,7 +143,7 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """Model that planned the commands of now (``SepState``); 0 without a planner."""
+        """Model that planned the commands of now (``SepState``); 0 with a predictor alone."""
         return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
 
     @property
@@ -225,7 +191,7 @@ class LookAhead:
             self._sums += np.square(x_meas - self._compared[:, self.k % self.Np])
         self.k += 1
         if self.k % self.Np == 0:
-            self._learn()
+            self.planner.update(self._measured)
             self._begin_window()
 
     def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
@@ -277,12 +243,12 @@ class LookAhead:
         """
         saved = Saved(_KIND, *unpack(_KIND, blob))
         look_ahead = cls.__new__(cls)
+        look_ahead.k = saved.whole("k")
         look_ahead._hold(model_type.from_bytes(saved.part("model")))
         Np = look_ahead.Np
         with saved.consistent():
             look_ahead.start = saved.real("start")
             check_position("start", look_ahead.start)
-        look_ahead.k = saved.whole("k")
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 4))
@@ -300,7 +266,7 @@ class LookAhead:
             n_followed=saved.whole("n_followed", Np),
             state_before=saved.whole("state_before"),
         )
-        if not (look_ahead._is_predicted or look_ahead.diverged):
+        if not (look_ahead.planner.is_planned or look_ahead.diverged):
             raise saved.error("the current window must be predicted, and planned if there is a planner")
         return look_ahead
 
@@ -309,27 +275,10 @@ class LookAhead:
         """First sample that is compared: with what was published behind the first fill, as it was measured."""
         return self.delay + self.predictor.settings.measurement_delay
 
-    @property
-    def _is_predicted(self) -> bool:
-        if self.planner is not None:
-            return self.planner.is_planned
-        return self.predictor.n_pending == (self.Np if self.k >= self.Np else 0)
-
-    def _learn(self) -> None:
-        """Learn the measured window."""
-        if self.planner is not None:
-            self.planner.update(self._measured)
-        elif self.k > self.Np:  # the first fill was not predicted
-            self.predictor.update(self._measured)
-
     def _begin_window(self) -> None:
-        """Predict or plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
-        x_d = np.roll(self._ahead, -(self.k % self.delay))
+        """Plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
         try:
-            if self.planner is None:
-                self.window = PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d))
-            else:
-                self.window = self.planner.plan(x_d)
+            self.window = self.planner.plan(np.roll(self._ahead, -(self.k % self.delay)))
             self._compare()
         except SignalError as error:
             self.diverged = str(error)
