@@ -36,10 +36,12 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
 
     def retune(self) -> None:
         """Take over ``compensate`` and ``change_max``."""
-        given = CompensatorSettings.from_fmi(self.values)
         compensator = self.look_ahead.planner
         assert isinstance(compensator, SepCompensator)
-        compensator.change(compensate=given.compensate, change_max=given.change_max)
+        now = compensator.compensate, compensator.settings.change_max
+        if now != (self.values["compensate"], self.values["change_max"]):
+            given = CompensatorSettings.from_fmi(self.values)
+            compensator.change(compensate=given.compensate, change_max=given.change_max)
 
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:

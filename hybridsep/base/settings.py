@@ -66,11 +66,13 @@ class Settings:
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """Return the parameters by the names of their fields."""
-        return {
-            field.name: replace(field.metadata["parameter"], name=field.metadata["parameter"].name or field.name)
-            for field in fields(cls)
-            if "parameter" in field.metadata
-        }
+        if cls not in _DECLARED:
+            _DECLARED[cls] = {
+                field.name: replace(field.metadata["parameter"], name=field.metadata["parameter"].name or field.name)
+                for field in fields(cls)
+                if "parameter" in field.metadata
+            }
+        return dict(_DECLARED[cls])
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
@@ -132,6 +134,10 @@ class Settings:
     def _label(cls, name: str) -> str | None:
         """Return the name of a field in messages; None for its parameter's name."""
         return None
+
+
+_DECLARED: dict[type[Settings], dict[str, Parameter]] = {}
+"""What :meth:`Settings.parameters` has made: every settings object asks for them when it is checked."""
 
 
 @dataclass(frozen=True, kw_only=True)

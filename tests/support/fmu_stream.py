@@ -20,9 +20,8 @@ class FmuStream:
         self.model = model
         self._outputs = OUTPUTS[kind_of(model)]
         self._fmu = FmuInstance(archive)
-        # The real numbers in one call: one by one they would take as long as the steps between
-        self._reals = [name for name in self._outputs if self._fmu.variables[name].type in ("Real", "Float64")]
-        self._read_reals = self._fmu.real_reader(self._reals)
+        # Of each type in one call: one by one they would take as long as the steps between
+        self._read = self._fmu.reader(self._outputs)
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
         self._refusing(self._fmu.begin, values, start_time=start, stop_time=stop)
@@ -45,8 +44,7 @@ class FmuStream:
         self._refusing(self._fmu.step, t, h)
 
     def outputs(self) -> list[float]:
-        values = dict(zip(self._reals, self._read_reals(), strict=True))
-        return [float(values[name] if name in values else self._fmu.get(name)) for name in self._outputs]
+        return [float(value) for value in self._read()]
 
     def window(self, name: str) -> Array:
         names = [variable for variable in self._fmu.variables if variable.partition("[")[0] == name]

@@ -92,8 +92,10 @@ class LookAheadStream(LibraryStream):
     def _tune(self) -> None:
         compensator = self._look_ahead.planner
         if isinstance(compensator, SepCompensator):
-            given = CompensatorSettings.from_fmi(self._values)
-            compensator.change(compensate=given.compensate, change_max=given.change_max)
+            now = compensator.compensate, compensator.settings.change_max
+            if now != (self._values["compensate"], self._values["change_max"]):
+                given = CompensatorSettings.from_fmi(self._values)
+                compensator.change(compensate=given.compensate, change_max=given.change_max)
 
     def outputs(self) -> list[float]:
         return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]
