@@ -134,11 +134,9 @@ static void text_put_fixed(text_sink *sink, double value, int decimals)
     }
 }
 
-/* Put value >= 0 as a power of ten, with so many digits behind the first one. */
-static void text_put_power(text_sink *sink, double value, int digits)
+/* Put number 10^(exponent - digits) as a power of ten, with so many digits behind the first one. */
+static void text_put_power(text_sink *sink, uint64_t number, int exponent, int digits)
 {
-    int exponent = 0;
-    const uint64_t number = value > 0.0 ? text_decimal(value, digits + 1, &exponent) : 0;
     const uint64_t unit = (uint64_t)text_power(digits);
     text_put_whole(sink, number / unit, 1);
     if (digits > 0) {
@@ -161,7 +159,7 @@ static void text_put_general(text_sink *sink, double value, int digits)
         needed--;
     }
     if (exponent < -4 || exponent >= digits) {
-        text_put_power(sink, text_scaled((double)number, exponent - needed), needed);
+        text_put_power(sink, number, exponent, needed);
     } else {
         text_put_fixed(
             sink, value > 0.0 ? text_scaled((double)number, exponent - needed) : 0.0,
@@ -185,7 +183,10 @@ static void text_put_number(text_sink *sink, char conversion, double value, int 
     if (conversion == 'f') {
         text_put_fixed(sink, value, precision);
     } else if (conversion == 'e') {
-        text_put_power(sink, value, precision < TEXT_DIGITS ? precision : TEXT_DIGITS - 1);
+        const int digits = precision < TEXT_DIGITS ? precision : TEXT_DIGITS - 1;
+        int exponent = 0;
+        const uint64_t number = value > 0.0 ? text_decimal(value, digits + 1, &exponent) : 0;
+        text_put_power(sink, number, exponent, digits);
     } else {
         text_put_general(sink, value, precision);
     }
