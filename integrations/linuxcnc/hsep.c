@@ -38,9 +38,9 @@ MODULE_LICENSE("Dual BSD/GPL");
 #define HSEP_COMPONENT "hsep_predictor"
 #endif
 
-#define HSEP_AXES 9        /* as many joints as LinuxCNC has */
-#define HSEP_FADE 500      /* periods within which the change of a command fades after a fault */
-#define HSEP_JUMP 1.5      /* a command that moves by more than so many times the largest step is another position */
+#define HSEP_AXES 9         /* as many joints as LinuxCNC has */
+#define HSEP_FADE 500       /* periods within which the change of a command fades after a fault */
+#define HSEP_JUMP 1.5       /* a command that moves by more than so many times the largest step is another position */
 #define HSEP_OTHER_T_S 0.01 /* deviation of the period, relative to the sampling interval, that is another one */
 
 static char *axes[HSEP_AXES];
@@ -51,14 +51,14 @@ enum { AXIS_WRONG_PERIOD = -2, AXIS_FAULT = -1, AXIS_INACTIVE = 0, AXIS_DELAYS =
 
 /* Pins and parameters, in HAL's memory. Positions are in machine units. */
 typedef struct {
-    hal_float_t *cmd, *fb;                                              /* in */
-    hal_bit_t *active, *enable, *reset;                                 /* in */
+    hal_float_t *cmd, *fb;                                               /* in */
+    hal_bit_t *active, *enable, *reset;                                  /* in */
     hal_float_t *out, *delayed, *fb_joint, *predicted, *error, *std_dev; /* out */
-    hal_s32_t *state;                                                   /* out */
-    hal_float_t scale;                                                  /* parameter: machine units in a metre */
-    hal_u32_t model;                                                    /* parameter: 1 physics, 2 hybrid */
-    hal_u32_t look_ahead;                                               /* parameter: periods */
-    hal_u32_t rejected;                                                 /* parameter: measurements not believed */
+    hal_s32_t *state;                                                    /* out */
+    hal_float_t scale;                                                   /* parameter: machine units in a metre */
+    hal_u32_t model;                                                     /* parameter: 1 physics, 2 hybrid */
+    hal_u32_t look_ahead;                                                /* parameter: periods */
+    hal_u32_t rejected;                                                  /* parameter: measurements not believed */
 } axis_pins;
 
 typedef struct {
@@ -67,10 +67,10 @@ typedef struct {
     void *weights;          /* what weights.bin holds; NULL: none */
     double *ring;           /* (n_ring,) m, the last commands, for the time after a fault */
     size_t n_ring, at;
-    double last;          /* m, last command */
-    double change;        /* m, last change of the command that the model made */
-    unsigned fading;      /* periods left of the fade after a fault */
-    uint64_t k;           /* sample of this run */
+    double last;     /* m, last command */
+    double change;   /* m, last change of the command that the model made */
+    unsigned fading; /* periods left of the fade after a fault */
+    uint64_t k;      /* sample of this run */
     int runs, faulty;
     int was_reset;
 } axis_data;
@@ -149,8 +149,7 @@ static void axis_process(axis_data *self, double command, double feedback)
     axis_choose(self);
     axis_message[0] = '\0';
     const double t = (double)self->k * T_s;
-    if (hsep_model_step(
-            &self->instance.context, self->instance.state, self->instance.values, t, T_s, axis_message) ==
+    if (hsep_model_step(&self->instance.context, self->instance.state, self->instance.values, t, T_s, axis_message) ==
         HSEP_REFUSED) {
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", self->instance.name, axis_message);
         self->faulty = 1;

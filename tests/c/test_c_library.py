@@ -32,11 +32,11 @@ KINDS = {"predictor": {**PREDICTOR_SETTINGS, **TRUST_SETTINGS}}
 KINDS["compensator"] = {**KINDS["predictor"], **COMPENSATOR_SETTINGS}
 
 
-def library(kind: str = "predictor", modes: list[dict[str, float]] | None = None, **settings: float) -> Library:
-    return Library(kind, settings, [SPRING_MASS_DAMPER] if modes is None else modes)
+def library(kind: str = "predictor", /, **settings: float) -> Library:
+    return Library(kind, settings, [SPRING_MASS_DAMPER])
 
 
-def program(path: Path, *arguments: str | Path) -> str:
+def program(path: Path, *arguments: object) -> str:
     return subprocess.run([path, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
 
 
@@ -121,10 +121,10 @@ def test_parameters_that_do_not_fit_together_are_refused() -> None:
     ]
     assert [library("compensator", **{**fits, **one}).size() for one in wrong] == [0, 0, 0]
     assert library("compensator", **{**fits, "measurement_delay": 1}).size() > 0
-    assert library("predictor", [], Np=20, p=20).size() == 0
+    assert Library("predictor", {"Np": 20, "p": 20}, []).size() == 0
     for name in ("f_n", "zeta", "alpha", "beta"):
         for value in (math.nan, 2 * PARAMETERS[name].maximum):
-            assert library("predictor", [SPRING_MASS_DAMPER, {**SPRING_MASS_DAMPER, name: value}]).size() == 0
+            assert Library("predictor", {}, [SPRING_MASS_DAMPER, {**SPRING_MASS_DAMPER, name: value}]).size() == 0
 
 
 def test_defaults_are_the_declared_ones() -> None:
@@ -145,7 +145,7 @@ def test_outputs_are_the_models(trust: int) -> None:
     """The interface without FMI computes what an FMU does, to the last bit."""
     x_d = staircase.commanded()[:700]
     settings = {"Np": 50, "p": 10, "preview": 100, "trust": trust}
-    compensator = library("compensator", STAGE_MODES, **settings)
+    compensator = Library("compensator", settings, STAGE_MODES)
     assert compensator.begin(float(x_d[0])) == 0
     model = CModel("compensator_2", {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
     for k, x_d_ahead in enumerate(x_d):
@@ -164,7 +164,7 @@ def test_weights_from_memory(kind: str) -> None:
     content = weights_file(trained)
     modes = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")} for mode in trained.model.modes]
     settings = {name: float(value) for name, value in trained.settings.to_fmi().items()}
-    given = library(kind, modes)
+    given = Library(kind, {}, modes)
     for name, value in settings.items():
         given.parameters[name] = value if KINDS[kind][name].kind is float else int(value)
     assert given.begin(0.0, content) == 0
@@ -219,6 +219,6 @@ def test_compilers_take_it_without_a_warning(name: str, standard: str, tmp_path:
     flags = [f"-std={standard}", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off", "-c"]
     sources = sorted(C_SOURCES.glob("core/**/*.c"))
     included = ["-include", str(tmp_path / "short_names.h"), *include_flags()]
-    arguments = [*command, *flags, *included, *sources]
+    arguments = [*command, *flags, *included, *map(str, sources)]
     done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -28,7 +28,7 @@ def test_the_c_files_are_formatted() -> None:
     assert command, "clang-format is missing: pip install -e '.[test]'"
     files = [
         path
-        for folder in ("fmu_src", "tests", "benchmarks")
+        for folder in ("fmu_src", "tests", "benchmarks", "integrations")
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in SUFFIXES
     ]

@@ -2,11 +2,10 @@
  *
  * The variance of a sample is a sum of three components, v = sum_i theta_i f_i, of what errors come with: measurement
  * noise; timing, the squared difference of x_pb; and what the residual model knows of itself, the variance of the
- * mixture of its experts. Timing and that variance are felt after they have happened, and for a while: they are averaged
- * over the samples before, from the last measured one on. The standard deviation is c sqrt(v). After each window theta
- * takes a step of expectation maximisation for normal errors of that variance, and c, which changes exponentially from
- * the beginning to the end of a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may,
- * together.
+ * mixture of its experts. The last two follow their cause with a delay: they are averaged over the samples before, from
+ * the last measured one on. The standard deviation is c sqrt(v). After each window theta takes a step of expectation
+ * maximisation for normal errors of that variance, and c, which changes exponentially from the beginning to the end of
+ * a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
  * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
