@@ -152,7 +152,7 @@ def fit_dead_time(u: Array, x: Array, first: float | None, sign: float = 0.0) ->
         # Of the other sign the best gain is none, and the response's own mean, which is 0, its offset.
         left = response - fit.gain * y - fit.offset if fit.gain * sign >= 0.0 else response
         if math.isfinite(float(np.add.reduce(left))):
-            return left
+            return np.asarray(left)
         return np.asarray(np.nan_to_num(left, nan=1e3, posinf=1e3, neginf=-1e3))
 
     best = None

@@ -147,7 +147,7 @@ class TextSource(Source):
                 f"{self.path}, line {numbers[i]}: {expected} columns were expected as in line {self._layout.header}, "
                 f"got {widths[i]}"
             )
-        types = np.dtype([(str(k), CELL if i in stamps else np.dtype(np.float64)) for k, i in enumerate(use)])
+        types = np.dtype([(str(k), CELL.str if i in stamps else "f8") for k, i in enumerate(use)])
         try:
             rows = np.loadtxt(lines, types, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=1)
         except ValueError:
