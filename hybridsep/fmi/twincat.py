@@ -63,4 +63,5 @@ def _configuration(excluded: Iterable[str]) -> bytes:
     ):
         ElementTree.SubElement(tool, name).text = text
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text
