@@ -9,10 +9,13 @@
 
 #include "hsep_constraints.h"
 #include "hsep_features.h"
+#include "hsep_parameters.h"
 #include "hsep_planner.h"
+#include "hsep_ranges.h"
 #include "hsep_recursion.h"
 #include "hsep_stack.h"
 
+#include <limits.h>
 #include <math.h>
 
 #include "__fc_builtin.h"
@@ -25,10 +28,22 @@
 
 #define MOST 1000.0 /* m, the largest position that is allowed */
 
+/* What Eva does not know of the C library. */
+double fmax(double a, double b) { return a > b || b != b ? a : b; }
+
+double fmin(double a, double b) { return a < b || b != b ? a : b; }
+
+double frexp(double x, int *exponent)
+{
+    *exponent = Frama_C_interval(-1073, 1024);
+    return x == 0.0 ? 0.0 : Frama_C_double_interval(-1.0, 1.0);
+}
+
 static double position(void) { return Frama_C_double_interval(-MOST, MOST); }
 
 static void fill(double *a, int n)
 {
+    //@ loop unroll 64;
     for (int i = 0; i < n; i++) {
         a[i] = position();
     }
@@ -125,7 +140,8 @@ void prove_constraints(void)
         .limit = {1e-3, 1e-4, 1e-5, 1e-5},
         .no_reversal = 1,
         .pinned = HSEP_PINNED};
-    double x_d[PREVIEW - SHORT], way[HSEP_ORDERS * PREVIEW], least, most;
+    static double x_d[PREVIEW - SHORT], way[HSEP_ORDERS * PREVIEW];
+    double least, most;
     hsep_planner *planner = (hsep_planner *)plan;
     if (hsep_planner_size(&parameters) > sizeof plan) {
         return;
@@ -143,8 +159,9 @@ void prove_constraints(void)
     (void)hsep_constraints_allow(planner, way);
 }
 
-/* Parameters of any bits, NaN among them: they are refused, or the size of a block comes out. */
-void prove_parameters(void)
+/* Parameters of any bits, NaN among them, are judged. Eva cannot see that spacing is judged before it divides, so 0 is a
+ * case of its own. */
+void prove_refusals(void)
 {
     hsep_parameters parameters;
     hsep_mode modes[2 - SHORT];
@@ -152,6 +169,39 @@ void prove_parameters(void)
     Frama_C_make_unknown((char *)modes, sizeof modes);
     parameters.n_modes = 2;
     parameters.modes = modes;
+    (void)hsep_predictor_allows(&parameters);
+    if (parameters.compensator.spacing == 0) {
+        parameters.compensator.spacing = 0;
+        (void)hsep_compensator_allows(&parameters);
+    } else {
+        parameters.compensator.spacing = (uint64_t)Frama_C_unsigned_long_interval(1, ULONG_MAX);
+        (void)hsep_compensator_allows(&parameters);
+    }
+}
+
+/* The sizes of all blocks of allowed parameters: every offset fits into its integer. */
+void prove_sizes(void)
+{
+    hsep_parameters parameters;
+    hsep_mode modes[2 - SHORT];
+#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters.predictor.name = (type)Frama_C_double_interval(least, most);
+    HSEP_PREDICTOR_RANGES(ANY)
+#undef ANY
+#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters.trust.name = (type)Frama_C_double_interval(least, most);
+    HSEP_TRUST_RANGES(ANY)
+#undef ANY
+#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters.compensator.name = (type)Frama_C_double_interval(least, most);
+    HSEP_COMPENSATOR_RANGES(ANY)
+#undef ANY
+    parameters.n_modes = 2;
+    parameters.modes = modes;
+    for (int i = 0; i < 2; i++) {
+        modes[i].f_n = Frama_C_double_interval(1e-3, 1e5);
+        modes[i].zeta = Frama_C_double_interval(1e-9, 1e3);
+        modes[i].alpha = modes[i].beta = position();
+    }
     (void)hsep_predictor_size(&parameters);
-    (void)hsep_compensator_size(&parameters);
 }
