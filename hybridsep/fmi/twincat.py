@@ -63,5 +63,5 @@ def _configuration(excluded: Iterable[str]) -> bytes:
     ):
         ElementTree.SubElement(tool, name).text = text
     ElementTree.indent(root)
-    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return text
+    content: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return content

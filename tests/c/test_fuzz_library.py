@@ -25,8 +25,8 @@ def test_no_input_breaks_the_library(tmp_path: Path) -> None:
     options = ["-std=c99", "-g", "-O1", "-ffp-contract=off", "-fno-sanitize-recover=all"]
     build = ["clang", *options, "-fsanitize=fuzzer,address,undefined", *include_flags()]
     harness = ROOT / "tests" / "c" / "fuzz" / "library.c"
-    subprocess.run([*build, harness, *sources, "-lm", "-o", tmp_path / "fuzz"], check=True)
-    command = [tmp_path / "fuzz", f"-runs={RUNS}", "-seed=1", "-max_len=4096", "-len_control=0"]
+    subprocess.run([*build, *map(str, [harness, *sources]), "-lm", "-o", str(tmp_path / "fuzz")], check=True)
+    command = [str(tmp_path / "fuzz"), f"-runs={RUNS}", "-seed=1", "-max_len=4096", "-len_control=0"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr[-3000:]
     assert f"Done {RUNS} runs" in done.stderr

@@ -1,4 +1,4 @@
-/* What a source FMU needs of stdlib.h, as tests/c/msvc/math.h. Microsoft's has this use of the word: it may be no macro. */
+/* What a source FMU needs of stdlib.h, as math.h beside it. The word restrict stands here as in Microsoft's: no macro. */
 #ifndef STDLIB_H
 #define STDLIB_H
 #include <stddef.h>

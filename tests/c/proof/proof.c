@@ -82,7 +82,7 @@ void prove_stack(void)
     hsep_stack_update(&stack, products, Frama_C_double_interval(1.0, 1e4), 1e-18);
     const hsep_expert_place leader = hsep_stack_leader(&stack);
     const hsep_expert_place expert = (hsep_expert_place)(Frama_C_interval(0, HSEP_N_EXPERTS - 1) + SHORT);
-    hsep_stack_copy(&stack, leader, HSEP_DOUBTING); /* of another one, as it is called */
+    hsep_stack_copy(&stack, leader, HSEP_DOUBTING); /* another one */
     hsep_stack_forget(&stack, expert);
 }
 
@@ -159,8 +159,8 @@ void prove_constraints(void)
     (void)hsep_constraints_allow(planner, way);
 }
 
-/* Parameters of any bits, NaN among them, are judged. Eva cannot see that spacing is judged before it divides, so 0 is a
- * case of its own. */
+/* Parameters of any bits, NaN among them, are judged. Eva cannot see that spacing is judged before it divides, so
+ * 0 is a case of its own. */
 void prove_refusals(void)
 {
     hsep_parameters parameters;
