@@ -1,4 +1,4 @@
-/* What a source FMU needs of stdlib.h, as math.h beside it. The word restrict stands here as in Microsoft's: no macro. */
+/* What a source FMU needs of stdlib.h, as math.h beside it; restrict stands here as in Microsoft's. */
 #ifndef STDLIB_H
 #define STDLIB_H
 #include <stddef.h>
