@@ -22,6 +22,9 @@ from .options import (
 
 __all__ = ["build"]
 
+CONTROLLERS = ("twincat",)
+"""Controllers that ``--for`` takes."""
+
 
 def build(
     fmus: Annotated[
@@ -55,6 +58,14 @@ def build(
             help="Compile the weights into the sources of a native FMU too, for targets without files (HSEP_NO_FILES).",
         ),
     ] = False,
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            help=f"Controller that compiles the sources: {', '.join(CONTROLLERS)}. Weights are compiled in, what "
+            "plays files is left out, and a file that its tool needs lies beside the FMUs.",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -65,20 +76,31 @@ def build(
     """
     from ..base.errors import ParameterError
     from ..fmi.archive import build_fmu
-    from ..fmi.jobs import extras_of, jobs_of, libraries_of
+    from ..fmi.jobs import extras_of, jobs_of, libraries_of, without_files
     from ..fmi.libraries import library_paths, missing
+    from ..fmi.twincat import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
-    from .overwrite import FMU, Output, check_outputs
+    from .overwrite import FMU, TWINCAT, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
     if embed_weights and flavour != "native":
         raise ParameterError(f"--embed-weights is for native FMUs; with --flavour {flavour} leave it out")
+    if controller is not None and controller not in CONTROLLERS:
+        raise ParameterError(f"--for must be {' or '.join(CONTROLLERS)}, got {controller}")
+    if controller is not None and flavour != "native":
+        raise ParameterError(f"--for {controller} is for native FMUs; with --flavour {flavour} leave it out")
     jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
+    if controller is not None:
+        jobs = without_files(jobs, f"--for {controller}", named=bool(fmus))
+        embed_weights = embed_weights or weights is not None
     extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows, embed_weights=embed_weights)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
-        [Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs],
+        [
+            *(Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs),
+            *([Output("--out", out / CONFIGURATION_FILE, TWINCAT)] if controller else []),
+        ],
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
@@ -101,6 +123,8 @@ def build(
             advance(name, i / len(jobs))
             given = {"targets": target or None, "fmi": version, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
+        if controller is not None:
+            paths.append(write_configuration(out, paths))
         advance("done", 1.0)
     if as_json:
         print_json([str(path) for path in paths])

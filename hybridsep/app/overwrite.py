@@ -37,6 +37,7 @@ __all__ = [
     "RUNS",
     "STATE",
     "SYSTEM",
+    "TWINCAT",
     "Kind",
     "Output",
     "check_outputs",
@@ -181,6 +182,9 @@ BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY, ".
 FIT_FILES = {".csv": COMMANDS_TO_TRY, ".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
 """Kinds of the files of ``hybridsep fit``."""
 
+TWINCAT = Kind(
+    "configuration of hybridsep build", _begins_with(b"<?xml version='1.0' encoding='utf-8'?>\n<CustomConfigurations")
+)
 HAL_FILES = {
     ".bin": Kind("file of hybridsep hal", _begins_with(b"HSEP")),
     ".c": Kind("HAL component of hybridsep", _begins_with(b"/* HAL component for LinuxCNC")),

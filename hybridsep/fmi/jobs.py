@@ -19,7 +19,7 @@ from .flavours import FMI_VERSIONS, versions_of
 from .libraries import Library, check_available, default_targets
 from .warm_start import load_trained
 
-__all__ = ["Job", "extras_of", "jobs_of", "libraries_of"]
+__all__ = ["Job", "extras_of", "jobs_of", "libraries_of", "without_files"]
 
 Job = tuple[Machine, str, str, str]
 """An FMU to build: its machine, name and model, and the version of FMI."""
@@ -93,6 +93,20 @@ def extras_of(
             raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
         extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
     return extras
+
+
+def without_files(jobs: Sequence[Job], option: str, *, named: bool) -> list[Job]:
+    """Return the FMUs whose sources open no file; ReferenceTrajectory plays files.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or a ReferenceTrajectory was asked for by name.
+    """
+    kept = [job for job in jobs if job[2] != "ReferenceTrajectory"]
+    if not kept or (named and len(kept) < len(jobs)):
+        raise ParameterError(f"{option} is for FMUs that open no files; ReferenceTrajectory plays files, leave it out")
+    return kept
 
 
 def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:

@@ -99,7 +99,7 @@ static void trusted_solve_of(
     for (uint64_t i = 0; i < count; i++) {
         trusted_solve(self, experts[i], all, n_rows + n_earlier);
     }
-    if (self->leading == experts[0] && self->predicted[HSEP_DOUBTING]) {
+    if (self->leading == (uint64_t)experts[0] && self->predicted[HSEP_DOUBTING]) {
         all = trusted_all(self, evidence, HSEP_TRUST_LESS);
         trusted_solve(self, HSEP_DOUBTING, all, n_rows + HSEP_TRUST_LESS * n_earlier);
     }

@@ -1,0 +1,1 @@
+"""Sizes, stack and instructions of the C library on processors of controllers."""

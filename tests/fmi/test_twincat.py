@@ -1,0 +1,112 @@
+"""Sources for Beckhoff's TwinCAT: the configuration file, and C as Microsoft's compiler takes it.
+
+Neither that compiler nor TE1420 is at hand. Clang compiles for its system with headers that declare what a source FMU
+needs and nothing more (tests/c/msvc), Zig for MinGW with the whole C library of Windows.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+import pytest
+from built_once import BuiltFmus
+from c_compiler import FMI_HEADERS
+from command_line import Run
+from places import ROOT
+
+from hybridsep import backtest, load_machine
+from hybridsep.fmi.twincat import CONFIGURATION_FILE, DEFINITIONS
+
+STAND_INS = ROOT / "tests" / "c" / "msvc"
+MODELS = ("HybridPredictor", "SepCompensator", "FeedDrive", "HybridPredictorFmi3")
+MICROSOFT = ["clang", "--target=x86_64-pc-windows-msvc19.29", "-fms-compatibility", "-std=c11", "-Wmicrosoft", "-Wvla"]
+MINGW = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-std=c99"]
+STRICT = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-c"]
+
+
+def unpacked(fmu: Path, folder: Path) -> Path:
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    return folder / "sources"
+
+
+def built(hybridsep: Run, out: Path, *arguments: object) -> list[Path]:
+    status, text, error = hybridsep(
+        "build", *arguments, "-m", "spring_mass_damper", "--target", "host", "--for", "twincat", "--out", out, "--json"
+    )
+    assert status == 0, error
+    return [Path(path) for path in json.loads(text)]
+
+
+@pytest.mark.slow
+def test_the_configuration_lies_beside_the_fmus(hybridsep: Run, tmp_path: Path) -> None:
+    """All FMUs of the machine but the one that plays files; what the file leaves out is what all.c includes."""
+    *archives, configuration = built(hybridsep, tmp_path)
+    assert configuration == tmp_path / CONFIGURATION_FILE
+    assert {path.stem for path in archives} == {"HybridPredictor", "SepCompensator", "FeedDrive"}
+    tool = ElementTree.parse(configuration).getroot().find("FmuConfiguration")
+    assert tool is not None
+    assert tool.findtext("ToolName") == fmpy.read_model_description(str(archives[0])).generationTool
+    assert tool.findtext("PreprocessorDefinitions") == ";".join(DEFINITIONS)
+    sources = unpacked(archives[0], tmp_path / "fmu")
+    excluded = (tool.findtext("ExcludedFromBuild") or "").split(";")
+    assert sorted([*excluded, "all.c"]) == sorted(path.name for path in sources.glob("*.c"))
+
+
+@pytest.mark.slow
+def test_weights_are_compiled_in(hybridsep: Run, tmp_path: Path) -> None:
+    machine = load_machine("spring_mass_damper")
+    predictor, command = machine.new_predictor(), np.linspace(0.0, 0.01, 400)
+    backtest(predictor, command, command)
+    predictor.save(tmp_path / "trained.state")
+    fmu, _ = built(hybridsep, tmp_path / "out", "HybridPredictor", "--weights", tmp_path / "trained.state")
+    header = unpacked(fmu, tmp_path / "fmu") / "hsep_fmu.h"
+    assert "hsep_embedded_weights" in header.read_text(encoding="utf-8")
+
+
+def test_what_does_not_fit_is_refused(hybridsep: Run, tmp_path: Path) -> None:
+    for arguments, said in (
+        (("--for", "plc"), "--for must be twincat, got plc"),
+        (("--for", "twincat", "--flavour", "python"), "--for twincat is for native FMUs"),
+        (("ReferenceTrajectory", "--for", "twincat"), "ReferenceTrajectory plays files"),
+    ):
+        status, _, error = hybridsep("build", *arguments, "-m", "spring_mass_damper", "--out", tmp_path / "out")
+        assert status != 0
+        assert said in " ".join(error.split())
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("compiler", ["clang for Microsoft's system", "zig for mingw"])
+def test_a_compiler_for_windows_takes_the_sources(fmus: BuiltFmus, compiler: str, model: str, tmp_path: Path) -> None:
+    sources = unpacked(fmus(model), tmp_path)
+    command = [*MINGW, *STRICT]
+    if compiler.startswith("clang"):
+        if not shutil.which("clang"):
+            pytest.skip("clang is not installed here")
+        command = [*MICROSOFT, *STRICT, "-nostdlibinc", f"-isystem{STAND_INS}"]
+    defines = [f"-D{name}" for name in DEFINITIONS]
+    done = subprocess.run(
+        [
+            *command,
+            *defines,
+            f"-I{sources}",
+            f"-isystem{FMI_HEADERS}",
+            str(sources / "all.c"),
+            "-o",
+            str(tmp_path / "all.o"),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
