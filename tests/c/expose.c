@@ -1,7 +1,6 @@
 /* What the tests reach through ctypes besides the models' own functions. */
 #include "hsep_fmu.h"
 #include "hsep_predictor.h"
-#include "hsep_wide.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -20,8 +19,3 @@ void test_fold(hsep_regression *regression, const double rows[], size_t n_rows, 
         hsep_regression_fold(regression);
     }
 }
-
-/* Whether the processor has wide vectors. */
-int test_wide(void);
-
-int test_wide(void) { return hsep_is_wide(1e9); }

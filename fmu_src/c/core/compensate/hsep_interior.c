@@ -179,7 +179,7 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     self->steps++;
     memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(double));
     hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor);
-    if (!hsep_cholesky_factor(a.factor, a.n)) {
+    if (!hsep_cholesky_factor(a.factor, a.n, NULL)) {
         return 1;
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */

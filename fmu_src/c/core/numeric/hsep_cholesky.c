@@ -3,6 +3,7 @@
 #include "hsep_vector.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* y -= a_0 x_0 + a_1 x_1 + a_2 x_2 + a_3 x_3: y is loaded and stored once for four rows. */
 static void cholesky_take(
@@ -11,10 +12,9 @@ static void cholesky_take(
 {
     const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
     uint64_t j = 0;
-    for (; j + 2 <= n; j += 2) {
-        const double s0 = (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
-        const double s1 = (a0 * x0[j + 1] + a1 * x1[j + 1]) + (a2 * x2[j + 1] + a3 * x3[j + 1]);
-        y[j] -= s0, y[j + 1] -= s1;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        *hsep_lanes_at(y + j) -= (a0 * *hsep_lanes_const(x0 + j) + a1 * *hsep_lanes_const(x1 + j)) +
+                                 (a2 * *hsep_lanes_const(x2 + j) + a3 * *hsep_lanes_const(x3 + j));
     }
     for (; j < n; j++) {
         y[j] -= (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
@@ -30,13 +30,11 @@ static void cholesky_take_two(
     const double b0 = x0[1], b1 = x1[1], b2 = x2[1], b3 = x3[1];
     uint64_t j = 1;
     y[0] -= (a0 * x0[0] + a1 * x1[0]) + (a2 * x2[0] + a3 * x3[0]);
-    for (; j + 2 <= n; j += 2) {
-        const double p0 = x0[j], p1 = x1[j], p2 = x2[j], p3 = x3[j];
-        const double q0 = x0[j + 1], q1 = x1[j + 1], q2 = x2[j + 1], q3 = x3[j + 1];
-        const double s0 = (a0 * p0 + a1 * p1) + (a2 * p2 + a3 * p3), s1 = (a0 * q0 + a1 * q1) + (a2 * q2 + a3 * q3);
-        const double t0 = (b0 * p0 + b1 * p1) + (b2 * p2 + b3 * p3), t1 = (b0 * q0 + b1 * q1) + (b2 * q2 + b3 * q3);
-        y[j] -= s0, y[j + 1] -= s1;
-        z[j - 1] -= t0, z[j] -= t1;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        const hsep_lanes p0 = *hsep_lanes_const(x0 + j), p1 = *hsep_lanes_const(x1 + j);
+        const hsep_lanes p2 = *hsep_lanes_const(x2 + j), p3 = *hsep_lanes_const(x3 + j);
+        *hsep_lanes_at(y + j) -= (a0 * p0 + a1 * p1) + (a2 * p2 + a3 * p3);
+        *hsep_lanes_at(z + j - 1) -= (b0 * p0 + b1 * p1) + (b2 * p2 + b3 * p3);
     }
     for (; j < n; j++) {
         y[j] -= (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
@@ -44,9 +42,12 @@ static void cholesky_take_two(
     }
 }
 
-/* Divide row k, (length,), by the root of its pivot; return whether there is one. */
-static int cholesky_pivot(double row[], uint64_t length)
+/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on the pivot, or none. */
+static int cholesky_pivot(double row[], uint64_t length, const double *least)
 {
+    if (least != NULL && !(row[0] >= *least)) {
+        row[0] = *least;
+    }
     if (!(row[0] > 0.0 && row[0] < HUGE_VAL)) {
         return 0;
     }
@@ -58,7 +59,7 @@ static int cholesky_pivot(double row[], uint64_t length)
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double least[])
 {
     double *row = triangle;
     uint64_t k = 0;
@@ -68,7 +69,7 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
             for (uint64_t above = 0; above < r; above++) {
                 hsep_axpy(x[r], -x[above][r - above], x[above] + (r - above), n - k - r);
             }
-            if (!cholesky_pivot(x[r], n - k - r)) {
+            if (!cholesky_pivot(x[r], n - k - r, least != NULL ? least + k + r : NULL)) {
                 return 0;
             }
         }
@@ -87,7 +88,7 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
         row = x[3] + (n - k - 3);
     }
     for (; k < n; k++) {
-        if (!cholesky_pivot(row, n - k)) {
+        if (!cholesky_pivot(row, n - k, least != NULL ? least + k : NULL)) {
             return 0;
         }
         double *y = row + (n - k);

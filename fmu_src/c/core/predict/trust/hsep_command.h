@@ -25,9 +25,10 @@ typedef struct {
     uint64_t commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
     uint64_t rows;     /* (n, count) features, sample after sample */
+    uint64_t shares;   /* (count,) effects that they may have, relative to the largest */
 } hsep_command;
 
-HSEP_ASSERT_WORDS(hsep_command, 7);
+HSEP_ASSERT_WORDS(hsep_command, 8);
 
 /* Bytes of the block, counted in double so that no size can overflow; n: samples of a prediction. */
 HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n);

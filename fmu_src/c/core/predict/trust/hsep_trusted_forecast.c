@@ -53,19 +53,19 @@ static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint
 }
 
 /* Rows of this run and of earlier ones, these weighed by weight. */
-static const hsep_regression *trusted_all(hsep_trusted *self, hsep_evidence evidence, double weight)
+static hsep_gram *trusted_all(hsep_trusted *self, hsep_evidence evidence, double weight)
 {
-    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
+    hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
     if (!(self->n_earlier[evidence] > 0.0)) {
         return of_run;
     }
-    hsep_regression *all = (hsep_regression *)hsep_at(self, self->all);
+    hsep_gram *all = (hsep_gram *)hsep_at(self, self->all);
     hsep_trusted_gather(self, evidence, weight, all);
     return all;
 }
 
 /* Solve for the weights of an expert, from its rows. */
-static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hsep_regression *regression, double n_rows)
+static void trusted_solve(hsep_trusted *self, hsep_expert_place place, hsep_gram *gram, double n_rows)
 {
     const int of_command = hsep_trusted_is_of_command(self, place);
     const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
@@ -78,12 +78,11 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
         scales[i] = effect * share / fmax(trusted_largest(self, place, i), HSEP_EXPERT_LEAST);
     }
     const hsep_expert_evidence solved = {
-        .regression = regression,
+        .gram = gram,
         .n_rows = n_rows,
         .scales = scales,
         .first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square,
-        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square),
-        .work = hsep_at(self, self->work)};
+        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square)};
     hsep_expert_solve(expert, &solved);
 }
 
@@ -95,7 +94,7 @@ static void trusted_solve_of(
     if (!self->predicted[experts[0]]) {
         return;
     }
-    const hsep_regression *all = trusted_all(self, evidence, 1.0);
+    hsep_gram *all = trusted_all(self, evidence, 1.0);
     for (uint64_t i = 0; i < count; i++) {
         trusted_solve(self, experts[i], all, n_rows + n_earlier);
     }
