@@ -131,25 +131,55 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, double weight)
     }
 }
 
-HSEP_API double hsep_gram_square(hsep_gram *self)
+HSEP_API void hsep_gram_settle(hsep_gram *self) { gram_add_waiting(self); }
+
+HSEP_API double hsep_gram_square(const hsep_gram *self)
 {
-    gram_add_waiting(self);
-    return hsep_at(self, self->sums)[(uint64_t)hsep_triangle(self->n + 1) - 1];
+    const uint64_t n = self->n;
+    const double *target = hsep_at_const(self, self->rows) + n;
+    double square = hsep_at_const(self, self->sums)[(uint64_t)hsep_triangle(n + 1) - 1];
+    for (uint64_t b = 0; b < self->waiting; b++, target += n + 1) {
+        square += *target * *target;
+    }
+    return square;
+}
+
+/* The triangle of the first m features with the target beside them: the target is the column behind the features, whose
+ * last row is its square. other: NULL, or added with its weight. */
+static void gram_copy(
+    const hsep_gram *self, const hsep_gram *other, double weight, const double penalties[], uint64_t m, double to[])
+{
+    const uint64_t n = self->n;
+    const double *sums = hsep_at_const(self, self->sums), *rows = hsep_at_const(self, self->rows);
+    const double *others = other != NULL ? hsep_at_const(other, other->sums) : NULL;
+    for (uint64_t i = 0; i < m; i++) {
+        memcpy(to, sums, (size_t)(m - i) * sizeof(double));
+        to[m - i] = sums[n - i];
+        if (others != NULL) {
+            hsep_axpy(to, weight, others, m - i);
+            to[m - i] += weight * others[n - i];
+            others += n + 1 - i;
+        }
+        for (uint64_t b = 0; b < self->waiting; b++) {
+            const double *row = rows + (n + 1) * b;
+            hsep_axpy(to, row[i], row + i, m - i);
+            to[m - i] += row[i] * row[n];
+        }
+        to[0] += penalties[i];
+        to += m + 1 - i;
+        sums += n + 1 - i;
+    }
 }
 
 HSEP_API double hsep_gram_solve(
-    hsep_gram *self, const double penalties[], uint64_t m, double factor[], double least[], double w[])
+    const hsep_gram *self, const hsep_gram *other, double weight, const double penalties[], uint64_t m, double factor[],
+    double least[], double w[])
 {
-    const uint64_t n = self->n;
-    const double square = hsep_gram_square(self), *from = hsep_at(self, self->sums);
-    double *row = factor;
-    for (uint64_t i = 0; i < m; i++) { /* the target is the column behind the features, whose last row is its square */
-        memcpy(row, from, (size_t)(m - i) * sizeof(double));
-        row[m - i] = from[n - i];
-        row[0] += penalties[i];
-        least[i] = fmax(penalties[i], gram_least);
-        row += m + 1 - i;
-        from += n + 1 - i;
+    const double square = hsep_gram_square(self) + (other != NULL ? weight * hsep_gram_square(other) : 0.0);
+    double *row = factor + (uint64_t)hsep_triangle(m + 1) - 1;
+    gram_copy(self, other, weight, penalties, m, factor);
+    for (uint64_t i = 0; i < m; i++) {
+        least[i] = penalties[i] > gram_least ? penalties[i] : gram_least;
     }
     row[0] = square;
     least[m] = fmax(gram_of_target * square, gram_least);
@@ -163,45 +193,50 @@ HSEP_API double hsep_gram_solve(
     return fmax(sum, 0.0);
 }
 
-/* x_j -= sum_r y_r factor_r of four rows of R for the entries behind them, side by side. */
-static void gram_take(double *restrict x, const double *restrict y, const double *const r[4], uint64_t n)
+/* x_j -= y_0 r_0j + y_1 r_1j + y_2 r_2j + y_3 r_3j for the entries j behind four, of HSEP_GRAM_ABREAST rows side by
+ * side. r: four rows of R. */
+static void gram_take(double *restrict x, const double y[4 * HSEP_GRAM_ABREAST], const double *const r[4], uint64_t n)
 {
+    const double *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
+    hsep_lanes at[4 * HSEP_OF_FOUR];
+    memcpy(at, y, sizeof at);
     for (uint64_t j = 0; j < n; j++, x += HSEP_GRAM_ABREAST) {
-        const double r0 = r[0][j], r1 = r[1][j], r2 = r[2][j], r3 = r[3][j];
         hsep_lanes *to = hsep_lanes_at(x);
-        const hsep_lanes *from = hsep_lanes_const(y);
         for (int l = 0; l < HSEP_OF_FOUR; l++) {
-            to[l] -= (r0 * from[l] + r1 * from[HSEP_OF_FOUR + l]) +
-                     (r2 * from[2 * HSEP_OF_FOUR + l] + r3 * from[3 * HSEP_OF_FOUR + l]);
+            to[l] -= (r0[j] * at[l] + r1[j] * at[HSEP_OF_FOUR + l]) +
+                     (r2[j] * at[2 * HSEP_OF_FOUR + l] + r3[j] * at[3 * HSEP_OF_FOUR + l]);
         }
     }
 }
 
 HSEP_API void hsep_gram_leverages(const double factor[], uint64_t m, double rows[], double leverages[HSEP_GRAM_ABREAST])
 {
-    double sums[HSEP_GRAM_ABREAST] = {0.0}, *x = rows;
+    hsep_lanes sums[HSEP_OF_FOUR];
     const double *row = factor;
+    memset(leverages, 0, HSEP_GRAM_ABREAST * sizeof *leverages);
+    memcpy(sums, leverages, sizeof sums);
     /* R' y = phi from the first feature to the last, which takes each of them from the entries behind it. */
-    for (uint64_t first = 0; first < m; first += 4, x += 4 * HSEP_GRAM_ABREAST) {
-        const uint64_t height = m - first < 4 ? m - first : 4;
+    for (uint64_t first = 0; first < m; first += 4) {
+        const uint64_t left = m - first, height = left < 4 ? left : 4;
+        double *x = rows + HSEP_GRAM_ABREAST * first;
         const double *r[4] = {NULL};
         for (uint64_t i = 0; i < height; i++) {
-            double *y = x + HSEP_GRAM_ABREAST * i;
+            hsep_lanes *y = hsep_lanes_at(x) + HSEP_OF_FOUR * i;
             const double inverse = 1.0 / row[0];
-            for (unsigned c = 0; c < HSEP_GRAM_ABREAST; c++) {
-                y[c] *= inverse;
-                sums[c] += y[c] * y[c];
+            for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                y[l] *= inverse;
+                sums[l] += y[l] * y[l];
             }
             for (uint64_t j = 1; i + j < height; j++) {
-                for (unsigned c = 0; c < HSEP_GRAM_ABREAST; c++) {
-                    y[HSEP_GRAM_ABREAST * j + c] -= row[j] * y[c];
+                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                    y[HSEP_OF_FOUR * j + (uint64_t)l] -= row[j] * y[l];
                 }
             }
             r[i] = row + (height - i);
             row += m + 1 - (first + i);
         }
-        if (first + 4 < m) {
-            gram_take(x + 4 * HSEP_GRAM_ABREAST, x, r, m - first - 4);
+        if (left > 4) {
+            gram_take(x + 4 * HSEP_GRAM_ABREAST, x, r, left - 4);
         }
     }
     memcpy(leverages, sums, sizeof sums);

@@ -56,14 +56,19 @@ HSEP_API int hsep_gram_load(hsep_gram *self, uint64_t i);
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, double weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, double weight);
 
-/* Sum of the squares of the targets, m2. */
-HSEP_API double hsep_gram_square(hsep_gram *self);
+/* Add the rows that wait to the sums now, so that a solution need not: before the last row of a window comes. */
+HSEP_API void hsep_gram_settle(hsep_gram *self);
 
-/* Solve for the weights w, (m,), of the first m features. penalties: (m,) > 0; factor: triangle of m + 1 rows, work,
- * [R z; 0 rho] with R' R = gram + penalties afterwards, by rows from the diagonal on; least: (m + 1,), work. Return the
- * first sum, of which rounding leaves 1e-14 of the square of the targets. Cost: m^3 / 6 + m^2 multiply-adds. */
+/* Sum of the squares of the targets, m2. */
+HSEP_API double hsep_gram_square(const hsep_gram *self);
+
+/* Solve for the weights w, (m,), of the first m features; with the rows of other, settled and of the same features,
+ * weighed by weight, or NULL. penalties: (m,) > 0; factor: triangle of m + 1 rows, [R z; 0 rho] with R' R = gram +
+ * penalties afterwards, by rows from the diagonal on; least: (m + 1,), work. Return the first sum, of which rounding
+ * leaves 1e-14 of the square of the targets. Cost: m^3 / 6 + m^2 multiply-adds, and m^2 / 2 for each row that waits. */
 HSEP_API double hsep_gram_solve(
-    hsep_gram *self, const double penalties[], uint64_t m, double factor[], double least[], double w[]);
+    const hsep_gram *self, const hsep_gram *other, double weight, const double penalties[], uint64_t m, double factor[],
+    double least[], double w[]);
 
 /* phi' (R' R)^-1 phi of HSEP_GRAM_ABREAST rows phi, entry after entry side by side in rows, which is used up: the
  * variances of w' phi relative to that of the noise. factor: that of hsep_gram_solve. Cost: m^2 / 2 multiply-adds for

@@ -72,4 +72,42 @@ static inline void hsep_axpy(double *restrict y, double a, const double *restric
     }
 }
 
+/* y -= sum_r a_r x_r over 4 or 8 arrays x_r, all (n,), one after the other: y is loaded and stored once for all. */
+static inline void hsep_take_four(double *restrict y, const double a[4], const double *const x[4], uint64_t n)
+{
+    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
+    uint64_t j = 0;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        *hsep_lanes_at(y + j) = (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) -
+                                  a1 * *hsep_lanes_const(x1 + j)) -
+                                 a2 * *hsep_lanes_const(x2 + j)) -
+                                a3 * *hsep_lanes_const(x3 + j);
+    }
+    for (; j < n; j++) {
+        y[j] = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+    }
+}
+
+static inline void hsep_take_eight(double *restrict y, const double a[8], const double *const x[8], uint64_t n)
+{
+    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
+    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
+    uint64_t j = 0;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        const hsep_lanes first = (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) -
+                                   a1 * *hsep_lanes_const(x1 + j)) -
+                                  a2 * *hsep_lanes_const(x2 + j)) -
+                                 a3 * *hsep_lanes_const(x3 + j);
+        *hsep_lanes_at(y + j) =
+            (((first - a4 * *hsep_lanes_const(x4 + j)) - a5 * *hsep_lanes_const(x5 + j)) -
+             a6 * *hsep_lanes_const(x6 + j)) -
+            a7 * *hsep_lanes_const(x7 + j);
+    }
+    for (; j < n; j++) {
+        const double first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+        y[j] = (((first - a4 * x4[j]) - a5 * x5[j]) - a6 * x6[j]) - a7 * x7[j];
+    }
+}
+
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Parts in which the one that can be trusted predicts a window: its variances are dear. */
-static const uint64_t residual_parts = 13;
+static const uint64_t residual_parts = 25;
 
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
 {

@@ -51,10 +51,21 @@ HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature)
 
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m)
 {
-    double *commands = hsep_at(self, self->commands) + (self->n - m), *row = hsep_at(self, self->rows);
-    memcpy(commands, x_d, (size_t)m * sizeof(double));
-    for (uint64_t j = m; j-- > 0; row += self->count) {
-        const double *late = commands + j + self->dead_time;
+    hsep_command_take_in(self, x_d, m);
+    hsep_command_fill(self, m, 0, m);
+}
+
+HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m)
+{
+    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(double));
+}
+
+HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last)
+{
+    const double *commands = hsep_at(self, self->commands) + (self->n - m);
+    double *row = hsep_at(self, self->rows) + first * self->count;
+    for (uint64_t k = first; k < last; k++, row += self->count) {
+        const double *late = commands + (m - 1 - k) + self->dead_time;
         row[0] = 1.0;
         for (uint64_t i = 1; i < self->count; i++) {
             row[i] = late[i - 1] - late[i];

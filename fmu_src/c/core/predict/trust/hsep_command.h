@@ -46,6 +46,10 @@ HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature);
  * others. */
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m);
 
+/* The same in parts: begin, then fill the rows of samples first ... last - 1. */
+HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m);
+HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last);
+
 /* Of these, the commands as many samples ago as the dead time has, (m,), m. */
 HSEP_API const double *hsep_command_late(const hsep_command *self, uint64_t m);
 

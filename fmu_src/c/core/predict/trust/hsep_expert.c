@@ -2,6 +2,7 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_predict_constants.h"
+#include "hsep_range.h"
 #include "hsep_trust_constants.h"
 #include "hsep_vector.h"
 
@@ -15,7 +16,7 @@ HSEP_API void hsep_residual_scale_follow(
     for (uint64_t j = 0; j < n; j++) {
         const double residual = accepted[j] * residuals[j];
         sum += residual * residual;
-        self->largest = fmax(self->largest, fabs(residual));
+        self->largest = fabs(residual) > self->largest ? fabs(residual) : self->largest;
     }
     self->largest_square = fmax(self->largest_square, sum / count);
 }
@@ -73,7 +74,8 @@ HSEP_API double hsep_expert_shrink(const hsep_expert *self, uint64_t j)
 HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *evidence)
 {
     const double noise = self->noise_variance > 0.0 ? self->noise_variance : evidence->first;
-    const double resolved = HSEP_EXPERT_RESOLUTION * hsep_gram_square(evidence->gram);
+    const double of_other = evidence->other != NULL ? evidence->weight * hsep_gram_square(evidence->other) : 0.0;
+    const double resolved = HSEP_EXPERT_RESOLUTION * (hsep_gram_square(evidence->gram) + of_other);
     const uint64_t n = self->n_static + self->p;
     double *penalties = hsep_at(self, self->penalties);
     self->variance = fmax(fmax(noise, evidence->least), resolved) * self->correlation;
@@ -83,51 +85,37 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *e
         penalties[i] = self->variance / (penalties[i] * penalties[i]);
     }
     const double sum = hsep_gram_solve(
-        evidence->gram, penalties, n, hsep_at(self, self->factor), hsep_at(self, self->side_by_side),
-        hsep_at(self, self->weights));
+        evidence->gram, evidence->other, evidence->weight, penalties, n, hsep_at(self, self->factor),
+        hsep_at(self, self->side_by_side), hsep_at(self, self->weights));
     self->rows_variance = fmax(sum, resolved) / evidence->n_rows;
 }
 
-static double expert_bounded(double value, double bound) { return fmax(-bound, fmin(value, bound)); }
-
-/* e(k) := e(k) + sum_i w_i e(k - i) over a window; eq. (4). */
-static void expert_run(const hsep_expert *self, double e[])
+/* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and the
+ * same within bounds; eq. (4). */
+static void expert_free_run(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
-    const double *lag_weights = hsep_at_const(self, self->weights) + self->n_static;
-    for (uint64_t j = self->n; self->p > 0 && j-- > 0;) {
-        e[j] = hsep_recur(e[j], lag_weights, e + j + 1, self->p);
-    }
-}
-
-/* Free run from the last residuals, and the same within bounds. */
-static void expert_free_run(hsep_expert *self, const double rows[], const double past[])
-{
-    const uint64_t n = self->n, n_static = self->n_static;
-    const double *weights = hsep_at(self, self->weights);
+    const uint64_t n_static = self->n_static;
+    const double *weights = hsep_at(self, self->weights), *lag_weights = weights + n_static;
     double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
-    for (uint64_t j = n; j-- > 0; rows += n_static) {
-        run[j] = hsep_dot(weights, rows, n_static);
-    }
-    memcpy(run + n, past, (size_t)self->p * sizeof(double));
-    memcpy(unshrunk + n, past, (size_t)self->p * sizeof(double));
-    expert_run(self, run);
-    for (uint64_t j = 0; j < n; j++) {
-        unshrunk[j] = isfinite(run[j]) ? expert_bounded(run[j], HSEP_EXPERT_LAG_BOUND * self->bound) : 0.0;
+    rows += first * n_static;
+    for (uint64_t k = first; k < last; k++, rows += n_static) {
+        const uint64_t j = self->n - 1 - k;
+        run[j] = hsep_recur(hsep_dot(weights, rows, n_static), lag_weights, run + j + 1, self->p);
+        unshrunk[j] = isfinite(run[j]) ? hsep_clip(run[j], HSEP_EXPERT_LAG_BOUND * self->bound) : 0.0;
     }
 }
 
-/* Squares of the recursion's impulse response. */
-static void expert_respond(hsep_expert *self)
+/* Squares first ... last - 1 of the recursion's impulse response. */
+static void expert_respond(hsep_expert *self, uint64_t first, uint64_t last)
 {
     const uint64_t n = self->n;
+    const double *lag_weights = hsep_at(self, self->weights) + self->n_static;
     double *response = hsep_at(self, self->response), *squares = hsep_at(self, self->squares);
-    memset(response, 0, (size_t)(n + self->p) * sizeof(double));
-    response[n - 1] = 1.0;
-    expert_run(self, response);
-    for (uint64_t i = 0; i < n; i++) {
-        const double at = response[n - 1 - i];
-        const double within = isnan(at) ? HSEP_EXPERT_DIVERGED : expert_bounded(at, HSEP_EXPERT_DIVERGED);
-        squares[i] = within * within;
+    for (uint64_t k = first; k < last; k++) {
+        const uint64_t j = n - 1 - k;
+        response[j] = hsep_recur(k == 0 ? 1.0 : 0.0, lag_weights, response + j + 1, self->p);
+        const double within = isnan(response[j]) ? HSEP_EXPERT_DIVERGED : hsep_clip(response[j], HSEP_EXPERT_DIVERGED);
+        squares[k] = within * within;
     }
 }
 
@@ -161,7 +149,7 @@ static double expert_variance(const hsep_expert *self, uint64_t k)
     const uint64_t j = self->n - 1 - k;
     const double *variances = hsep_at_const(self, self->variances) + j, most = expert_most(self);
     const double carried = self->p > 0 ? hsep_dot(hsep_at_const(self, self->squares), variances, k + 1) : variances[0];
-    return isfinite(hsep_at_const(self, self->run)[j]) ? fmin(carried, most) : most;
+    return isfinite(hsep_at_const(self, self->run)[j]) && carried < most ? carried : most;
 }
 
 /* What a variance, m2, leaves of a prediction. */
@@ -176,15 +164,15 @@ static void expert_shrink(hsep_expert *self, uint64_t begin, uint64_t end)
     const double *unshrunk = hsep_at(self, self->unshrunk), *kept = hsep_at(self, self->kept);
     double *e_h = hsep_at(self, self->e_h);
     for (uint64_t j = begin; j < end; j++) {
-        e_h[j] = expert_bounded(unshrunk[j], self->bound) * kept[j];
+        e_h[j] = hsep_clip(unshrunk[j], self->bound) * kept[j];
     }
 }
 
 HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
     double *kept = hsep_at(self, self->kept);
-    if (first == 0 && self->p > 0) {
-        expert_respond(self);
+    if (self->p > 0) {
+        expert_respond(self, first, last);
     }
     for (uint64_t k = first; k < last; k += HSEP_GRAM_ABREAST) {
         expert_vary_rows(self, rows, k, last - k < HSEP_GRAM_ABREAST ? last - k : HSEP_GRAM_ABREAST);
@@ -195,13 +183,26 @@ HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t 
     expert_shrink(self, self->n - last, self->n - first);
 }
 
+HSEP_API void hsep_expert_begin(hsep_expert *self, const double past[], double largest_square, double bound)
+{
+    self->largest_square = largest_square;
+    self->bound = bound;
+    memcpy(hsep_at(self, self->run) + self->n, past, (size_t)self->p * sizeof(double));
+    memcpy(hsep_at(self, self->unshrunk) + self->n, past, (size_t)self->p * sizeof(double));
+}
+
+HSEP_API void hsep_expert_go_on(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
+{
+    expert_free_run(self, rows, first, last);
+    hsep_expert_vary(self, rows, first, last);
+}
+
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const double rows[], const double past[], double largest_square, double bound, uint64_t varied)
 {
     double *kept = hsep_at(self, self->kept);
-    self->largest_square = largest_square;
-    self->bound = bound;
-    expert_free_run(self, rows, past);
+    hsep_expert_begin(self, past, largest_square, bound);
+    expert_free_run(self, rows, 0, self->n);
     if (varied > 0) {
         hsep_expert_vary(self, rows, 0, varied);
         for (uint64_t j = 0; j < self->n - varied; j++) {

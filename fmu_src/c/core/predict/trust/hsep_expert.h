@@ -70,7 +70,9 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 
 /* What the weights are solved with. */
 typedef struct {
-    hsep_gram *gram;      /* of rows whose first features are those of the expert, */
+    const hsep_gram *gram; /* of rows whose first features are those of the expert, */
+    const hsep_gram *other; /* more of them, settled, or NULL, */
+    double weight;        /* and the weight of these */
     double n_rows;        /* and their number, weighted */
     const double *scales; /* (n_static,) prior standard deviations of the weights without lags */
     double first, least;  /* m2, variance of the noise while it is not known, and the least one */
@@ -85,6 +87,11 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *e
  * that of hsep_expert_vary. */
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const double rows[], const double past[], double largest_square, double bound, uint64_t varied);
+
+/* Predict them part by part: begin, then go on with samples first ... last - 1, first being 0, or where the last call
+ * ended; the result is the same as with varied = n. */
+HSEP_API void hsep_expert_begin(hsep_expert *self, const double past[], double largest_square, double bound);
+HSEP_API void hsep_expert_go_on(hsep_expert *self, const double rows[], uint64_t first, uint64_t last);
 
 /* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
  * them by it. Cost for each: that of hsep_gram_leverages, four at a time, and last multiply-adds. */

@@ -138,6 +138,10 @@ HSEP_API void hsep_trusted_follow(
     for (uint64_t i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
         trusted_follow_sample(self, x_pb, e, 1);
     }
+    if (last + 1 == self->Np) { /* the solution comes with the next row */
+        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
+        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+    }
 }
 
 /* Update the weights of the stack with the samples that were published, of those accepted. */
@@ -148,16 +152,24 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
     double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (uint64_t j = 0; j < self->Np - first; j++) {
         double of_sample[HSEP_N_EXPERTS + 1];
+        if (!(accepted[j] > 0.0)) {
+            continue;
+        }
         for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
             of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
-        for (int i = 0; accepted[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
-            for (int l = 0; l <= HSEP_N_EXPERTS; l++) {
+        for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
+            for (int l = i; l <= HSEP_N_EXPERTS; l++) {
                 products[i][l] += of_sample[i] * of_sample[l];
             }
         }
-        n += accepted[j];
+        n += 1.0;
+    }
+    for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
+        for (int l = 0; l < i; l++) {
+            products[i][l] = products[l][i];
+        }
     }
     if (n > 0.0) {
         hsep_stack_update(&self->stack, products, n, self->least_variance);

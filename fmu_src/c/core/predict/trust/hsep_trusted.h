@@ -90,14 +90,13 @@ typedef struct {
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
     uint64_t disturbances, command;
     uint64_t evidence[HSEP_N_EVIDENCE]; /* Gram matrices of this run's rows, */
-    uint64_t earlier[HSEP_N_EVIDENCE];  /* of those of earlier runs, */
-    uint64_t all;                       /* and of both, work */
+    uint64_t earlier[HSEP_N_EVIDENCE];  /* and of those of earlier runs */
     uint64_t experts[HSEP_N_EXPERTS];   /* hold has none, 0 */
 } hsep_trusted;
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    40 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
+    39 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -138,9 +137,6 @@ HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
 /* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
-
-/* Rows of this run, and of earlier ones weighed by weight, in to. Cost: n^2 multiply-adds for n features. */
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_gram *to);
 
 /* Forget all rows of some evidence; go on with all of them as with those of this run; weigh all so far by kept; begin
  * another run, of which all so far are earlier ones, at a bounded weight. */

@@ -95,14 +95,11 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));
     self->command = hsep_take_block(&end, hsep_command_size(settings, parameters->n));
-    double largest = 0.0;
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
         const double size = hsep_gram_size(trusted_n_features(self, i));
         self->evidence[i] = hsep_take_block(&end, size);
         self->earlier[i] = hsep_take_block(&end, size);
-        largest = fmax(largest, size);
     }
-    self->all = hsep_take_block(&end, largest);
     self->experts[HSEP_HOLD] = 0;
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         self->experts[i] = hsep_take_block(&end, trusted_expert_size(self, i));

@@ -16,13 +16,6 @@ HSEP_API void hsep_trusted_forget(hsep_trusted *self, hsep_evidence evidence)
     self->n_rows[evidence] = self->n_earlier[evidence] = 0.0;
 }
 
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_gram *to)
-{
-    const hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
-    memcpy(to, of_run, (size_t)hsep_gram_size(of_run->n));
-    hsep_gram_add(to, hsep_trusted_earlier(self, evidence), weight);
-}
-
 HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence)
 {
     if (self->n_earlier[evidence] > 0.0) {
@@ -44,11 +37,12 @@ HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, 
 
 HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
 {
-    const hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
+    hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
     const double most = HSEP_TRUST_CARRIED * (double)self->Np;
     hsep_trusted_believe_earlier(self, evidence);
     hsep_trusted_discount(self, evidence, most / fmax(self->n_rows[evidence], most));
     const double n_rows = self->n_rows[evidence];
+    hsep_gram_settle(of_run);
     memcpy(hsep_trusted_earlier(self, evidence), of_run, (size_t)hsep_gram_size(of_run->n));
     hsep_trusted_forget(self, evidence);
     self->n_earlier[evidence] = n_rows;
