@@ -19,3 +19,15 @@ void test_fold(hsep_regression *regression, const double rows[], size_t n_rows, 
         hsep_regression_fold(regression);
     }
 }
+
+void test_fold_gram(hsep_gram *gram, const double rows[], size_t n_rows, size_t repetitions);
+
+/* The same into a Gram matrix. */
+void test_fold_gram(hsep_gram *gram, const double rows[], size_t n_rows, size_t repetitions)
+{
+    const size_t width = (size_t)gram->n + 1;
+    for (size_t i = 0; i < repetitions * n_rows; i++) {
+        memcpy(hsep_gram_row(gram), rows + (i % n_rows) * width, width * sizeof(double));
+        hsep_gram_fold(gram);
+    }
+}

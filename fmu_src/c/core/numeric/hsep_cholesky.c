@@ -77,10 +77,21 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double le
 HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
 {
     const double *row = triangle;
-    for (uint64_t i = 0; i < n; i++) { /* R' y = b */
-        b[i] /= row[0];
-        hsep_axpy(b + i + 1, -b[i], row + 1, n - i - 1);
-        row += n - i;
+    for (uint64_t first = 0; first < n; first += CHOLESKY_PANEL) { /* R' y = b */
+        const uint64_t left = n - first, count = left < CHOLESKY_PANEL ? left : CHOLESKY_PANEL;
+        const double *x[CHOLESKY_PANEL] = {NULL};
+        double *y = b + first;
+        for (uint64_t r = 0; r < count; r++) {
+            y[r] /= row[0];
+            for (uint64_t j = 1; r + j < count; j++) {
+                y[r + j] -= y[r] * row[j];
+            }
+            x[r] = row + (CHOLESKY_PANEL - r);
+            row += left - r;
+        }
+        if (left > CHOLESKY_PANEL) {
+            hsep_take_eight(y + CHOLESKY_PANEL, y, x, left - CHOLESKY_PANEL);
+        }
     }
     for (uint64_t i = n; i-- > 0;) { /* R x = y */
         row -= n - i;

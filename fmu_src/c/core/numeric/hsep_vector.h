@@ -7,9 +7,10 @@
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__GNUC__) || defined(__clang__)
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
 #define HSEP_LANES 2
 typedef double hsep_lanes __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
 #else
 #define HSEP_LANES 1
 typedef double hsep_lanes;
@@ -21,6 +22,17 @@ typedef double hsep_lanes;
 /* The vectors that begin at a double, in any alignment of doubles. */
 static inline hsep_lanes *hsep_lanes_at(double *a) { return (hsep_lanes *)(void *)a; }
 static inline const hsep_lanes *hsep_lanes_const(const double *a) { return (const hsep_lanes *)(const void *)a; }
+
+/* Entry by entry a where it is larger than b, else b. */
+static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
+{
+#if HSEP_LANES == 2
+    const hsep_bits larger = (hsep_bits)(a > b);
+    return (hsep_lanes)((larger & (hsep_bits)a) | (~larger & (hsep_bits)b));
+#else
+    return a > b ? a : b;
+#endif
+}
 
 /* sum_i a_i b_i, both (n,). */
 static inline double hsep_dot(const double a[], const double b[], uint64_t n)
