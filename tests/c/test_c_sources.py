@@ -130,7 +130,7 @@ def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_
     folder = build_folder() / f"sanitise_{name}"
     c_core.write_header(name, folder)
     program = sanitised_program("sanitise", folder)
-    write_trajectory(tmp_path, staircase.commanded()[:600])
+    write_trajectory(tmp_path, staircase.commanded()[:360])
     for pairs in arguments:
         done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr

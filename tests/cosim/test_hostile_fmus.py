@@ -194,10 +194,10 @@ def test_truncated_libraries(native: Path, tmp_path: Path, hybridsep: Run, nothi
         path = changed(native, tmp_path / "Cut.fmu", {".so": partial(beginning, kept)})
         with pytest.raises(FmuError, match=r"Cut\.fmu cannot be loaded: binaries/linux64/FeedDrive\.so is (no|trunc)"):
             FmuInstance(path)
-        status, _, err = hybridsep("cosim", "--plant", path, "--flavour", "python")
-        assert status == 2
-        assert len(err.strip().splitlines()) == 1
-        assert "is truncated" in err or "is no ELF library" in err
+    status, _, err = hybridsep("cosim", "--plant", path, "--flavour", "python")
+    assert status == 2
+    assert len(err.strip().splitlines()) == 1
+    assert "is truncated" in err
     assert not list(nothing_left.iterdir())
 
 

@@ -34,7 +34,7 @@ FOREIGN = [
 READ_FMI3 = ("ecos", "fmucontainer")
 SHIFT = 0.1  # m
 MOVED = " moved"
-N_MOVED = 1500
+N_MOVED = 800
 """Samples of the shorter run at another place."""
 
 

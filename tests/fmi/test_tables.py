@@ -188,7 +188,7 @@ def test_mutated_tables_under_sanitizers(tmp_path: Path) -> None:
     def findings(kind: str) -> str:
         folder = tmp_path / kind
         folder.mkdir()
-        held, said = fuzz_tables.fuzz(kind, folder, 3000)
+        held, said = fuzz_tables.fuzz(kind, folder, 1000)
         return "" if held else f"{kind}: {said}"
 
     with ThreadPoolExecutor() as pool:

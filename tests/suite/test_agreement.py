@@ -65,7 +65,7 @@ def named(values: object) -> str:
     ],
 )
 def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p: int, q: int, start: float) -> None:
-    loop = assert_agreement(new_stream, 6001, {"p": p, "q": q}, 1e-11, start=start)
+    loop = assert_agreement(new_stream, 3000, {"p": p, "q": q}, 1e-11, start=start)
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
 
 
@@ -86,7 +86,7 @@ def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p
     ids=named,
 )
 def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 1250, values, 1e-11)
+    assert_agreement(new_stream, 900, values, 1e-11)
 
 
 @on_all((PREDICTOR,), needs="agreement")
@@ -118,7 +118,7 @@ def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: Str
 def test_every_parameter_predicts_with_trust_as_in_the_library(
     new_stream: StreamMaker, values: dict[str, Value], path: str
 ) -> None:
-    n = 200 if values.get("Np") == 1 else 850
+    n = 150 if values.get("Np") == 1 else 650
     assert_agreement(new_stream, n, {"trust": True, **values}, 1e-12, path=path)
 
 
@@ -153,7 +153,7 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
 @pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     # The limits act in some windows.
-    loop = assert_agreement(new_stream, 4000, PAPER, 1e-11, start=start)
+    loop = assert_agreement(new_stream, 2400, PAPER, 1e-11, start=start)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
 
@@ -184,7 +184,7 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
     ids=named,
 )
 def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 300 if values.get("Np") == 1 else 1250, values, 1e-9)
+    assert_agreement(new_stream, 200 if values.get("Np") == 1 else 800, values, 1e-9)
 
 
 @pytest.mark.slow
@@ -195,13 +195,13 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     ids=named,
 )
 def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 1250, values, 1e-9)
+    assert_agreement(new_stream, 800, values, 1e-9)
 
 
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.1, pytest.param(0.0, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
-    loop = assert_agreement(new_stream, 2450, {}, 1e-11, start=start)
+    loop = assert_agreement(new_stream, 1600, {}, 1e-11, start=start)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert loop.column(COMPENSATOR, "rms_e")[-1] < 1e-5
     assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
@@ -229,7 +229,7 @@ def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: S
 def test_every_parameter_compensates_with_trust_as_in_the_library(
     new_stream: StreamMaker, values: dict[str, Value]
 ) -> None:
-    assert_agreement(new_stream, 250 if values.get("Np") == 2 else 1100, values, 1e-9)
+    assert_agreement(new_stream, 150 if values.get("Np") == 2 else 750, values, 1e-9)
 
 
 @on_all((COMPENSATOR,), needs="agreement")
@@ -250,7 +250,7 @@ def test_every_parameter_compensates_with_trust_as_in_the_library(
 def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     delay = int(values["measurement_delay"])
     start = 0.1 if "spacing" in values else 0.0
-    assert_agreement(new_stream, 1250, values, 1e-9, start=start, delay=delay)
+    assert_agreement(new_stream, 800, values, 1e-9, start=start, delay=delay)
 
 
 @on_all((COMPENSATOR,), needs="agreement")

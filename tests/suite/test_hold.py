@@ -40,7 +40,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     [
         {},
         {"t_init": 0.333},
-        {"measurement_delay": 7},
+        pytest.param({"measurement_delay": 7}, marks=pytest.mark.nightly),
         {"measurement_delay": 45},  # later than a window
         {"trust": False},
         {"trust": False, "t_init": 0.2},

@@ -28,7 +28,7 @@ from stream import (
 )
 from streams import StreamMaker, on_adapters, on_all
 
-N_SAMPLES = 260
+N_SAMPLES = 160
 
 Clock = list[Fraction]
 

@@ -58,7 +58,7 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
     # 1e-11 m at every sample; a pythonfmu FMU is the library.
     tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
     path, model = weights(new_stream.model), new_stream.model
-    loop = closed_loop(model, 6001 if model == PREDICTOR else 2501, weights=path)
+    loop = closed_loop(model, 6001 if model == PREDICTOR else 1501, weights=path)
     stream = new_stream(weights=path)
     stream.initialise(loop.values)
     np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
@@ -76,7 +76,7 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
 def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, led: Path) -> None:
     """Its counterpart doubts it, and has a part in the plans."""
     tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-10
-    loop = closed_loop(COMPENSATOR, 1200, weights=led)
+    loop = closed_loop(COMPENSATOR, 700, weights=led)
     stream = new_stream(weights=led)
     stream.initialise(loop.values)
     np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
@@ -85,7 +85,7 @@ def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, le
 @on_adapters(LOOK_AHEADS, needs="weights before")
 def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker, weights: Trained) -> None:
     path = weights(new_stream.model)
-    expected = closed_loop(new_stream.model, 1500, weights=path).outputs[0]
+    expected = closed_loop(new_stream.model, 10, weights=path).outputs[0]
     assert new_stream(weights=path).outputs_before({}) == expected.tolist()
 
 

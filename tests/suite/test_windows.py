@@ -31,7 +31,7 @@ PLANS: dict[str, Value] = {"Np": 50, "p": 20, "q": 3, "t_init": 0.1}
 @cache
 def predicted(start: float) -> tuple[Array, Array, Any]:
     """Return what the library predicts of the closed loop's log, window by window."""
-    loop = closed_loop(PREDICTOR, 2500, {}, start=start)
+    loop = closed_loop(PREDICTOR, 1700, {}, start=start)
     return predictions(loop.r[:-100], loop.x[100:])
 
 
@@ -39,7 +39,7 @@ def predicted(start: float) -> tuple[Array, Array, Any]:
 def planned(preview: int, start: float) -> dict[str, Array]:
     """Return what the library plans of the closed loop's log, window by window."""
     values = PLANS | {"preview": preview}
-    loop = closed_loop(COMPENSATOR, 1500, values, start=start)
+    loop = closed_loop(COMPENSATOR, 900, values, start=start)
     return plans(values, loop.r, loop.x)
 
 
@@ -50,7 +50,7 @@ def tolerance_of(new_stream: StreamMaker) -> float:
 @on_all((PREDICTOR,))
 @pytest.mark.parametrize("start", [0.0, 0.1])
 def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start: float) -> None:
-    shown = shown_by(new_stream, 2500, {}, start)
+    shown = shown_by(new_stream, 1700, {}, start)
     x_pb, x_h, active = predicted(start)
     n, tolerance = len(x_pb), tolerance_of(new_stream)
     np.testing.assert_array_equal(shown["x_d"][100 : 100 + n], shown["r"][:n])
@@ -59,7 +59,6 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start
     np.testing.assert_array_equal(shown["hybrid_active"][100 : 100 + n] == 1.0, active)
 
 
-@pytest.mark.slow
 @cache
 def directly_solved(n: int) -> Array:
     """Return the prediction of the staircase by the oracle.
@@ -74,19 +73,19 @@ def directly_solved(n: int) -> Array:
 
 @on_all((PREDICTOR,))
 def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
-    shown = shown_by(new_stream, 6001, {})
+    shown = shown_by(new_stream, 4001, {})
     tolerance = 1e-12 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
-    assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(6001))) < tolerance
+    assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(4001))) < tolerance
 
 
 @on_all((COMPENSATOR,))
 @pytest.mark.parametrize(("preview", "start"), [(200, 0.0), (170, 0.1)])
 def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker, preview: int, start: float) -> None:
-    shown = shown_by(new_stream, 1500, PLANS | {"preview": preview}, start)
+    shown = shown_by(new_stream, 900, PLANS | {"preview": preview}, start)
     expected = planned(preview, start)
     exact = new_stream.implementation in (LIBRARY, PYTHON)
     for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state"):
-        np.testing.assert_allclose(shown[name][:1500], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
+        np.testing.assert_allclose(shown[name][:900], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
     assert set(expected["sep_state"]) == {1, 2}
 
 
@@ -129,7 +128,7 @@ def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> Non
 @pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
-    shown, moved = (shown_by(new_stream, 2500, {}, start) for start in (0.0, 0.1))
+    shown, moved = (shown_by(new_stream, 1700, {}, start) for start in (0.0, 0.1))
     for name in ("x_d", "x_pb", "x_h"):
         np.testing.assert_allclose(moved[name] - 0.1, shown[name], rtol=0, atol=1e-10)
 
