@@ -38,13 +38,11 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
     for (uint64_t i = 0; hsep_residual_trusted(from) != NULL && i < HSEP_N_EVIDENCE; i++) {
         hsep_gram *gram = hsep_trusted_evidence(hsep_residual_trusted(from), (hsep_evidence)i);
         memcpy(
-            hsep_trusted_evidence(hsep_residual_trusted(to), (hsep_evidence)i), gram,
-            (size_t)hsep_gram_size(gram->n));
+            hsep_trusted_evidence(hsep_residual_trusted(to), (hsep_evidence)i), gram, (size_t)hsep_gram_size(gram->n));
     }
     if (hsep_residual_paper(from) != NULL) {
         hsep_regression *factor = hsep_paper_regression(hsep_residual_paper(from));
-        memcpy(
-            hsep_paper_regression(hsep_residual_paper(to)), factor, (size_t)hsep_regression_size(factor->n));
+        memcpy(hsep_paper_regression(hsep_residual_paper(to)), factor, (size_t)hsep_regression_size(factor->n));
     }
     memcpy(
         hsep_uncertainty_learned(hsep_predictor_uncertainty(predictor)),

@@ -60,11 +60,10 @@ def test_rows_that_wait_count(n_rows: int) -> None:
 
 
 def test_rows_of_others_are_added_with_their_weight() -> None:
-    gram, library, rows, target = both(7, 30, 1)
-    other, _, _, _ = both(7, 33, 2)
-    rng_rows = both(7, 33, 2)[2:]
+    gram, library, rows, _ = both(7, 30, 1)
+    other, _, other_rows, other_target = both(7, 33, 2)
     penalties = np.abs(rows).max(axis=0) ** 2
-    library.update(0.1 * rng_rows[0], 0.1 * rng_rows[1])
+    library.update(0.1 * other_rows, 0.1 * other_target)
     other.settle()
     assert_same(CSolution(gram, penalties, other, 0.01), library, penalties, rows)
     gram.add(other, 0.01)
@@ -152,7 +151,7 @@ def test_digits_do_not_wear_off() -> None:
     gram = CGram(2)
     gram.fold_over(rows, target, repetitions)
     exact = [
-        repetitions * sum(Fraction(float(a)) * Fraction(float(b)) for a, b in zip(x, y, strict=True))
+        repetitions * sum((Fraction(a) * Fraction(b) for a, b in zip(x.tolist(), y.tolist(), strict=True)), Fraction(0))
         for x, y in ((rows[:, 0], rows[:, 0]), (rows[:, 0], rows[:, 1]), (rows[:, 0], target))
     ]
     sums = gram.block[-12:-6]

@@ -77,8 +77,7 @@ HSEP_API void hsep_slacks_push(const hsep_slacks *self)
         uint64_t r = self->range[order].begin;
         for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
             *hsep_lanes_at(self->work + r) =
-                (*hsep_lanes_const(low->r_c + r) - *hsep_lanes_const(low->z + r) *
-                                                       *hsep_lanes_const(low->inverse + r) *
+                (*hsep_lanes_const(low->r_c + r) - *hsep_lanes_const(low->z + r) * *hsep_lanes_const(low->inverse + r) *
                                                        *hsep_lanes_const(low->r_p + r)) -
                 (*hsep_lanes_const(high->r_c + r) - *hsep_lanes_const(high->z + r) *
                                                         *hsep_lanes_const(high->inverse + r) *

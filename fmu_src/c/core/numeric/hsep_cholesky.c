@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on the pivot, or none. */
+/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. */
 static int cholesky_pivot(double row[], uint64_t length, const double *least)
 {
     if (least != NULL && !(row[0] >= *least)) {

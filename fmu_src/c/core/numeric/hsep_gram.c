@@ -184,8 +184,8 @@ HSEP_API double hsep_gram_solve(
     row[0] = square;
     least[m] = fmax(gram_of_target * square, gram_least);
     (void)hsep_cholesky_factor(factor, m + 1, least); /* no pivot is 0 */
-    double sum = row[0] * row[0]; /* sum of the squares, and of the penalties */
-    for (uint64_t i = m; i-- > 0;) { /* R w = z */
+    double sum = row[0] * row[0];                     /* sum of the squares, and of the penalties */
+    for (uint64_t i = m; i-- > 0;) {                  /* R w = z */
         row -= m + 1 - i;
         w[i] = (row[m - i] - hsep_dot(row + 1, w + i + 1, m - i - 1)) / row[0];
         sum -= penalties[i] * w[i] * w[i];

@@ -73,6 +73,7 @@ HSEP_API double hsep_gram_solve(
 /* phi' (R' R)^-1 phi of HSEP_GRAM_ABREAST rows phi, entry after entry side by side in rows, which is used up: the
  * variances of w' phi relative to that of the noise. factor: that of hsep_gram_solve. Cost: m^2 / 2 multiply-adds for
  * each. */
-HSEP_API void hsep_gram_leverages(const double factor[], uint64_t m, double rows[], double leverages[HSEP_GRAM_ABREAST]);
+HSEP_API void hsep_gram_leverages(
+    const double factor[], uint64_t m, double rows[], double leverages[HSEP_GRAM_ABREAST]);
 
 #endif

@@ -1,6 +1,6 @@
-/* Vectors of two doubles where the compiler has them, one double elsewhere; sums and products of arrays, four entries at
- * a time. Lanes do not meet: results are the same to the last bit whatever a vector holds, and no addition waits for
- * the one before. Reentrant; allocate nothing. */
+/* Vectors of two doubles where the compiler has them, one double elsewhere or with HSEP_NO_VECTORS; sums and products
+ * of arrays, four entries at a time. Lanes do not meet: results are the same to the last bit whatever a vector holds,
+ * and no addition waits for the one before. Reentrant; allocate nothing. */
 #ifndef HSEP_VECTOR_H
 #define HSEP_VECTOR_H
 
@@ -91,10 +91,10 @@ static inline void hsep_take_four(double *restrict y, const double a[4], const d
     const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
     uint64_t j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        *hsep_lanes_at(y + j) = (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) -
-                                  a1 * *hsep_lanes_const(x1 + j)) -
-                                 a2 * *hsep_lanes_const(x2 + j)) -
-                                a3 * *hsep_lanes_const(x3 + j);
+        *hsep_lanes_at(y + j) =
+            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
+             a2 * *hsep_lanes_const(x2 + j)) -
+            a3 * *hsep_lanes_const(x3 + j);
     }
     for (; j < n; j++) {
         y[j] = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
@@ -107,14 +107,13 @@ static inline void hsep_take_eight(double *restrict y, const double a[8], const 
     const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
     uint64_t j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        const hsep_lanes first = (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) -
-                                   a1 * *hsep_lanes_const(x1 + j)) -
-                                  a2 * *hsep_lanes_const(x2 + j)) -
-                                 a3 * *hsep_lanes_const(x3 + j);
-        *hsep_lanes_at(y + j) =
-            (((first - a4 * *hsep_lanes_const(x4 + j)) - a5 * *hsep_lanes_const(x5 + j)) -
-             a6 * *hsep_lanes_const(x6 + j)) -
-            a7 * *hsep_lanes_const(x7 + j);
+        const hsep_lanes first =
+            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
+             a2 * *hsep_lanes_const(x2 + j)) -
+            a3 * *hsep_lanes_const(x3 + j);
+        *hsep_lanes_at(y + j) = (((first - a4 * *hsep_lanes_const(x4 + j)) - a5 * *hsep_lanes_const(x5 + j)) -
+                                 a6 * *hsep_lanes_const(x6 + j)) -
+                                a7 * *hsep_lanes_const(x7 + j);
     }
     for (; j < n; j++) {
         const double first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];

@@ -167,7 +167,8 @@ HSEP_API void hsep_residual_take_in(
         hsep_trusted_measure(trusted, sample->i, sample->relative);
         if (self->learning && sample->settled) {
             hsep_trusted_follow(
-                trusted, window->command + self->late, window->x_pb + self->late, window->e + self->late, sample->i + 1);
+                trusted, window->command + self->late, window->x_pb + self->late, window->e + self->late,
+                sample->i + 1);
         }
     } else if (self->learning) {
         hsep_paper_learn(hsep_residual_paper(self), sample);

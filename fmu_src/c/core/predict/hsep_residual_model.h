@@ -55,8 +55,8 @@ HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
 /* Parameters of the one that can be trusted. */
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters);
 
-/* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of one
- * of them. The first one is that of the physics model's residual. */
+/* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
+ * one of them. The first one is that of the physics model's residual. */
 HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self);
 HSEP_API uint64_t hsep_residual_n_features(hsep_residual_model *self, uint64_t factor);
 

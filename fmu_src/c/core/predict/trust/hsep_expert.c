@@ -90,8 +90,8 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *e
     self->rows_variance = fmax(sum, resolved) / evidence->n_rows;
 }
 
-/* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and the
- * same within bounds; eq. (4). */
+/* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
+ * the same within bounds; eq. (4). */
 static void expert_free_run(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
     const uint64_t n_static = self->n_static;

@@ -37,17 +37,17 @@ typedef struct {
     double largest_square; /* m2, largest mean square of a window, and */
     double bound;          /* m, bound on the prediction, as it was made */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t lag_scales; /* (p,) prior standard deviations of the weights of the lags */
-    uint64_t penalties; /* (n_static + p,) of the weights */
-    uint64_t weights;   /* (n_static + p,) */
-    uint64_t run;       /* (n + p,) m, the recursion, behind it measured residuals */
-    uint64_t unshrunk;  /* (n + p,) m, the same within bounds */
-    uint64_t e_h;       /* (n,) m, shrunk by its variance, and bounded */
-    uint64_t kept;      /* (n,) what the variance leaves of it */
-    uint64_t response;  /* (n + p,) the recursion's impulse response, behind it 0 */
-    uint64_t squares;   /* (n,) its squares, oldest first */
-    uint64_t variances; /* (n,) m2, of the rows */
-    uint64_t factor;    /* triangle of n_static + p + 1 rows: that of the solution */
+    uint64_t lag_scales;   /* (p,) prior standard deviations of the weights of the lags */
+    uint64_t penalties;    /* (n_static + p,) of the weights */
+    uint64_t weights;      /* (n_static + p,) */
+    uint64_t run;          /* (n + p,) m, the recursion, behind it measured residuals */
+    uint64_t unshrunk;     /* (n + p,) m, the same within bounds */
+    uint64_t e_h;          /* (n,) m, shrunk by its variance, and bounded */
+    uint64_t kept;         /* (n,) what the variance leaves of it */
+    uint64_t response;     /* (n + p,) the recursion's impulse response, behind it 0 */
+    uint64_t squares;      /* (n,) its squares, oldest first */
+    uint64_t variances;    /* (n,) m2, of the rows */
+    uint64_t factor;       /* triangle of n_static + p + 1 rows: that of the solution */
     uint64_t side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
 } hsep_expert;
 
@@ -70,12 +70,12 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 
 /* What the weights are solved with. */
 typedef struct {
-    const hsep_gram *gram; /* of rows whose first features are those of the expert, */
+    const hsep_gram *gram;  /* of rows whose first features are those of the expert, */
     const hsep_gram *other; /* more of them, settled, or NULL, */
-    double weight;        /* and the weight of these */
-    double n_rows;        /* and their number, weighted */
-    const double *scales; /* (n_static,) prior standard deviations of the weights without lags */
-    double first, least;  /* m2, variance of the noise while it is not known, and the least one */
+    double weight;          /* and the weight of these */
+    double n_rows;          /* and their number, weighted */
+    const double *scales;   /* (n_static,) prior standard deviations of the weights without lags */
+    double first, least;    /* m2, variance of the noise while it is not known, and the least one */
 } hsep_expert_evidence;
 
 /* Solve for the weights from all rows. Cost: that of hsep_gram_solve. */

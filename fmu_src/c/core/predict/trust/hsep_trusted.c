@@ -49,10 +49,10 @@ static void trusted_begin_window(hsep_trusted *self, const double x_d[], const d
     self->largest_step = self->forecast_step;
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
-    hsep_reach_begin(&self->reach, x_pb, disturbances->before.x_pb[0], self->Np, self->scale.largest);
+    self->reach_of_window =
+        hsep_reach_begin(&self->reach, x_pb, disturbances->before.x_pb[0], self->Np, self->scale.largest);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
-        hsep_disturbances_command(
-            disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
     }
     hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
     self->n_accepted = 0.0;
@@ -72,8 +72,7 @@ static void trusted_take_rows(hsep_trusted *self, const double x_pb[], const dou
     if (first > 0) { /* the velocity at the first of them */
         x[Np - first] = x_pb[Np - first] + e[Np - first];
     }
-    hsep_disturbances_motion_of(
-        hsep_trusted_disturbances(self), x_pb, x, Np, first, last, hsep_at(self, self->rows));
+    hsep_disturbances_motion_of(hsep_trusted_disturbances(self), x_pb, x, Np, first, last, hsep_at(self, self->rows));
     self->known = last;
 }
 
@@ -104,7 +103,7 @@ static void trusted_follow_sample(hsep_trusted *self, const double x_pb[], doubl
 {
     const uint64_t k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
     const double measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_reach_judge(&self->reach, measured, self->T_s);
+    const int accepted = hsep_reach_judge(&self->reach, &self->reach_of_window, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
     if (!accepted) {

@@ -75,6 +75,7 @@ typedef struct {
     uint64_t followed; /* samples that were judged and, as far as they are believed, learned */
     uint64_t known;    /* samples up to the last one that is believed */
     double n_accepted; /* samples that are */
+    hsep_reach_window reach_of_window;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
@@ -95,8 +96,8 @@ typedef struct {
 } hsep_trusted;
 
 HSEP_ASSERT_WORDS(
-    hsep_trusted,
-    39 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
+    hsep_trusted, 39 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS +
+                      (sizeof(hsep_stack) + sizeof(hsep_reach) + sizeof(hsep_reach_window)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -171,9 +172,9 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 /* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, Np > 1, with the motion before it. */
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[]);
 
-/* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a call.
- * x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not believed, between
- * those beside it; behind it those before it. All of the window must have been predicted. Cost for a sample: that of
+/* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
+ * call. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not believed,
+ * between those beside it; behind it those before it. All of the window must have been predicted. Cost for a sample: that of
  * hsep_gram_fold, of physics and of command. */
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);

@@ -146,7 +146,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound = memcmp(&got, block, sizeof got) == 0 && (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) &&
-                got.followed <= got.Np && got.known <= got.followed && got.reach.known <= 1 &&
+                got.followed <= got.Np && got.known <= got.followed && got.reach_of_window.known <= 1 &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&

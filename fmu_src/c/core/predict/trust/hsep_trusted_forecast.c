@@ -195,8 +195,8 @@ static void trusted_by_experts(
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             trusted_predict_by(
-                self, (hsep_expert_place)i, hsep_trusted_is_of_command(self, i) ? hsep_at(command, command->rows) : rows,
-                past, varied);
+                self, (hsep_expert_place)i,
+                hsep_trusted_is_of_command(self, i) ? hsep_at(command, command->rows) : rows, past, varied);
         }
     }
     trusted_follow_command(self, x_pb, 0, self->n);
