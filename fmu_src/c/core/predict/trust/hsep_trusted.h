@@ -173,9 +173,9 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[]);
 
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
- * call. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not believed,
- * between those beside it; behind it those before it. All of the window must have been predicted. Cost for a sample: that of
- * hsep_gram_fold, of physics and of command. */
+ * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
+ * residuals; where the measurement is not believed, between those beside it; behind it those before it. Cost for a
+ * sample: that of hsep_gram_fold, of physics and of command. */
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);
 
