@@ -33,10 +33,10 @@ __all__ = ["count"]
 
 WINDOWS = 60
 LIMITS = {
-    "predictor, cold": 2.7e6,
-    "predictor, warm": 4.1e6,
-    "compensator, cold": 5.8e6,
-    "compensator, warm": 5.9e6,
+    "predictor, cold": 0.7e6,
+    "predictor, warm": 0.95e6,
+    "compensator, cold": 4.7e6,
+    "compensator, warm": 5.7e6,
 }
 """Instructions of the dearest sample."""
 
