@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
+from c_compiler import C_SOURCES, include_flags, run_compiler
 from c_gram import CGram, CSolution
 from numpy.typing import NDArray
 
@@ -157,3 +160,17 @@ def test_digits_do_not_wear_off() -> None:
     sums = gram.block[-12:-6]
     for found, expected in zip(sums[:3], exact, strict=True):
         assert abs(Fraction(float(found)) - expected) <= Fraction(3e-16) * abs(expected)
+
+
+def test_vectors_change_no_bit(tmp_path: Path) -> None:
+    numeric = C_SOURCES / "core" / "numeric"
+    sources = [Path(__file__).with_name("lanes.c"), numeric / "hsep_gram.c", numeric / "hsep_cholesky.c"]
+    shown = []
+    for flags in (["-O3"], ["-O3", "-DHSEP_NO_VECTORS"], ["-O1", "-DHSEP_NO_VECTORS"]):
+        program = tmp_path / "lanes"
+        run_compiler([*flags, *include_flags(), *sources, "-lm", "-o", program])
+        done = subprocess.run([program], check=True, capture_output=True, text=True)
+        *bits, last = done.stdout.split()
+        shown.append((bits, int(last)))
+    assert [lanes for _, lanes in shown] == [2, 1, 1]
+    assert shown[0][0] == shown[1][0] == shown[2][0]
