@@ -12,7 +12,8 @@ typedef struct {
     double *x_h, *std;
 } replayed_run;
 
-static int replay_run(hsep_predictor *predictor, const replayed_run *run)
+/* learned: becomes the predictor behind the last whole window, size bytes; or NULL. */
+static int replay_run(hsep_predictor *predictor, const replayed_run *run, hsep_predictor *learned, size_t size)
 {
     const uint64_t Np = predictor->Np;
     for (uint64_t k = 0; k < run->n + Np && predictor->divergence == HSEP_CONVERGES; k++) {
@@ -23,6 +24,9 @@ static int replay_run(hsep_predictor *predictor, const replayed_run *run)
             hsep_predictor_read(predictor, &outputs);
             run->x_h[k + 1 - Np] = outputs.x_h;
             run->std[k + 1 - Np] = outputs.x_h_std;
+        }
+        if (learned != NULL && k + 1 == Np + run->n / Np * Np) {
+            memcpy(learned, predictor, size);
         }
     }
     return predictor->divergence == HSEP_CONVERGES;
@@ -35,9 +39,14 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
     for (uint64_t i = 0; i < hsep_residual_n_learned(to); i++) {
         *hsep_residual_learned(to, i) = *hsep_residual_learned(from, i);
     }
-    for (uint64_t i = 0; i < hsep_residual_n_factors(to); i++) {
-        hsep_regression *factor = hsep_residual_factor(from, i);
-        memcpy(hsep_residual_factor(to, i), factor, (size_t)hsep_regression_size(factor->n));
+    for (uint64_t i = 0; hsep_residual_trusted(from) != NULL && i < HSEP_N_EVIDENCE; i++) {
+        hsep_gram *gram = hsep_trusted_evidence(hsep_residual_trusted(from), (hsep_evidence)i);
+        memcpy(
+            hsep_trusted_evidence(hsep_residual_trusted(to), (hsep_evidence)i), gram, (size_t)hsep_gram_size(gram->n));
+    }
+    if (hsep_residual_paper(from) != NULL) {
+        hsep_regression *factor = hsep_paper_regression(hsep_residual_paper(from));
+        memcpy(hsep_paper_regression(hsep_residual_paper(to)), factor, (size_t)hsep_regression_size(factor->n));
     }
     memcpy(
         hsep_uncertainty_learned(hsep_predictor_uncertainty(predictor)),
@@ -49,18 +58,19 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 int replay(const hsep_predictor_parameters *parameters, const replayed_run *first, const replayed_run *second)
 {
     const size_t size = (size_t)hsep_predictor_block_size(parameters);
-    hsep_predictor *trained = malloc(size), *predictor = malloc(size);
-    int sound = trained != NULL && predictor != NULL;
+    hsep_predictor *trained = malloc(size), *learned = malloc(size), *predictor = malloc(size);
+    int sound = trained != NULL && learned != NULL && predictor != NULL;
     if (sound) {
         hsep_predictor_block_init(trained, parameters, first->x_d[0]);
-        sound = replay_run(trained, first);
+        sound = replay_run(trained, first, learned, size);
     }
     if (sound && second->n > 0) {
         hsep_predictor_block_init(predictor, parameters, second->x_d[0]);
-        replay_take_over(predictor, trained);
-        sound = replay_run(predictor, second);
+        replay_take_over(predictor, learned);
+        sound = replay_run(predictor, second, NULL, 0);
     }
     free(trained);
+    free(learned);
     free(predictor);
     return sound;
 }

@@ -55,7 +55,7 @@ MEDIAN_OVER_LAPACK_MAX = 5.0
 TAIL_OVER_MEDIAN_MAX = 15.0
 """Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
 
-TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX, TRUST_LONGEST = 4e6, 6.0, 0.5
+TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX, TRUST_LONGEST = 1e6, 6.0, 0.5
 """Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model; the
 longest step, if nothing interrupts it, relative to T_s."""
 

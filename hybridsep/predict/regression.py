@@ -117,6 +117,12 @@ class RidgeRegression:
         """``Σ (target − wᵀφ)² + λ‖w‖²`` at the optimum, m²."""
         return float(self._factor[-1, -1] ** 2)
 
+    @property
+    def target_square(self) -> float:
+        """Sum of the squares of the targets, m²."""
+        column = self._factor[:, -1]
+        return float(column @ column)
+
     def update(self, rows: ArrayLike, target: ArrayLike) -> None:
         """Update with a block of rows.
 

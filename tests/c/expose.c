@@ -1,7 +1,6 @@
 /* What the tests reach through ctypes besides the models' own functions. */
 #include "hsep_fmu.h"
 #include "hsep_predictor.h"
-#include "hsep_wide.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -21,7 +20,14 @@ void test_fold(hsep_regression *regression, const double rows[], size_t n_rows, 
     }
 }
 
-/* Whether the processor has wide vectors. */
-int test_wide(void);
+void test_fold_gram(hsep_gram *gram, const double rows[], size_t n_rows, size_t repetitions);
 
-int test_wide(void) { return hsep_is_wide(1e9); }
+/* The same into a Gram matrix. */
+void test_fold_gram(hsep_gram *gram, const double rows[], size_t n_rows, size_t repetitions)
+{
+    const size_t width = (size_t)gram->n + 1;
+    for (size_t i = 0; i < repetitions * n_rows; i++) {
+        memcpy(hsep_gram_row(gram), rows + (i % n_rows) * width, width * sizeof(double));
+        hsep_gram_fold(gram);
+    }
+}

@@ -51,37 +51,6 @@ def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
     assert np.linalg.norm(regression.weights - exact) <= 1e-9 * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("n", [1, 3, 4, 5, 8, 23])
-@pytest.mark.parametrize("size", [1e-6, 1.0, 100.0])
-@pytest.mark.parametrize("count", [1, 2, 7, 50])
-def test_rows_folded_at_once_are_those_folded_one_by_one(n: int, size: float, count: int) -> None:
-    # 1e-9 relative against long double: rows that weigh as much, next to nothing, and far more than those before.
-    rng = np.random.default_rng(n)
-    rows = rng.normal(size=(40 + count, n)) * np.where(np.arange(40 + count) < 40, 1.0, size)[:, None]
-    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=40 + count)
-    regression, library = CRegression(n, 1e-6), RidgeRegression(n, 1e-6)
-    regression.fold(rows[:40], target[:40])
-    regression.fold_at_once(rows[40:], target[40:])
-    library.update(rows, target)
-    exact = oracle.ridge_extended(rows, target, 1e-6).astype(float)
-    assert np.linalg.norm(regression.weights - exact) <= 1e-9 * np.linalg.norm(exact)
-    assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-9)
-    assert regression.n_samples == 40 + count
-
-
-@pytest.mark.parametrize("n", [1, 7, 23, 76])
-def test_wide_vectors_change_no_bit(n: int) -> None:
-    rng = np.random.default_rng(n)
-    rows, target = rng.normal(size=(150, n)), rng.normal(size=150)
-    blocks = []
-    for wide in (False, bool(CRegression(n, 1e-6).library.test_wide())):
-        regression = CRegression(n, 1e-6)
-        for i in (0, 50, 99):
-            regression.fold_at_once(rows[i : i + 51], target[i : i + 51], wide=wide)
-        blocks.append(regression.block)
-    np.testing.assert_array_equal(blocks[0], blocks[1])
-
-
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)

@@ -29,19 +29,6 @@ class CRegression:
         pointer = stacked.ctypes.data_as(ctypes.c_void_p)
         self.library.test_fold(self._block, pointer, ctypes.c_size_t(len(rows)), ctypes.c_size_t(repetitions))
 
-    def fold_at_once(self, rows: Array, target: Array, *, wide: bool = False) -> None:
-        """Fold rows by hsep_block_fold, with wide vectors or not."""
-        stacked, count = np.column_stack((rows, target)), ctypes.c_uint64(len(rows))
-        self.library.hsep_block_fold_size.restype = ctypes.c_double
-        self.library.hsep_block_fold_row.restype = ctypes.POINTER(ctypes.c_double)
-        work = np.full(int(self.library.hsep_block_fold_size(ctypes.c_uint64(self.n), count)), np.nan)
-        pointer = work.ctypes.data_as(ctypes.c_void_p)
-        for b, row in enumerate(stacked.tolist()):
-            place = self.library.hsep_block_fold_row(pointer, ctypes.c_uint64(self.n), ctypes.c_uint64(b))
-            for j, value in enumerate(row):
-                place[j] = value
-        self.library.hsep_block_fold(self._block, pointer, count, 0, int(wide))
-
     def load(self, i: int, row: Array) -> int:
         place = self.library.hsep_regression_row(self._block)
         for j, value in enumerate(row.tolist()):

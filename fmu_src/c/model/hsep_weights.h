@@ -4,7 +4,7 @@
  * what has been learned besides the factors, as uint64; each setting that shapes the features and the factor, its name
  * in 24 bytes and its value as a double; as doubles the numbers of a residual model that can be trusted, as
  * hsep_residual_learned has them, and those of hsep_uncertainty_learned; the upper triangle of each factor
- * [R z; 0 rho], of hsep_residual_factor, by rows, (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all before as
+ * [R z; 0 rho], of hsep_residual_load, by rows, (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all before as
  * uint64.
  */
 #ifndef HSEP_WEIGHTS_H

@@ -26,6 +26,11 @@ _LAG_BOUND = 10.0
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
 
+_RESOLUTION = 1e-13
+"""Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
+squares of the targets: the C core has it from a Gram matrix, which does not resolve less, and no less matters before
+10⁷ rows without noise."""
+
 _LEAST = 1e-150
 """Magnitude of a feature that counts as 0."""
 
@@ -289,11 +294,13 @@ class Expert:
         first, least : float, m²
             Variance of the noise while it is not known, and the least one.
         """
-        variance = max(self.noise_variance or first, least) * self.correlation
+        resolved = _RESOLUTION * evidence.regression.target_square
+        variance = max(self.noise_variance or first, least, resolved) * self.correlation
         scales = effect * self.shares / np.maximum(largest, _LEAST)
         priors = np.concatenate((scales, self.lag_scales))
         solution = evidence.regression.penalised(variance / priors**2)
-        return SolvedExpert(len(self.shares), solution, variance, solution.residual_sum / evidence.n_rows)
+        residual_sum = max(solution.residual_sum, resolved)
+        return SolvedExpert(len(self.shares), solution, variance, residual_sum / evidence.n_rows)
 
     def judge(self, prediction: ExpertPrediction, measured: Array, accepted: NDArray[np.bool_], given: float) -> None:
         """Estimate noise and correlation from the errors of a window.

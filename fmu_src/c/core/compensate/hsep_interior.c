@@ -2,6 +2,7 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_slacks.h"
+#include "hsep_vector.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -126,13 +127,9 @@ static void interior_gradient(const interior_arrays *a, const double *P)
 {
     memcpy(a->r_d, a->v, (size_t)a->n * sizeof(double));
     for (uint64_t i = 0; i < a->n; i++) {
-        const double x = a->x[i];
-        double sum = P[0] * x;
-        for (uint64_t j = 1; j < a->n - i; j++) {
-            sum += P[j] * a->x[i + j];
-            a->r_d[i + j] -= P[j] * x;
-        }
-        a->r_d[i] -= sum;
+        const uint64_t left = a->n - i - 1;
+        a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
+        hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
         P += a->n - i;
     }
 }
@@ -178,8 +175,8 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     }
     self->steps++;
     memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(double));
-    hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor);
-    if (!hsep_cholesky_factor(a.factor, a.n)) {
+    hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor, a.slacks.work);
+    if (!hsep_cholesky_factor(a.factor, a.n, NULL)) {
         return 1;
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */

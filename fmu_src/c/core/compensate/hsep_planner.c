@@ -193,7 +193,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
         planner_pin(self);
     }
     memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(double));
-    if (!hsep_cholesky_factor(factor, n)) {
+    if (!hsep_cholesky_factor(factor, n, NULL)) {
         return HSEP_PLAN_FAILED;
     }
     memcpy(free_minimum, v, (size_t)n * sizeof(double));

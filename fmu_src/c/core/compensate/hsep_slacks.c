@@ -1,10 +1,16 @@
 #include "hsep_slacks.h"
 
+#include "hsep_vector.h"
+
 #include <math.h>
+#include <string.h>
 
 static const double slacks_least = 0.3;     /* smallest initial slack, in shares */
 static const double slacks_first_mu = 10.0; /* initial mu, as a share of the cost per bound */
 static const double slacks_tau = 0.995;     /* fraction of the step to the nearest bound */
+
+/* Of the sides: B = A, B = -A. */
+static const double slacks_sign[2] = {1.0, -1.0};
 
 /* B x - b of a row: A x - low, or high - A x. */
 static inline double slacks_distance(int i, double Ax, double b) { return i == 0 ? Ax - b : b - Ax; }
@@ -23,97 +29,186 @@ HSEP_API void hsep_slacks_begin(const hsep_slacks *self, double cost)
     }
 }
 
-/* ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z). */
+/* Values of four rows, which are added to and compared with those of the next four, and one of the rows left over. */
+typedef struct {
+    hsep_lanes of_four[HSEP_OF_FOUR];
+    double left;
+} slacks_values;
+
+static double slacks_sum(const slacks_values *values)
+{
+    double s[4];
+    memcpy(s, values->of_four, sizeof s);
+    return ((s[0] + s[1]) + (s[2] + s[3])) + values->left;
+}
+
+static double slacks_largest(const slacks_values *values)
+{
+    double s[4], largest = values->left;
+    memcpy(s, values->of_four, sizeof s);
+    for (int i = 0; i < 4; i++) {
+        largest = s[i] > largest ? s[i] : largest;
+    }
+    return largest;
+}
+
+/* ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z), of the rows of a vector and of one. */
+static inline void slacks_steps(
+    const hsep_slacks *self, int i, uint64_t r, hsep_lanes *restrict ds, hsep_lanes *restrict dz)
+{
+    const hsep_side *side = &self->side[i];
+    const hsep_lanes to = slacks_sign[i] * *hsep_lanes_const(self->Adx + r) + *hsep_lanes_const(side->r_p + r);
+    *dz = *hsep_lanes_const(side->r_c + r) - *hsep_lanes_const(side->z + r) * *hsep_lanes_const(side->inverse + r) * to;
+    *ds = to + self->rho * *dz;
+}
+
 static inline void slacks_step(const hsep_slacks *self, int i, uint64_t r, double *ds, double *dz)
 {
     const hsep_side *side = &self->side[i];
-    const double to = (i == 0 ? self->Adx[r] : -self->Adx[r]) + side->r_p[r];
+    const double to = slacks_sign[i] * self->Adx[r] + side->r_p[r];
     *dz = side->r_c[r] - side->z[r] * side->inverse[r] * to;
     *ds = to + self->rho * *dz;
 }
 
 HSEP_API void hsep_slacks_push(const hsep_slacks *self)
 {
+    const hsep_side *low = &self->side[0], *high = &self->side[1];
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            double push[2];
-            for (int i = 0; i < 2; i++) {
-                const hsep_side *side = &self->side[i];
-                push[i] = side->r_c[r] - side->z[r] * side->inverse[r] * side->r_p[r];
-            }
-            self->work[r] = push[0] - push[1];
+        uint64_t r = self->range[order].begin;
+        for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
+            *hsep_lanes_at(self->work + r) =
+                (*hsep_lanes_const(low->r_c + r) - *hsep_lanes_const(low->z + r) * *hsep_lanes_const(low->inverse + r) *
+                                                       *hsep_lanes_const(low->r_p + r)) -
+                (*hsep_lanes_const(high->r_c + r) - *hsep_lanes_const(high->z + r) *
+                                                        *hsep_lanes_const(high->inverse + r) *
+                                                        *hsep_lanes_const(high->r_p + r));
+        }
+        for (; r < self->range[order].end; r++) {
+            self->work[r] = (low->r_c[r] - low->z[r] * low->inverse[r] * low->r_p[r]) -
+                            (high->r_c[r] - high->z[r] * high->inverse[r] * high->r_p[r]);
         }
     }
 }
 
-/* Shorten a step to where value + length change stays >= 0. */
-static inline void slacks_shorten(double *length, double value, double change)
-{
-    if (change < 0.0 && value < -change * *length) {
-        *length = -value / change;
-    }
-}
-
+/* Lengths of a step to where all values + length change stay >= 0: the largest -change / value is its inverse. */
 static hsep_lengths slacks_lengths(const hsep_slacks *self)
 {
-    hsep_lengths alpha = {1.0, 1.0};
+    slacks_values primal, dual;
+    memset(&primal, 0, sizeof primal);
+    memset(&dual, 0, sizeof dual);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
+        for (int i = 0; i < 2; i++) {
+            const hsep_side *side = &self->side[i];
+            uint64_t r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    hsep_lanes ds, dz;
+                    slacks_steps(self, i, at, &ds, &dz);
+                    primal.of_four[l] = hsep_lanes_larger(-ds / *hsep_lanes_const(side->s + at), primal.of_four[l]);
+                    dual.of_four[l] = hsep_lanes_larger(-dz / *hsep_lanes_const(side->z + at), dual.of_four[l]);
+                }
+            }
+            for (; r < self->range[order].end; r++) {
                 double ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
-                slacks_shorten(&alpha.primal, self->side[i].s[r], ds);
-                slacks_shorten(&alpha.dual, self->side[i].z[r], dz);
+                primal.left = -ds / side->s[r] > primal.left ? -ds / side->s[r] : primal.left;
+                dual.left = -dz / side->z[r] > dual.left ? -dz / side->z[r] : dual.left;
             }
         }
     }
-    return alpha;
+    const double of_s = slacks_largest(&primal), of_z = slacks_largest(&dual);
+    return (hsep_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
 HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal)
 {
-    double sum = 0.0;
-    *primal = 0.0;
+    slacks_values sum, largest;
+    memset(&sum, 0, sizeof sum);
+    memset(&largest, 0, sizeof largest);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            double weight = 0.0;
-            for (int i = 0; i < 2; i++) {
-                const hsep_side *side = &self->side[i];
-                side->r_p[r] = slacks_distance(i, self->Ax[r], side->b[r]) - side->s[r];
-                sum += side->s[r] * side->z[r];
-                *primal = fmax(*primal, fabs(side->r_p[r]));
-                weight += side->z[r] * side->inverse[r];
-                side->r_c[r] = -side->s[r] * side->z[r] * side->inverse[r];
+        for (int i = 0; i < 2; i++) {
+            const hsep_side *side = &self->side[i];
+            uint64_t r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    const hsep_lanes s = *hsep_lanes_const(side->s + at), z = *hsep_lanes_const(side->z + at);
+                    const hsep_lanes inverse = *hsep_lanes_const(side->inverse + at), product = s * z;
+                    const hsep_lanes distance =
+                        slacks_sign[i] * (*hsep_lanes_const(self->Ax + at) - *hsep_lanes_const(side->b + at));
+                    const hsep_lanes r_p = distance - s, weight = z * inverse;
+                    sum.of_four[l] += product;
+                    largest.of_four[l] = hsep_lanes_larger(hsep_lanes_larger(r_p, -r_p), largest.of_four[l]);
+                    *hsep_lanes_at(side->r_p + at) = r_p;
+                    *hsep_lanes_at(side->r_c + at) = -product * inverse;
+                    if (i == 0) {
+                        *hsep_lanes_at(self->Adx + at) = weight;
+                        *hsep_lanes_at(self->work + at) = z;
+                    } else {
+                        *hsep_lanes_at(self->Adx + at) += weight;
+                        *hsep_lanes_at(self->work + at) -= z;
+                    }
+                }
             }
-            self->Adx[r] = weight;
-            self->work[r] = self->side[0].z[r] - self->side[1].z[r];
+            for (; r < self->range[order].end; r++) {
+                const double s = side->s[r], z = side->z[r], weight = z * side->inverse[r];
+                const double r_p = slacks_sign[i] * (self->Ax[r] - side->b[r]) - s;
+                sum.left += s * z;
+                largest.left = fabs(r_p) > largest.left ? fabs(r_p) : largest.left;
+                side->r_p[r] = r_p;
+                side->r_c[r] = -(s * z) * side->inverse[r];
+                self->Adx[r] = i == 0 ? weight : self->Adx[r] + weight;
+                self->work[r] = i == 0 ? z : self->work[r] - z;
+            }
         }
     }
-    return sum / self->sides;
+    *primal = slacks_largest(&largest);
+    return slacks_sum(&sum) / self->sides;
 }
 
 HSEP_API double hsep_slacks_predicted(const hsep_slacks *self)
 {
     const hsep_lengths alpha = slacks_lengths(self);
-    double sum = 0.0;
+    slacks_values sum;
+    memset(&sum, 0, sizeof sum);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
+        for (int i = 0; i < 2; i++) {
+            const hsep_side *side = &self->side[i];
+            uint64_t r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    hsep_lanes ds, dz;
+                    slacks_steps(self, i, at, &ds, &dz);
+                    sum.of_four[l] += (*hsep_lanes_const(side->s + at) + alpha.primal * ds) *
+                                      (*hsep_lanes_const(side->z + at) + alpha.dual * dz);
+                }
+            }
+            for (; r < self->range[order].end; r++) {
                 double ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
-                sum += (self->side[i].s[r] + alpha.primal * ds) * (self->side[i].z[r] + alpha.dual * dz);
+                sum.left += (side->s[r] + alpha.primal * ds) * (side->z[r] + alpha.dual * dz);
             }
         }
     }
-    return sum / self->sides;
+    return slacks_sum(&sum) / self->sides;
 }
 
 HSEP_API void hsep_slacks_correct(const hsep_slacks *self, double sigma_mu)
 {
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                const hsep_side *side = &self->side[i];
+        for (int i = 0; i < 2; i++) {
+            const hsep_side *side = &self->side[i];
+            uint64_t r = self->range[order].begin;
+            for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
+                hsep_lanes ds, dz;
+                slacks_steps(self, i, r, &ds, &dz);
+                *hsep_lanes_at(side->r_c + r) =
+                    (sigma_mu - *hsep_lanes_const(side->s + r) * *hsep_lanes_const(side->z + r) - ds * dz) *
+                    *hsep_lanes_const(side->inverse + r);
+            }
+            for (; r < self->range[order].end; r++) {
                 double ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 side->r_c[r] = (sigma_mu - side->s[r] * side->z[r] - ds * dz) * side->inverse[r];
@@ -128,9 +223,19 @@ HSEP_API double hsep_slacks_move(const hsep_slacks *self)
     const double primal = alpha.primal >= 1.0 ? 1.0 : slacks_tau * alpha.primal;
     const double dual = alpha.dual >= 1.0 ? 1.0 : slacks_tau * alpha.dual;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                const hsep_side *side = &self->side[i];
+        for (int i = 0; i < 2; i++) {
+            const hsep_side *side = &self->side[i];
+            uint64_t r = self->range[order].begin;
+            for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
+                hsep_lanes ds, dz;
+                slacks_steps(self, i, r, &ds, &dz);
+                const hsep_lanes s = *hsep_lanes_const(side->s + r) + primal * ds;
+                const hsep_lanes z = *hsep_lanes_const(side->z + r) + dual * dz;
+                *hsep_lanes_at(side->s + r) = s;
+                *hsep_lanes_at(side->z + r) = z;
+                *hsep_lanes_at(side->inverse + r) = 1.0 / (s + self->rho * z);
+            }
+            for (; r < self->range[order].end; r++) {
                 double ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 side->s[r] += primal * ds;

@@ -96,28 +96,57 @@ HSEP_API double hsep_splines_sum(const hsep_splines *self, const double c[], uin
     return sum;
 }
 
-HSEP_API void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[])
+/* delta, (preview,), of the splines first ... n - 1 with coefficients c, (n - first,). */
+static void splines_change(const hsep_splines *self, const double c[], uint64_t first, double delta[])
 {
     const double *b = hsep_splines_shape(self);
-    const uint64_t preview = self->preview, spacing = self->spacing, count = self->n - first;
-    double before[HSEP_ORDERS] = {0.0, 0.0, 0.0, 0.0};
-    for (uint64_t k = 0; k < preview; k++) {
-        double now[HSEP_ORDERS] = {0.0, 0.0, 0.0, 0.0};
-        if (k >= first * spacing) {
-            const uint64_t place = k / spacing - first, within = k % spacing;
+    const uint64_t spacing = self->spacing, count = self->n - first;
+    uint64_t k = first * spacing;
+    memset(delta, 0, (size_t)k * sizeof(double));
+    for (uint64_t place = 0; k < self->preview; place++) { /* between two knots */
+        const uint64_t end = k + spacing < self->preview ? k + spacing : self->preview;
+        if (place >= HSEP_DECIDED && place < count) {
+            const double c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
+            for (const double *at = b; k < end; k++, at++) {
+                delta[k] = ((c0 * at[0] + c1 * at[spacing]) + c2 * at[2 * spacing]) + c3 * at[3 * spacing];
+            }
+        }
+        for (uint64_t within = 0; k < end; k++, within++) { /* not all four are there */
+            delta[k] = 0.0;
             for (uint64_t i = 0; i <= HSEP_DECIDED && i <= place; i++) {
                 if (place - i < count) {
-                    now[0] += c[place - i] * b[within + i * spacing];
+                    delta[k] += c[place - i] * b[within + i * spacing];
                 }
             }
         }
-        rows[k] = now[0] * self->share[0];
-        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            now[order] = now[order - 1] - before[order - 1];
-            rows[order * preview + k] = now[order] * self->share[order];
+    }
+}
+
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[])
+{
+    const uint64_t preview = self->preview;
+    splines_change(self, c, first, rows);
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        const double *of = rows + (order - 1) * preview;
+        double *to = rows + order * preview;
+        uint64_t k = 1;
+        to[0] = of[0];
+        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
+            *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
         }
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            before[order] = now[order];
+        for (; k < preview; k++) {
+            to[k] = of[k] - of[k - 1];
+        }
+    }
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        double *row = rows + order * preview;
+        const double share = self->share[order];
+        uint64_t k = 0;
+        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
+            *hsep_lanes_at(row + k) *= share;
+        }
+        for (; k < preview; k++) {
+            row[k] *= share;
         }
     }
 }
@@ -129,38 +158,94 @@ HSEP_API void hsep_splines_touched(
     *end = (self->n - 1) * self->spacing + splines_length(self, order);
 }
 
-HSEP_API void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[])
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, double rows[], uint64_t first, double g[])
 {
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const double *e = splines_differences(self, order);
-        const uint64_t length = splines_length(self, order);
-        for (uint64_t j = first; j < self->n; j++) {
-            const double *row = rows + order * self->preview + j * self->spacing;
-            double sum = 0.0;
-            for (uint64_t k = 1; k < length; k++) {
-                sum += e[k] * row[k];
-            }
-            g[j - first] += sum;
+    const double *b = hsep_splines_shape(self);
+    const uint64_t preview = self->preview, spacing = self->spacing;
+    const double s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
+    const double *r1 = rows + preview, *r2 = rows + 2 * preview, *r3 = rows + 3 * preview;
+    /* A' = B' (s_0 + D' (s_1 + D' (s_2 + D' s_3))) with the differences D: what later samples say comes first. */
+    const uint64_t begin = first * spacing + 1, end = self->n * spacing + 3 * spacing; /* of the change itself */
+    const double a3 = s3 * r3[end + 2], b3 = s3 * r3[end + 1], a2 = s2 * r2[end + 1] + (b3 - a3);
+    double u3 = s3 * r3[end], u2 = s2 * r2[end] + (u3 - b3), u1 = s1 * r1[end] + (u2 - a2);
+    for (uint64_t k = end; k-- > begin;) {
+        const double v3 = s3 * r3[k], v2 = s2 * r2[k] + (v3 - u3), v1 = s1 * r1[k] + (v2 - u2);
+        rows[k] = s0 * rows[k] + (v1 - u1);
+        u1 = v1, u2 = v2, u3 = v3;
+    }
+    for (uint64_t j = first; j < self->n; j++) {
+        g[j - first] += hsep_dot(b + 1, rows + j * spacing + 1, 4 * spacing - 1);
+    }
+}
+
+/* Weights of the rows of an order, (preview,), so that those of samples spacing apart are neighbours. */
+static void splines_sort(const hsep_splines *self, const double weights[], double sorted[])
+{
+    for (uint64_t phase = 0; phase < self->spacing; phase++) {
+        for (uint64_t k = phase; k < self->preview; k += self->spacing) {
+            *sorted++ = weights[k];
         }
     }
 }
 
-HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[])
+#define SPLINES_TOGETHER 8 /* splines whose products with another one are summed side by side */
+
+/* sums, (count,), count <= SPLINES_TOGETHER: of splines i ... i + count - 1 with those d behind them. sorted: (4,
+ * preview). */
+static void splines_products(
+    const hsep_splines *self, const double sorted[], uint64_t i, uint64_t count, uint64_t d, double sums[])
 {
     const uint64_t spacing = self->spacing;
-    for (uint64_t i = first; i < self->n; i++) {
-        for (uint64_t d = 0; i + d < self->n && d * spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
-            double sum = 0.0;
-            for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-                const double *e = splines_differences(self, order);
-                const double *weight = weights + order * self->preview + i * spacing;
-                for (uint64_t k = d * spacing + 1; k < splines_length(self, order); k++) {
-                    sum += weight[k] * e[k] * e[k - d * spacing];
+    hsep_lanes acc[SPLINES_TOGETHER / HSEP_LANES];
+    memset(sums, 0, SPLINES_TOGETHER * sizeof *sums);
+    memcpy(acc, sums, sizeof acc);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const double *e = splines_differences(self, order);
+        const uint64_t length = splines_length(self, order);
+        uint64_t begin = order * self->preview; /* of a phase */
+        for (uint64_t phase = 0; phase < spacing; phase++) {
+            const double *weight = sorted + begin + i;
+            for (uint64_t k = phase, m = 0; k < length; k += spacing, m++) {
+                if (k < d * spacing + 1) {
+                    continue;
+                }
+                const double product = e[k] * e[k - d * spacing];
+                if (count == SPLINES_TOGETHER) {
+                    for (int l = 0; l < SPLINES_TOGETHER / HSEP_LANES; l++) {
+                        acc[l] += product * hsep_lanes_const(weight + m)[l];
+                    }
+                } else {
+                    for (uint64_t l = 0; l < count; l++) {
+                        sums[l] += product * weight[m + l];
+                    }
                 }
             }
-            triangle[d] += sum;
+            begin += (self->preview - phase - 1) / spacing + 1;
         }
-        triangle += self->n - i;
+    }
+    if (count == SPLINES_TOGETHER) {
+        memcpy(sums, acc, sizeof acc);
+    }
+}
+
+HSEP_API void hsep_splines_gram(
+    const hsep_splines *self, const double weights[], uint64_t first, double triangle[], double work[])
+{
+    const uint64_t n = self->n - first;
+    double sums[SPLINES_TOGETHER];
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        splines_sort(self, weights + order * self->preview, work + order * self->preview);
+    }
+    for (uint64_t d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
+        double *entry = triangle + d;
+        for (uint64_t i = 0; i + d < n; i += SPLINES_TOGETHER) {
+            const uint64_t left = n - d - i, count = left < SPLINES_TOGETHER ? left : SPLINES_TOGETHER;
+            splines_products(self, work, first + i, count, d, sums);
+            for (uint64_t l = 0; l < count; l++) {
+                *entry += sums[l];
+                entry += n - (i + l);
+            }
+        }
     }
 }
 

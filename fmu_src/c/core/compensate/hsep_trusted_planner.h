@@ -21,13 +21,13 @@
 
 #include <stdint.h>
 
-#define HSEP_TRUSTED_STEPS 4     /* Newton steps of a plan at most, */
-#define HSEP_TRUSTED_TRIES 6     /* tries of each, */
-#define HSEP_TRUSTED_TOGETHER 8  /* tries of all, */
-#define HSEP_TRUSTED_SOLVER 34   /* solver steps after which no bounded try is begun, */
-#define HSEP_TRUSTED_SOLVED 10   /* and those of one programme at most */
-#define HSEP_TRUSTED_COLUMNS 7   /* parts in which the changes of x_h by the splines are computed */
-#define HSEP_TRUSTED_VARIANCES 5 /* parts in which the variances over the preview are computed */
+#define HSEP_TRUSTED_STEPS 4      /* Newton steps of a plan at most, */
+#define HSEP_TRUSTED_TRIES 6      /* tries of each, */
+#define HSEP_TRUSTED_TOGETHER 8   /* tries of all, */
+#define HSEP_TRUSTED_SOLVER 34    /* solver steps after which no bounded try is begun, */
+#define HSEP_TRUSTED_SOLVED 10    /* and those of one programme at most */
+#define HSEP_TRUSTED_COLUMNS 7    /* parts in which the changes of x_h by the splines are computed */
+#define HSEP_TRUSTED_VARIANCES 13 /* parts in which the variances over the preview are computed */
 
 /* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries
  * with their programmes, predictions; and 8 because a part is not divided between samples. */

@@ -65,17 +65,18 @@ static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model
            hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
 }
 
-/* Read a factor row after row through the regression's own row: 0 if it is damaged. */
-static int learned_take_factor(hsep_learned_source *source, hsep_regression *regression, uint64_t n_samples)
+/* Read a factor row after row through the model's own row: 0 if it is damaged. */
+static int learned_take_factor(
+    hsep_learned_source *source, hsep_residual_model *model, uint64_t factor, uint64_t n_samples)
 {
-    for (uint64_t i = 0; i <= regression->n; i++) {
-        const size_t left = (size_t)(regression->n + 1 - i);
-        if (!hsep_learned_read(source, hsep_regression_row(regression), left * sizeof(double)) ||
-            !hsep_regression_load(regression, i)) {
+    const uint64_t n = hsep_residual_n_features(model, factor);
+    for (uint64_t i = 0; i <= n; i++) {
+        const size_t left = (size_t)(n + 1 - i);
+        if (!hsep_learned_read(source, hsep_residual_factor_row(model, factor), left * sizeof(double)) ||
+            !hsep_residual_load(model, factor, i, n_samples)) {
             return 0;
         }
     }
-    regression->n_samples = n_samples;
     return 1;
 }
 
@@ -84,7 +85,7 @@ static double learned_size(const hsep_learned_head *head, hsep_residual_model *m
 {
     double words = 4.0 * (double)head->n_settings + (double)head->n_learned + 1.0;
     for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
-        const double n = (double)hsep_residual_factor(model, i)->n;
+        const double n = (double)hsep_residual_n_features(model, i);
         words += 0.5 * (n + 1.0) * (n + 2.0);
     }
     return (double)sizeof *head + words * (double)sizeof(double);
@@ -99,7 +100,7 @@ HSEP_API int hsep_learned_take(
         return 0;
     }
     for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!learned_take_factor(source, hsep_residual_factor(model, i), head->n_samples)) {
+        if (!learned_take_factor(source, model, i, head->n_samples)) {
             return 0;
         }
     }

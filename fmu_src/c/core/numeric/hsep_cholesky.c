@@ -3,50 +3,14 @@
 #include "hsep_vector.h"
 
 #include <math.h>
+#include <stddef.h>
 
-/* y -= a_0 x_0 + a_1 x_1 + a_2 x_2 + a_3 x_3: y is loaded and stored once for four rows. */
-static void cholesky_take(
-    double *restrict y, const double a[4], const double *restrict x0, const double *restrict x1,
-    const double *restrict x2, const double *restrict x3, uint64_t n)
+/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. */
+static int cholesky_pivot(double row[], uint64_t length, const double *least)
 {
-    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-    uint64_t j = 0;
-    for (; j + 2 <= n; j += 2) {
-        const double s0 = (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
-        const double s1 = (a0 * x0[j + 1] + a1 * x1[j + 1]) + (a2 * x2[j + 1] + a3 * x3[j + 1]);
-        y[j] -= s0, y[j + 1] -= s1;
+    if (least != NULL && !(row[0] >= *least)) {
+        row[0] = *least;
     }
-    for (; j < n; j++) {
-        y[j] -= (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
-    }
-}
-
-/* The same for row i, y, and row i + 1, z, from its diagonal on: x_r are loaded once for both. n: of y, at least 2. */
-static void cholesky_take_two(
-    double *restrict y, double *restrict z, const double a[4], const double *restrict x0, const double *restrict x1,
-    const double *restrict x2, const double *restrict x3, uint64_t n)
-{
-    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-    const double b0 = x0[1], b1 = x1[1], b2 = x2[1], b3 = x3[1];
-    uint64_t j = 1;
-    y[0] -= (a0 * x0[0] + a1 * x1[0]) + (a2 * x2[0] + a3 * x3[0]);
-    for (; j + 2 <= n; j += 2) {
-        const double p0 = x0[j], p1 = x1[j], p2 = x2[j], p3 = x3[j];
-        const double q0 = x0[j + 1], q1 = x1[j + 1], q2 = x2[j + 1], q3 = x3[j + 1];
-        const double s0 = (a0 * p0 + a1 * p1) + (a2 * p2 + a3 * p3), s1 = (a0 * q0 + a1 * q1) + (a2 * q2 + a3 * q3);
-        const double t0 = (b0 * p0 + b1 * p1) + (b2 * p2 + b3 * p3), t1 = (b0 * q0 + b1 * q1) + (b2 * q2 + b3 * q3);
-        y[j] -= s0, y[j + 1] -= s1;
-        z[j - 1] -= t0, z[j] -= t1;
-    }
-    for (; j < n; j++) {
-        y[j] -= (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
-        z[j - 1] -= (b0 * x0[j] + b1 * x1[j]) + (b2 * x2[j] + b3 * x3[j]);
-    }
-}
-
-/* Divide row k, (length,), by the root of its pivot; return whether there is one. */
-static int cholesky_pivot(double row[], uint64_t length)
-{
     if (!(row[0] > 0.0 && row[0] < HUGE_VAL)) {
         return 0;
     }
@@ -58,44 +22,54 @@ static int cholesky_pivot(double row[], uint64_t length)
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
+/* Rows of a triangle that are finished together. */
+#define CHOLESKY_PANEL 8
+
+/* Finish count rows, from row k of n on, of which those above have been taken; return whether they have pivots. */
+static int cholesky_panel(double *const rows[CHOLESKY_PANEL], uint64_t count, uint64_t length, const double least[])
 {
-    double *row = triangle;
-    uint64_t k = 0;
-    for (; k + 4 <= n; k += 4) {
-        double *x[4] = {row, row + (n - k), row + (2 * (n - k) - 1), row + (3 * (n - k) - 3)};
-        for (uint64_t r = 0; r < 4; r++) { /* four rows among themselves */
-            for (uint64_t above = 0; above < r; above++) {
-                hsep_axpy(x[r], -x[above][r - above], x[above] + (r - above), n - k - r);
-            }
-            if (!cholesky_pivot(x[r], n - k - r)) {
-                return 0;
-            }
+    for (uint64_t r = 0; r < count; r++) {
+        uint64_t above = 0;
+        if (r >= 4) {
+            const double a[4] = {rows[0][r], rows[1][r - 1], rows[2][r - 2], rows[3][r - 3]};
+            const double *const x[4] = {rows[0] + r, rows[1] + r - 1, rows[2] + r - 2, rows[3] + r - 3};
+            hsep_take_four(rows[r], a, x, length - r);
+            above = 4;
         }
-        double *y = x[3] + (n - k - 3);
-        for (uint64_t i = k + 4; i < n; i += 2) { /* and what they leave of the rows below */
-            const uint64_t at = i - k;
-            const double a[4] = {x[0][at], x[1][at - 1], x[2][at - 2], x[3][at - 3]};
-            const double *from[4] = {x[0] + at, x[1] + at - 1, x[2] + at - 2, x[3] + at - 3};
-            if (i + 1 < n) {
-                cholesky_take_two(y, y + (n - i), a, from[0], from[1], from[2], from[3], n - i);
-            } else {
-                cholesky_take(y, a, from[0], from[1], from[2], from[3], n - i);
-            }
-            y += (n - i) + (n - i - 1);
+        for (; above < r; above++) {
+            hsep_axpy(rows[r], -rows[above][r - above], rows[above] + (r - above), length - r);
         }
-        row = x[3] + (n - k - 3);
-    }
-    for (; k < n; k++) {
-        if (!cholesky_pivot(row, n - k)) {
+        if (!cholesky_pivot(rows[r], length - r, least != NULL ? least + r : NULL)) {
             return 0;
         }
-        double *y = row + (n - k);
-        for (uint64_t i = k + 1; i < n; i++) {
-            hsep_axpy(y, -row[i - k], row + (i - k), n - i);
-            y += n - i;
+    }
+    return 1;
+}
+
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double least[])
+{
+    double *row = triangle;
+    for (uint64_t k = 0; k < n; k += CHOLESKY_PANEL) {
+        const uint64_t length = n - k, count = length < CHOLESKY_PANEL ? length : CHOLESKY_PANEL;
+        double *rows[CHOLESKY_PANEL] = {NULL};
+        for (uint64_t r = 0; r < count; r++) {
+            rows[r] = row;
+            row += length - r;
         }
-        row += n - k;
+        if (!cholesky_panel(rows, count, length, least != NULL ? least + k : NULL)) {
+            return 0;
+        }
+        double *y = row;
+        for (uint64_t i = CHOLESKY_PANEL; i < length; i++) { /* what they leave of the rows below */
+            double a[CHOLESKY_PANEL];
+            const double *x[CHOLESKY_PANEL];
+            for (uint64_t r = 0; r < CHOLESKY_PANEL; r++) {
+                x[r] = rows[r] + (i - r);
+                a[r] = *x[r];
+            }
+            hsep_take_eight(y, a, x, length - i);
+            y += length - i;
+        }
     }
     return 1;
 }
@@ -103,10 +77,21 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
 HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
 {
     const double *row = triangle;
-    for (uint64_t i = 0; i < n; i++) { /* R' y = b */
-        b[i] /= row[0];
-        hsep_axpy(b + i + 1, -b[i], row + 1, n - i - 1);
-        row += n - i;
+    for (uint64_t first = 0; first < n; first += CHOLESKY_PANEL) { /* R' y = b */
+        const uint64_t left = n - first, count = left < CHOLESKY_PANEL ? left : CHOLESKY_PANEL;
+        const double *x[CHOLESKY_PANEL] = {NULL};
+        double *y = b + first;
+        for (uint64_t r = 0; r < count; r++) {
+            y[r] /= row[0];
+            for (uint64_t j = 1; r + j < count; j++) {
+                y[r + j] -= y[r] * row[j];
+            }
+            x[r] = row + (CHOLESKY_PANEL - r);
+            row += left - r;
+        }
+        if (left > CHOLESKY_PANEL) {
+            hsep_take_eight(y + CHOLESKY_PANEL, y, x, left - CHOLESKY_PANEL);
+        }
     }
     for (uint64_t i = n; i-- > 0;) { /* R x = y */
         row -= n - i;

@@ -14,8 +14,9 @@
 static inline double hsep_triangle(uint64_t n) { return 0.5 * (double)n * ((double)n + 1.0); }
 
 /* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
- * is used up then. Cost: n^3 / 6 multiply-adds. */
-HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n);
+ * is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL: nothing is.
+ * Cost: n^3 / 6 multiply-adds. */
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double least[]);
 
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
 HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[]);

@@ -20,4 +20,11 @@ static inline int hsep_within(const void *a, uint64_t n, double limit)
     return within;
 }
 
+/* A value within +- bound; bound if it is not a number. */
+static inline double hsep_clip(double value, double bound)
+{
+    const double below = value < bound ? value : bound;
+    return below > -bound ? below : -bound;
+}
+
 #endif

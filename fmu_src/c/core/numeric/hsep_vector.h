@@ -1,25 +1,57 @@
-/* Sums and products of vectors, four entries at a time: compilers make vectors of them without knowing n, and no
- * addition waits for the one before. Reentrant; allocate nothing. */
+/* Vectors of two doubles where the compiler has them, one double elsewhere or with HSEP_NO_VECTORS; sums and products
+ * of arrays, four entries at a time. Lanes do not meet: results are the same to the last bit whatever a vector holds,
+ * and no addition waits for the one before. Reentrant; allocate nothing. */
 #ifndef HSEP_VECTOR_H
 #define HSEP_VECTOR_H
 
 #include <stdint.h>
+#include <string.h>
+
+#if (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
+#define HSEP_LANES 2
+typedef double hsep_lanes __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+#else
+#define HSEP_LANES 1
+typedef double hsep_lanes;
+#endif
+
+/* Vectors that hold four doubles. */
+#define HSEP_OF_FOUR (4 / HSEP_LANES)
+
+/* The vectors that begin at a double, in any alignment of doubles. */
+static inline hsep_lanes *hsep_lanes_at(double *a) { return (hsep_lanes *)(void *)a; }
+static inline const hsep_lanes *hsep_lanes_const(const double *a) { return (const hsep_lanes *)(const void *)a; }
+
+/* Entry by entry a where it is larger than b, else b. */
+static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
+{
+#if HSEP_LANES == 2
+    const hsep_bits larger = (hsep_bits)(a > b);
+    return (hsep_lanes)((larger & (hsep_bits)a) | (~larger & (hsep_bits)b));
+#else
+    return a > b ? a : b;
+#endif
+}
 
 /* sum_i a_i b_i, both (n,). */
 static inline double hsep_dot(const double a[], const double b[], uint64_t n)
 {
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
+    hsep_lanes sums[HSEP_OF_FOUR];
+    double s[4] = {0.0, 0.0, 0.0, 0.0};
     uint64_t i = 0;
+    memcpy(sums, s, sizeof s);
     for (; i + 4 <= n; i += 4) {
-        s0 += a[i] * b[i];
-        s1 += a[i + 1] * b[i + 1];
-        s2 += a[i + 2] * b[i + 2];
-        s3 += a[i + 3] * b[i + 3];
+        const hsep_lanes *x = hsep_lanes_const(a + i), *y = hsep_lanes_const(b + i);
+        for (int l = 0; l < HSEP_OF_FOUR; l++) {
+            sums[l] += x[l] * y[l];
+        }
     }
+    memcpy(s, sums, sizeof s);
     for (; i < n; i++) {
-        s0 += a[i] * b[i];
+        s[0] += a[i] * b[i];
     }
-    return (s0 + s1) + (s2 + s3);
+    return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
 /* start + sum_i w_i e_i, both (n,), e a recursion's own values, newest first: the newest, which are only just computed,
@@ -41,15 +73,51 @@ static inline void hsep_axpy(double *restrict y, double a, const double *restric
 {
     uint64_t i = 0;
     for (; i + 4 <= n; i += 4) {
-        const double y0 = y[i] + a * x[i], y1 = y[i + 1] + a * x[i + 1];
-        const double y2 = y[i + 2] + a * x[i + 2], y3 = y[i + 3] + a * x[i + 3];
-        y[i] = y0;
-        y[i + 1] = y1;
-        y[i + 2] = y2;
-        y[i + 3] = y3;
+        hsep_lanes *to = hsep_lanes_at(y + i);
+        const hsep_lanes *from = hsep_lanes_const(x + i);
+        for (int l = 0; l < HSEP_OF_FOUR; l++) {
+            to[l] += a * from[l];
+        }
     }
     for (; i < n; i++) {
         y[i] += a * x[i];
+    }
+}
+
+/* y -= sum_r a_r x_r over 4 or 8 arrays x_r, all (n,), one after the other: y is loaded and stored once for all. */
+static inline void hsep_take_four(double *restrict y, const double a[4], const double *const x[4], uint64_t n)
+{
+    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
+    uint64_t j = 0;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        *hsep_lanes_at(y + j) =
+            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
+             a2 * *hsep_lanes_const(x2 + j)) -
+            a3 * *hsep_lanes_const(x3 + j);
+    }
+    for (; j < n; j++) {
+        y[j] = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+    }
+}
+
+static inline void hsep_take_eight(double *restrict y, const double a[8], const double *const x[8], uint64_t n)
+{
+    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
+    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
+    uint64_t j = 0;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        const hsep_lanes first =
+            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
+             a2 * *hsep_lanes_const(x2 + j)) -
+            a3 * *hsep_lanes_const(x3 + j);
+        *hsep_lanes_at(y + j) = (((first - a4 * *hsep_lanes_const(x4 + j)) - a5 * *hsep_lanes_const(x5 + j)) -
+                                 a6 * *hsep_lanes_const(x6 + j)) -
+                                a7 * *hsep_lanes_const(x7 + j);
+    }
+    for (; j < n; j++) {
+        const double first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+        y[j] = (((first - a4 * x4[j]) - a5 * x5[j]) - a6 * x6[j]) - a7 * x7[j];
     }
 }
 

@@ -15,6 +15,15 @@ HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
         .e_h = hsep_at(self, self->e_h)};
 }
 
+/* Whether commands and x_pb of the window will not change any more: they are all decided, and no motion before the run
+ * will be found at the end of its first window. */
+static int predictor_settled(hsep_predictor *self)
+{
+    const int is_first = self->motion && self->k < self->preview + self->Np;
+    const hsep_start *motion = (const hsep_start *)hsep_at_const(self, self->motion);
+    return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
+}
+
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
 {
     const uint64_t i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
@@ -23,12 +32,14 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     const double x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
+    const hsep_residual_window window = hsep_predictor_window(self);
     const hsep_residual_sample sample = {
         .i = i,
+        .settled = predictor_settled(self),
         .relative = x_meas - self->start,
         .x = hsep_at(self, self->past_x) + j,
         .e = hsep_at(self, self->past_e) + j};
-    hsep_residual_take_in(hsep_predictor_model(self), &sample);
+    hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);
     if (self->k >= self->preview + late && !isnan(x_meas)) {
         self->residual = x_meas - x_pb;
     }

@@ -13,9 +13,10 @@
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
- * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust nothing is folded
- * but at the end of a window: hsep_trusted_learn and hsep_trusted_forecast, which leaves most of the window that begins
- * to the next samples, hsep_residual_part of it to each.
+ * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust that of
+ * hsep_gram_fold, twice, and at the end of a window hsep_trusted_learn, hsep_trusted_forecast, which leaves most of the
+ * window that begins to the next samples, hsep_residual_part of it to each; at the end of a first window whose commands
+ * begin in motion all its rows at once.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:

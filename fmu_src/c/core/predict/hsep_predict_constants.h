@@ -65,6 +65,11 @@
 /* Largest lag within a window, relative to the bound on a prediction: what is beyond has diverged. */
 #define HSEP_EXPERT_LAG_BOUND 10.0
 
+/* Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of
+ * the squares of the targets: the C core has it from a Gram matrix, which does not resolve less, and no less matters
+ * before 10⁷ rows without noise. */
+#define HSEP_EXPERT_RESOLUTION 1e-13
+
 /* Magnitude of a feature that counts as 0. */
 #define HSEP_EXPERT_LEAST 1e-150
 

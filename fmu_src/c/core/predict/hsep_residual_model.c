@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Parts in which the one that can be trusted predicts a window: its variances are dear. */
-static const uint64_t residual_parts = 6;
+static const uint64_t residual_parts = 25;
 
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
 {
@@ -78,10 +78,26 @@ HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self)
     return self->trusted ? HSEP_N_EVIDENCE : 1;
 }
 
-HSEP_API hsep_regression *hsep_residual_factor(hsep_residual_model *self, uint64_t i)
+HSEP_API uint64_t hsep_residual_n_features(hsep_residual_model *self, uint64_t factor)
 {
-    return self->trusted ? hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)i)
-                         : hsep_paper_regression(hsep_residual_paper(self));
+    return self->trusted ? hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor)->n
+                         : hsep_paper_regression(hsep_residual_paper(self))->n;
+}
+
+HSEP_API double *hsep_residual_factor_row(hsep_residual_model *self, uint64_t factor)
+{
+    return self->trusted ? hsep_gram_row(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor))
+                         : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
+}
+
+HSEP_API int hsep_residual_load(hsep_residual_model *self, uint64_t factor, uint64_t i, uint64_t n_samples)
+{
+    if (self->trusted) {
+        return hsep_gram_load(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor), i);
+    }
+    hsep_regression *regression = hsep_paper_regression(hsep_residual_paper(self));
+    regression->n_samples = n_samples;
+    return hsep_regression_load(regression, i);
 }
 
 HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self)
@@ -143,10 +159,17 @@ HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_s
     }
 }
 
-HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residual_sample *sample)
+HSEP_API void hsep_residual_take_in(
+    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
 {
     if (self->trusted) {
-        hsep_trusted_measure(hsep_residual_trusted(self), sample->i, sample->relative);
+        hsep_trusted *trusted = hsep_residual_trusted(self);
+        hsep_trusted_measure(trusted, sample->i, sample->relative);
+        if (self->learning && sample->settled) {
+            hsep_trusted_follow(
+                trusted, window->command + self->late, window->x_pb + self->late, window->e + self->late,
+                sample->i + 1);
+        }
     } else if (self->learning) {
         hsep_paper_learn(hsep_residual_paper(self), sample);
     }

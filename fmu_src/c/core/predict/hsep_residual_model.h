@@ -13,7 +13,6 @@
 #include "hsep_layout.h"
 #include "hsep_paper.h"
 #include "hsep_physics.h"
-#include "hsep_regression.h"
 #include "hsep_residual_window.h"
 #include "hsep_settings.h"
 #include "hsep_trusted.h"
@@ -56,10 +55,15 @@ HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
 /* Parameters of the one that can be trusted. */
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters);
 
-/* Factors that are learned and their number, for a warm start by hsep_regression_load before the first sample. The
- * first one is that of the physics model's residual. */
+/* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
+ * one of them. The first one is that of the physics model's residual. */
 HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self);
-HSEP_API hsep_regression *hsep_residual_factor(hsep_residual_model *self, uint64_t i);
+HSEP_API uint64_t hsep_residual_n_features(hsep_residual_model *self, uint64_t factor);
+
+/* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_samples: rows that the
+ * factor is from. */
+HSEP_API double *hsep_residual_factor_row(hsep_residual_model *self, uint64_t factor);
+HSEP_API int hsep_residual_load(hsep_residual_model *self, uint64_t factor, uint64_t i, uint64_t n_samples);
 
 /* Numbers learned besides them and whether they are in range; those of hsep_trusted_learned, none without. */
 HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self);
@@ -85,8 +89,9 @@ HSEP_API void hsep_residual_predict(
 /* Add to the signals of a prediction's errors what the model itself tells. */
 HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals);
 
-/* Take in a sample. */
-HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residual_sample *sample);
+/* Take in a sample of the window. */
+HSEP_API void hsep_residual_take_in(
+    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample);
 
 /* Finish a window: learn what was not learned sample by sample; window->e becomes its residuals as they are to be
  * continued from. Return whether it was learned. A first fill that was predicted is not, but is what comes before. */

@@ -20,6 +20,7 @@ typedef struct {
     uint64_t i;          /* sample of the window, 0 ... Np - 1 */
     double relative;     /* m, measured position relative to the start */
     const double *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
+    int settled;         /* whether the window's commands and x_pb will not change any more */
 } hsep_residual_sample;
 
 #endif

@@ -17,6 +17,7 @@ static double command_lay_out(hsep_command *self, const hsep_predictor_settings 
     self->n_before = settings->dead_time + self->p + 1;
     self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)self->p + 1.0);
     self->rows = hsep_take(&end, (double)n * (double)self->count);
+    self->shares = hsep_take(&end, (double)self->count);
     return end * sizeof(double);
 }
 
@@ -29,6 +30,10 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_setting
 {
     memset(self, 0, (size_t)hsep_command_size(settings, n));
     (void)command_lay_out(self, settings, n);
+    for (uint64_t i = 0; i < self->count; i++) {
+        const double age = i > 0 ? (double)(i - 1) / (double)self->p : 0.0;
+        hsep_at(self, self->shares)[i] = sqrt(pow(HSEP_TRUST_LAST_LAG, age));
+    }
 }
 
 HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n)
@@ -41,15 +46,26 @@ HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings
 
 HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature)
 {
-    return feature > 0 ? sqrt(pow(HSEP_TRUST_LAST_LAG, (double)(feature - 1) / (double)self->p)) : 1.0;
+    return hsep_at_const(self, self->shares)[feature];
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m)
 {
-    double *commands = hsep_at(self, self->commands) + (self->n - m), *row = hsep_at(self, self->rows);
-    memcpy(commands, x_d, (size_t)m * sizeof(double));
-    for (uint64_t j = m; j-- > 0; row += self->count) {
-        const double *late = commands + j + self->dead_time;
+    hsep_command_take_in(self, x_d, m);
+    hsep_command_fill(self, m, 0, m);
+}
+
+HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m)
+{
+    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(double));
+}
+
+HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last)
+{
+    const double *commands = hsep_at(self, self->commands) + (self->n - m);
+    double *row = hsep_at(self, self->rows) + first * self->count;
+    for (uint64_t k = first; k < last; k++, row += self->count) {
+        const double *late = commands + (m - 1 - k) + self->dead_time;
         row[0] = 1.0;
         for (uint64_t i = 1; i < self->count; i++) {
             row[i] = late[i - 1] - late[i];

@@ -25,9 +25,10 @@ typedef struct {
     uint64_t commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
     uint64_t rows;     /* (n, count) features, sample after sample */
+    uint64_t shares;   /* (count,) effects that they may have, relative to the largest */
 } hsep_command;
 
-HSEP_ASSERT_WORDS(hsep_command, 7);
+HSEP_ASSERT_WORDS(hsep_command, 8);
 
 /* Bytes of the block, counted in double so that no size can overflow; n: samples of a prediction. */
 HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n);
@@ -44,6 +45,10 @@ HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature);
 /* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
  * others. */
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m);
+
+/* The same in parts: begin, then fill the rows of samples first ... last - 1. */
+HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m);
+HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last);
 
 /* Of these, the commands as many samples ago as the dead time has, (m,), m. */
 HSEP_API const double *hsep_command_late(const hsep_command *self, uint64_t m);

@@ -237,11 +237,21 @@ static double disturbances_angle(const hsep_disturbances *self, double x)
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[])
 {
+    hsep_disturbances_motion_of(self, x_pb, x, n, 0, n, rows);
+}
+
+HSEP_API void hsep_disturbances_motion_of(
+    hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, uint64_t first, uint64_t last,
+    double rows[])
+{
     const double s = sin(disturbances_angle(self, 0.0)), c = cos(disturbances_angle(self, 0.0));
     double disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER] = {0.0};
-    disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
-    for (uint64_t j = n; j > 0;) {
-        const uint64_t count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
+    if (first == 0) {
+        disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
+    }
+    rows += first * self->n;
+    for (uint64_t j = n - first; j > n - last;) {
+        const uint64_t left = j - (n - last), count = left < DISTURBANCES_TOGETHER ? left : DISTURBANCES_TOGETHER;
         for (uint64_t k = 0; k < count; k++) {
             double *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
             j--;

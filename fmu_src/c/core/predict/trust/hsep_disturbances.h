@@ -85,9 +85,13 @@ HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n, double velocity_scale, double rows[]);
 
 /* Fill stiffness, damping and what repeats of these samples in the rows, which act at the position x, (n,), m; may be
- * tried again. */
+ * tried again. Those of samples first ... last - 1 alone, as x becomes known; first is 0, or where the last call
+ * ended. */
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[]);
+HSEP_API void hsep_disturbances_motion_of(
+    hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, uint64_t first, uint64_t last,
+    double rows[]);
 
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);

@@ -1,10 +1,10 @@
 #include "hsep_expert.h"
 
-#include "hsep_penalised.h"
+#include "hsep_cholesky.h"
 #include "hsep_predict_constants.h"
+#include "hsep_range.h"
 #include "hsep_trust_constants.h"
 #include "hsep_vector.h"
-#include "hsep_wide.h"
 
 #include <math.h>
 #include <string.h>
@@ -16,7 +16,7 @@ HSEP_API void hsep_residual_scale_follow(
     for (uint64_t j = 0; j < n; j++) {
         const double residual = accepted[j] * residuals[j];
         sum += residual * residual;
-        self->largest = fmax(self->largest, fabs(residual));
+        self->largest = fabs(residual) > self->largest ? fabs(residual) : self->largest;
     }
     self->largest_square = fmax(self->largest_square, sum / count);
 }
@@ -30,6 +30,7 @@ static double expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
     self->n = shape->n;
     self->n_static = shape->n_static;
     self->p = shape->p;
+    self->lag_scales = hsep_take(&end, lags);
     self->penalties = hsep_take(&end, n);
     self->weights = hsep_take(&end, n);
     self->run = hsep_take(&end, window + lags);
@@ -39,11 +40,10 @@ static double expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
-    self->solved = hsep_take_block(&end, hsep_regression_size(shape->n_static + shape->p));
+    self->factor = hsep_take(&end, hsep_triangle(shape->n_static + shape->p + 1));
+    self->side_by_side = hsep_take(&end, HSEP_GRAM_ABREAST * (n + 1.0));
     return end * sizeof(double);
 }
-
-static hsep_regression *expert_solved(hsep_expert *self) { return (hsep_regression *)hsep_at(self, self->solved); }
 
 HSEP_API double hsep_expert_size(const hsep_expert_shape *shape) { return expert_lay_out(&(hsep_expert){0}, shape); }
 
@@ -52,7 +52,9 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
     self->correlation = 1.0;
-    hsep_regression_init(expert_solved(self), shape->n_static + shape->p, 1.0);
+    for (uint64_t i = 0; i < self->p; i++) {
+        hsep_at(self, self->lag_scales)[i] = sqrt(pow(HSEP_TRUST_LAST_LAG, (double)i / (double)self->p));
+    }
 }
 
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape)
@@ -60,8 +62,7 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
     hsep_expert got;
     memcpy(&got, block, sizeof got);
     (void)expert_lay_out(&got, shape); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 &&
-           hsep_regression_valid(hsep_at_bytes(block, got.solved), shape->n_static + shape->p);
+    return memcmp(&got, block, sizeof got) == 0;
 }
 
 HSEP_API double hsep_expert_shrink(const hsep_expert *self, uint64_t j)
@@ -73,78 +74,82 @@ HSEP_API double hsep_expert_shrink(const hsep_expert *self, uint64_t j)
 HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *evidence)
 {
     const double noise = self->noise_variance > 0.0 ? self->noise_variance : evidence->first;
+    const double of_other = evidence->other != NULL ? evidence->weight * hsep_gram_square(evidence->other) : 0.0;
+    const double resolved = HSEP_EXPERT_RESOLUTION * (hsep_gram_square(evidence->gram) + of_other);
+    const uint64_t n = self->n_static + self->p;
     double *penalties = hsep_at(self, self->penalties);
-    self->variance = fmax(noise, evidence->least) * self->correlation;
+    self->variance = fmax(fmax(noise, evidence->least), resolved) * self->correlation;
     memcpy(penalties, evidence->scales, (size_t)self->n_static * sizeof(double));
-    for (uint64_t i = 0; i < self->p; i++) {
-        penalties[self->n_static + i] = sqrt(pow(HSEP_TRUST_LAST_LAG, (double)i / (double)self->p));
-    }
-    for (uint64_t i = 0; i < self->n_static + self->p; i++) {
+    memcpy(penalties + self->n_static, hsep_at(self, self->lag_scales), (size_t)self->p * sizeof(double));
+    for (uint64_t i = 0; i < n; i++) {
         penalties[i] = self->variance / (penalties[i] * penalties[i]);
     }
-    self->rows_variance =
-        hsep_penalised_solve(
-            evidence->regression, penalties, expert_solved(self), hsep_at(self, self->weights), evidence->work) /
-        evidence->n_rows;
+    const double sum = hsep_gram_solve(
+        evidence->gram, evidence->other, evidence->weight, penalties, n, hsep_at(self, self->factor),
+        hsep_at(self, self->side_by_side), hsep_at(self, self->weights));
+    self->rows_variance = fmax(sum, resolved) / evidence->n_rows;
 }
 
-static double expert_bounded(double value, double bound) { return fmax(-bound, fmin(value, bound)); }
-
-/* e(k) := e(k) + sum_i w_i e(k - i) over a window; eq. (4). */
-static void expert_run(const hsep_expert *self, double e[])
+/* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
+ * the same within bounds; eq. (4). */
+static void expert_free_run(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
-    const double *lag_weights = hsep_at_const(self, self->weights) + self->n_static;
-    for (uint64_t j = self->n; self->p > 0 && j-- > 0;) {
-        e[j] = hsep_recur(e[j], lag_weights, e + j + 1, self->p);
-    }
-}
-
-/* Free run from the last residuals, and the same within bounds. */
-static void expert_free_run(hsep_expert *self, const double rows[], const double past[])
-{
-    const uint64_t n = self->n, n_static = self->n_static;
-    const double *weights = hsep_at(self, self->weights);
+    const uint64_t n_static = self->n_static;
+    const double *weights = hsep_at(self, self->weights), *lag_weights = weights + n_static;
     double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
-    for (uint64_t j = n; j-- > 0; rows += n_static) {
-        run[j] = hsep_dot(weights, rows, n_static);
-    }
-    memcpy(run + n, past, (size_t)self->p * sizeof(double));
-    memcpy(unshrunk + n, past, (size_t)self->p * sizeof(double));
-    expert_run(self, run);
-    for (uint64_t j = 0; j < n; j++) {
-        unshrunk[j] = isfinite(run[j]) ? expert_bounded(run[j], HSEP_EXPERT_LAG_BOUND * self->bound) : 0.0;
+    rows += first * n_static;
+    for (uint64_t k = first; k < last; k++, rows += n_static) {
+        const uint64_t j = self->n - 1 - k;
+        run[j] = hsep_recur(hsep_dot(weights, rows, n_static), lag_weights, run + j + 1, self->p);
+        unshrunk[j] = isfinite(run[j]) ? hsep_clip(run[j], HSEP_EXPERT_LAG_BOUND * self->bound) : 0.0;
     }
 }
 
-/* Squares of the recursion's impulse response. */
-static void expert_respond(hsep_expert *self)
+/* Squares first ... last - 1 of the recursion's impulse response. */
+static void expert_respond(hsep_expert *self, uint64_t first, uint64_t last)
 {
     const uint64_t n = self->n;
+    const double *lag_weights = hsep_at(self, self->weights) + self->n_static;
     double *response = hsep_at(self, self->response), *squares = hsep_at(self, self->squares);
-    memset(response, 0, (size_t)(n + self->p) * sizeof(double));
-    response[n - 1] = 1.0;
-    expert_run(self, response);
-    for (uint64_t i = 0; i < n; i++) {
-        const double at = response[n - 1 - i];
-        const double within = isnan(at) ? HSEP_EXPERT_DIVERGED : expert_bounded(at, HSEP_EXPERT_DIVERGED);
-        squares[i] = within * within;
+    for (uint64_t k = first; k < last; k++) {
+        const uint64_t j = n - 1 - k;
+        response[j] = hsep_recur(k == 0 ? 1.0 : 0.0, lag_weights, response + j + 1, self->p);
+        const double within = isnan(response[j]) ? HSEP_EXPERT_DIVERGED : hsep_clip(response[j], HSEP_EXPERT_DIVERGED);
+        squares[k] = within * within;
     }
 }
 
 /* Largest variance that counts, m2. */
 static double expert_most(const hsep_expert *self) { return HSEP_EXPERT_DIVERGED * self->bound * self->bound; }
 
-/* Variance of sample k of a prediction: that of the rows, carried through the impulse response; wide: hsep_is_wide. */
-static double expert_variance(hsep_expert *self, const double row_of_k[], uint64_t k, int wide)
+/* Variances of the rows of count samples from k on, at most HSEP_GRAM_ABREAST. */
+static void expert_vary_rows(hsep_expert *self, const double rows[], uint64_t k, uint64_t count)
 {
-    const uint64_t j = self->n - 1 - k, p = self->p;
-    const double *squares = hsep_at(self, self->squares), most = expert_most(self);
-    double *variances = hsep_at(self, self->variances), *row = hsep_regression_row(expert_solved(self));
-    memcpy(row, row_of_k, (size_t)self->n_static * sizeof(double));
-    memcpy(row + self->n_static, hsep_at(self, self->unshrunk) + j + 1, (size_t)p * sizeof(double));
-    variances[j] = self->variance * hsep_penalised_leverage(expert_solved(self), wide);
-    const double carried = p > 0 ? hsep_dot(squares, variances + j, k + 1) : variances[j];
-    return isfinite(hsep_at(self, self->run)[j]) ? fmin(carried, most) : most;
+    const uint64_t n_static = self->n_static, p = self->p;
+    double *to = hsep_at(self, self->side_by_side), leverages[HSEP_GRAM_ABREAST];
+    for (uint64_t c = 0; c < HSEP_GRAM_ABREAST; c++) {
+        const uint64_t sample = k + (c < count ? c : count - 1); /* what is beyond is a copy */
+        const double *row = rows + sample * n_static, *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
+        for (uint64_t i = 0; i < n_static; i++) {
+            to[HSEP_GRAM_ABREAST * i + c] = row[i];
+        }
+        for (uint64_t i = 0; i < p; i++) {
+            to[HSEP_GRAM_ABREAST * (n_static + i) + c] = lags[i];
+        }
+    }
+    hsep_gram_leverages(hsep_at(self, self->factor), n_static + p, to, leverages);
+    for (uint64_t c = 0; c < count; c++) {
+        hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c];
+    }
+}
+
+/* Variance of sample k of a prediction: that of the rows, carried through the impulse response. */
+static double expert_variance(const hsep_expert *self, uint64_t k)
+{
+    const uint64_t j = self->n - 1 - k;
+    const double *variances = hsep_at_const(self, self->variances) + j, most = expert_most(self);
+    const double carried = self->p > 0 ? hsep_dot(hsep_at_const(self, self->squares), variances, k + 1) : variances[0];
+    return isfinite(hsep_at_const(self, self->run)[j]) && carried < most ? carried : most;
 }
 
 /* What a variance, m2, leaves of a prediction. */
@@ -159,31 +164,45 @@ static void expert_shrink(hsep_expert *self, uint64_t begin, uint64_t end)
     const double *unshrunk = hsep_at(self, self->unshrunk), *kept = hsep_at(self, self->kept);
     double *e_h = hsep_at(self, self->e_h);
     for (uint64_t j = begin; j < end; j++) {
-        e_h[j] = expert_bounded(unshrunk[j], self->bound) * kept[j];
+        e_h[j] = hsep_clip(unshrunk[j], self->bound) * kept[j];
     }
 }
 
 HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
-    const double n = (double)(self->n_static + self->p);
-    const int wide = hsep_is_wide((double)(last - first) * n * n / 2.0);
     double *kept = hsep_at(self, self->kept);
-    if (first == 0 && self->p > 0) {
-        expert_respond(self);
+    if (self->p > 0) {
+        expert_respond(self, first, last);
+    }
+    for (uint64_t k = first; k < last; k += HSEP_GRAM_ABREAST) {
+        expert_vary_rows(self, rows, k, last - k < HSEP_GRAM_ABREAST ? last - k : HSEP_GRAM_ABREAST);
     }
     for (uint64_t k = first; k < last; k++) {
-        kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, rows + k * self->n_static, k, wide));
+        kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, k));
     }
     expert_shrink(self, self->n - last, self->n - first);
+}
+
+HSEP_API void hsep_expert_begin(hsep_expert *self, const double past[], double largest_square, double bound)
+{
+    self->largest_square = largest_square;
+    self->bound = bound;
+    memcpy(hsep_at(self, self->run) + self->n, past, (size_t)self->p * sizeof(double));
+    memcpy(hsep_at(self, self->unshrunk) + self->n, past, (size_t)self->p * sizeof(double));
+}
+
+HSEP_API void hsep_expert_go_on(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
+{
+    expert_free_run(self, rows, first, last);
+    hsep_expert_vary(self, rows, first, last);
 }
 
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const double rows[], const double past[], double largest_square, double bound, uint64_t varied)
 {
     double *kept = hsep_at(self, self->kept);
-    self->largest_square = largest_square;
-    self->bound = bound;
-    expert_free_run(self, rows, past);
+    hsep_expert_begin(self, past, largest_square, bound);
+    expert_free_run(self, rows, 0, self->n);
     if (varied > 0) {
         hsep_expert_vary(self, rows, 0, varied);
         for (uint64_t j = 0; j < self->n - varied; j++) {

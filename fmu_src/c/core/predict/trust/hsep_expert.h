@@ -12,8 +12,8 @@
 #define HSEP_EXPERT_H
 
 #include "hsep_api.h"
+#include "hsep_gram.h"
 #include "hsep_layout.h"
-#include "hsep_regression.h"
 
 #include <stdint.h>
 
@@ -37,21 +37,23 @@ typedef struct {
     double largest_square; /* m2, largest mean square of a window, and */
     double bound;          /* m, bound on the prediction, as it was made */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t penalties; /* (n_static + p,) of the weights */
-    uint64_t weights;   /* (n_static + p,) */
-    uint64_t run;       /* (n + p,) m, the recursion, behind it measured residuals */
-    uint64_t unshrunk;  /* (n + p,) m, the same within bounds */
-    uint64_t e_h;       /* (n,) m, shrunk by its variance, and bounded */
-    uint64_t kept;      /* (n,) what the variance leaves of it */
-    uint64_t response;  /* (n + p,) the recursion's impulse response, behind it 0 */
-    uint64_t squares;   /* (n,) its squares, oldest first */
-    uint64_t variances; /* (n,) m2, of the rows */
-    uint64_t solved;    /* the regression with penalties */
+    uint64_t lag_scales;   /* (p,) prior standard deviations of the weights of the lags */
+    uint64_t penalties;    /* (n_static + p,) of the weights */
+    uint64_t weights;      /* (n_static + p,) */
+    uint64_t run;          /* (n + p,) m, the recursion, behind it measured residuals */
+    uint64_t unshrunk;     /* (n + p,) m, the same within bounds */
+    uint64_t e_h;          /* (n,) m, shrunk by its variance, and bounded */
+    uint64_t kept;         /* (n,) what the variance leaves of it */
+    uint64_t response;     /* (n + p,) the recursion's impulse response, behind it 0 */
+    uint64_t squares;      /* (n,) its squares, oldest first */
+    uint64_t variances;    /* (n,) m2, of the rows */
+    uint64_t factor;       /* triangle of n_static + p + 1 rows: that of the solution */
+    uint64_t side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
 HSEP_ASSERT_WORDS(hsep_expert_shape, 4);
-HSEP_ASSERT_WORDS(hsep_expert, 20);
+HSEP_ASSERT_WORDS(hsep_expert, 22);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
 HSEP_API void hsep_residual_scale_follow(
@@ -68,14 +70,15 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 
 /* What the weights are solved with. */
 typedef struct {
-    const hsep_regression *regression; /* of rows whose first features are those of the expert, */
-    double n_rows;                     /* and their number, weighted */
-    const double *scales;              /* (n_static,) prior standard deviations of the weights without lags */
-    double first, least;               /* m2, variance of the noise while it is not known, and the least one */
-    double *work;                      /* hsep_block_fold_size(n, n) doubles for n features of the regression */
+    const hsep_gram *gram;  /* of rows whose first features are those of the expert, */
+    const hsep_gram *other; /* more of them, settled, or NULL, */
+    double weight;          /* and the weight of these */
+    double n_rows;          /* and their number, weighted */
+    const double *scales;   /* (n_static,) prior standard deviations of the weights without lags */
+    double first, least;    /* m2, variance of the noise while it is not known, and the least one */
 } hsep_expert_evidence;
 
-/* Solve for the weights from all rows. Cost: that of hsep_penalised_solve. */
+/* Solve for the weights from all rows. Cost: that of hsep_gram_solve. */
 HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *evidence);
 
 /* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; bound: m,
@@ -85,8 +88,13 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *e
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const double rows[], const double past[], double largest_square, double bound, uint64_t varied);
 
+/* Predict them part by part: begin, then go on with samples first ... last - 1, first being 0, or where the last call
+ * ended; the result is the same as with varied = n. */
+HSEP_API void hsep_expert_begin(hsep_expert *self, const double past[], double largest_square, double bound);
+HSEP_API void hsep_expert_go_on(hsep_expert *self, const double rows[], uint64_t first, uint64_t last);
+
 /* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
- * them by it. Cost for each: that of hsep_penalised_leverage, and last multiply-adds. */
+ * them by it. Cost for each: that of hsep_gram_leverages, four at a time, and last multiply-adds. */
 HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last);
 
 /* Estimate noise and correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1

@@ -4,32 +4,32 @@
 
 #include <math.h>
 
-HSEP_API void hsep_reach_judge(
-    hsep_reach *self, const double x[], const double x_pb[], double before, uint64_t n, double largest, double T_s,
-    double believed[])
+HSEP_API hsep_reach_window
+hsep_reach_begin(hsep_reach *self, const double x_pb[], double before, uint64_t n, double largest)
 {
-    const double patience = ceil(HSEP_TRUST_PATIENCE / T_s);
     for (uint64_t j = n; j-- > 0; before = x_pb[j]) {
-        self->fastest = fmax(self->fastest, fabs(x_pb[j] - before));
+        const double change = fabs(x_pb[j] - before);
+        self->fastest = change > self->fastest ? change : self->fastest;
     }
-    const int known = largest > 0.0 && self->fastest > 0.0;
-    for (uint64_t j = n; j-- > 0;) {
-        const double e = fabs(x[j] - x_pb[j]);
-        self->n_missing++;
-        believed[j] = 0.0;
-        if (!isfinite(x[j])) {
-            continue;
-        }
-        const int beyond = e > HSEP_TRUST_REACH_RESIDUALS * largest + HSEP_TRUST_REACH_STEPS * self->fastest;
-        if (known && beyond) {
-            self->n_beyond++;
-        } else if (self->n_beyond > 0) {
-            self->n_beyond--;
-        }
-        if (self->n_beyond == 0 || (double)self->n_missing > patience) {
-            believed[j] = 1.0;
-            self->n_missing = self->n_beyond = 0;
-            largest = fmax(largest, e);
-        }
+    return (hsep_reach_window){.largest = largest, .known = largest > 0.0 && self->fastest > 0.0};
+}
+
+HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, double e, double T_s)
+{
+    const double size = fabs(e);
+    self->n_missing++;
+    if (!isfinite(e)) {
+        return 0;
     }
+    if (window->known && size > HSEP_TRUST_REACH_RESIDUALS * window->largest + HSEP_TRUST_REACH_STEPS * self->fastest) {
+        self->n_beyond++;
+    } else if (self->n_beyond > 0) {
+        self->n_beyond--;
+    }
+    if (self->n_beyond > 0 && (double)self->n_missing <= ceil(HSEP_TRUST_PATIENCE / T_s)) {
+        return 0;
+    }
+    self->n_missing = self->n_beyond = 0;
+    window->largest = size > window->largest ? size : window->largest;
+    return 1;
 }

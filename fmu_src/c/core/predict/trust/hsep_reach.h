@@ -23,12 +23,21 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_reach, 3);
 
-/* Judge the samples of a window: believed, (n,), becomes 1 where one is believed and 0 elsewhere. Before the first
- * motion, and over the first window that has a residual, all are. x: (n,) m, measured, NaN where missing; x_pb: (n,)
- * m; before: m, the last prediction before them; largest: m, the largest residual believed before them; T_s: s.
- * Signals are newest first: sample k is at place n - 1 - k. Cost: 10 operations a sample. */
-HSEP_API void hsep_reach_judge(
-    hsep_reach *self, const double x[], const double x_pb[], double before, uint64_t n, double largest, double T_s,
-    double believed[]);
+/* What is known of a window that is judged. */
+typedef struct {
+    double largest; /* m, largest residual believed */
+    uint64_t known; /* whether there was a motion, and a residual, before it */
+} hsep_reach_window;
+
+HSEP_ASSERT_WORDS(hsep_reach_window, 2);
+
+/* Begin a window. x_pb: (n,) m, newest first; before: m, the last prediction before it; largest: m, the largest
+ * residual believed before it. */
+HSEP_API hsep_reach_window
+hsep_reach_begin(hsep_reach *self, const double x_pb[], double before, uint64_t n, double largest);
+
+/* Judge its next sample by its residual e, m, NaN where it is missing; return whether it is believed. Before the first
+ * motion, and over the first window that has a residual, all are. T_s: s. Constant cost. */
+HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, double e, double T_s);
 
 #endif

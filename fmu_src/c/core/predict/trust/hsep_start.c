@@ -79,23 +79,29 @@ static void start_respond(hsep_start *self, double step, double x_pb[], uint64_t
     }
 }
 
-/* First step of the commands, m; 0 if the axis begins at rest, as far as they and the measured residuals tell. */
-static double start_step(const hsep_start *self, const double x_d[], const double e[])
+/* First step of the commands, m; 0 if the axis begins at rest, as far as they tell. */
+static double start_step(const hsep_start *self, const double x_d[])
 {
     const uint64_t late = self->n - self->Np, first = self->n - 1 - late;
     double peak = 0.0;
-    uint64_t known = 0;
     for (uint64_t j = first; j-- > 0;) {
-        peak = fmax(peak, fabs(x_d[j] - x_d[j + 1]));
+        const double change = fabs(x_d[j] - x_d[j + 1]);
+        peak = change > peak ? change : peak;
     }
-    for (uint64_t k = late; k < self->Np; k++) {
+    const double step = first > 0 ? x_d[first - 1] - x_d[first] : 0.0;
+    return fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
+}
+
+HSEP_API int hsep_start_moves(const hsep_start *self, const double x_d[]) { return fabs(start_step(self, x_d)) > 0.0; }
+
+/* Whether enough residuals are measured. */
+static int start_knows(const hsep_start *self, const double e[])
+{
+    uint64_t known = 0;
+    for (uint64_t k = self->n - self->Np; k < self->Np; k++) {
         known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
     }
-    if (known < HSEP_START_SAMPLES * self->n_states || first == 0) {
-        return 0.0;
-    }
-    const double step = x_d[first - 1] - x_d[first];
-    return fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
+    return known >= HSEP_START_SAMPLES * self->n_states;
 }
 
 /* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
@@ -121,10 +127,10 @@ static void start_fold(hsep_start *self, const double e[])
 HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const double e[])
 {
     const uint64_t all = self->n_states + self->dead_time;
-    const double step = start_step(self, x_d, e), *weights = hsep_at(self, self->weights);
+    const double step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
     double *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
     double seen = 0.0, left = 0.0;
-    if (!(fabs(step) > 0.0)) {
+    if (!hsep_start_moves(self, x_d) || !start_knows(self, e)) {
         return 0;
     }
     for (uint64_t i = 0; i < self->n_states; i++) {

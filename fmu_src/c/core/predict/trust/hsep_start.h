@@ -46,6 +46,9 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *par
 /* Whether a block, in any alignment, is one that hsep_start_init with these parameters began. */
 HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters);
 
+/* Whether the commands of the first window, (n,), m, begin in motion. */
+HSEP_API int hsep_start_moves(const hsep_start *self, const double x_d[]);
+
 /* Whether the run began in motion: x_d: (n,), m, commands of its first window; e: (Np,), m, measured residuals of its
  * first samples relative to what was predicted, NaN where missing. Cost: n n_states (9 n_states / 2 + n_states)
  * multiply-adds, once. */

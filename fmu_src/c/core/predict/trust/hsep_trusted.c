@@ -3,7 +3,6 @@
 
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
-#include "hsep_wide.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -24,6 +23,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     const hsep_expert_place leading = hsep_stack_leader(&self->stack);
     hsep_trusted_lead(self, leading);
     self->reach.n_missing = self->reach.n_beyond = 0;
+    self->followed = self->known = 0;
     hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, leading));
@@ -36,88 +36,111 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x)
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
-/* The window's residuals, linear in time between accepted ones; return how many are accepted. */
-static double trusted_bridge(hsep_trusted *self, const double x_pb[], double e[])
+/* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. */
+static void trusted_begin_window(hsep_trusted *self, const double x_d[], const double x_pb[])
 {
-    const double *measured = hsep_at(self, self->measured), *accepted = hsep_at(self, self->accepted);
-    double *bridged = hsep_at(self, self->bridged), count = 0.0;
-    uint64_t known = self->Np; /* place of the last accepted residual, at first the one before the window */
-    for (uint64_t j = self->Np; j-- > 0;) {
-        bridged[j] = 1.0 - accepted[j];
-        if (accepted[j] > 0.0) {
-            e[j] = measured[j] - x_pb[j];
-            const double slope = (e[j] - e[known]) / (double)(known - j);
-            for (uint64_t i = known - 1; i > j; i--) {
-                e[i] = slope * (double)(known - i) + e[known];
-            }
-            known = j;
-            count += 1.0;
-        }
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    if (self->forecast_scale != self->velocity_scale) {
+        hsep_trusted_forget(self, HSEP_OF_PHYSICS);
+        hsep_trusted_believe_earlier(self, HSEP_OF_COMMAND);
+        hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     }
-    for (uint64_t i = 0; i < known; i++) {
-        e[i] = e[known];
+    self->velocity_scale = self->forecast_scale;
+    self->largest_step = self->forecast_step;
+    memcpy(
+        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
+    self->reach_of_window =
+        hsep_reach_begin(&self->reach, x_pb, disturbances->before.x_pb[0], self->Np, self->scale.largest);
+    if (self->n > self->Np) { /* what was tried last went beyond the window */
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
     }
-    return count;
+    hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
+    self->n_accepted = 0.0;
 }
 
-/* Residual of the command over the window, whose commands and residuals are known. */
-static void trusted_of_command(hsep_trusted *self, const double x_pb[], const double e[])
+/* Features of the window up to sample last - 1 as they were measured, and the residual of the command: those before
+ * known are there. */
+static void trusted_take_rows(hsep_trusted *self, const double x_pb[], const double e[], uint64_t last)
 {
-    const double *late = hsep_command_late(hsep_trusted_command(self), self->Np);
-    double *e_0 = hsep_at(self, self->e_0);
-    for (uint64_t j = 0; j < self->Np; j++) {
-        e_0[j] = e[j] + x_pb[j] - late[j];
+    const uint64_t first = self->known, Np = self->Np;
+    const double *late = hsep_command_late(hsep_trusted_command(self), Np);
+    double *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0);
+    for (uint64_t j = Np - last; j < Np - first; j++) {
+        x[j] = x_pb[j] + e[j];
+        e_0[j] = x[j] - late[j];
     }
+    if (first > 0) { /* the velocity at the first of them */
+        x[Np - first] = x_pb[Np - first] + e[Np - first];
+    }
+    hsep_disturbances_motion_of(hsep_trusted_disturbances(self), x_pb, x, Np, first, last, hsep_at(self, self->rows));
+    self->known = last;
 }
 
-/* Which rows of the window with p lags are learned, (Np,), by their places, and their number. Those with many lags that
- * stand for samples without a measurement are not. */
-static uint64_t trusted_learned_rows(const hsep_trusted *self, uint64_t p, double learned[])
+/* Learn the row [features without lags | lags | residual] of sample k. Those with many lags that stand for samples
+ * without a measurement are not. row: (n_static,); e: (Np + lags,), m. */
+static void trusted_fold(hsep_trusted *self, hsep_evidence evidence, uint64_t k, const double row[], const double e[])
 {
-    const double *accepted = hsep_at_const(self, self->accepted);
-    const double *bridged = hsep_at_const(self, self->bridged);
-    double n_bridged = 0.0; /* among the lags of the row */
-    uint64_t count = 0;
+    hsep_gram *gram = hsep_trusted_evidence(self, evidence);
+    const uint64_t p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
+    const double *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
+    double n_bridged = 0.0, *to = hsep_gram_row(gram);
     for (uint64_t i = 0; i < p; i++) {
-        n_bridged += bridged[self->Np + i];
+        n_bridged += bridged[i];
     }
-    for (uint64_t j = self->Np; j-- > 0;) {
-        learned[j] = accepted[j] > 0.0 && n_bridged <= HSEP_TRUSTED_BRIDGED;
-        count += learned[j] > 0.0;
-        n_bridged += bridged[j] - bridged[j + p];
+    if (n_bridged > HSEP_TRUSTED_BRIDGED) {
+        return;
     }
-    return count;
+    memcpy(to, row, (size_t)n_static * sizeof(double));
+    memcpy(to + n_static, lags, (size_t)p * sizeof(double));
+    to[gram->n] = lags[-1];
+    hsep_gram_fold(gram);
+    self->n_rows[evidence] += 1.0;
 }
 
-/* Update some evidence with the rows [features without lags | lags | residual] of the window that are learned.
- * rows: (Np, n_static); e: (Np + lags,), m. */
-static void trusted_fold(hsep_trusted *self, hsep_evidence evidence, const double rows[], const double e[])
+/* Judge the next sample, and take in those since the last one that is believed, if it is: their residuals are linear in
+ * time between both. fold: whether it is learned. */
+static void trusted_follow_sample(hsep_trusted *self, const double x_pb[], double e[], int fold)
 {
-    hsep_regression *regression = hsep_trusted_evidence(self, evidence);
-    const uint64_t n = regression->n, p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p;
-    const uint64_t n_static = n - p;
-    double *learned = hsep_at(self, self->x), *work = hsep_at(self, self->work); /* x is not needed any more */
-    const uint64_t count = trusted_learned_rows(self, p, learned);
-    uint64_t b = 0;
-    hsep_trusted_discount(self, evidence, self->kept);
-    for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
-        if (learned[j] > 0.0) {
-            double *row = hsep_block_fold_row(work, n, b++);
-            memcpy(row, rows, (size_t)n_static * sizeof(double));
-            memcpy(row + n_static, e + j + 1, (size_t)p * sizeof(double));
-            row[n] = e[j];
+    const uint64_t k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
+    const double measured = hsep_at(self, self->measured)[j] - x_pb[j];
+    const int accepted = hsep_reach_judge(&self->reach, &self->reach_of_window, measured, self->T_s);
+    hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
+    hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
+    if (!accepted) {
+        return;
+    }
+    e[j] = measured;
+    const double slope = (e[j] - e[known]) / (double)(known - j);
+    for (uint64_t i = known - 1; i > j; i--) {
+        e[i] = slope * (double)(known - i) + e[known];
+    }
+    trusted_take_rows(self, x_pb, e, k + 1);
+    if (fold) {
+        hsep_command *command = hsep_trusted_command(self);
+        if (!(self->n_accepted > 0.0)) {
+            hsep_trusted_discount(self, HSEP_OF_PHYSICS, self->kept);
+            hsep_trusted_discount(self, HSEP_OF_COMMAND, self->kept);
         }
+        trusted_fold(self, HSEP_OF_PHYSICS, k, hsep_at(self, self->rows) + k * self->n_static, e);
+        trusted_fold(
+            self, HSEP_OF_COMMAND, k, hsep_at(command, command->rows) + k * command->count, hsep_at(self, self->e_0));
     }
-    hsep_block_fold(regression, work, count, 0, hsep_is_wide((double)count * (double)n * (double)n));
-    self->n_rows[evidence] += (double)count;
+    self->n_accepted += 1.0;
 }
 
-/* Update all evidence with the window. */
-static void trusted_fold_window(hsep_trusted *self, const double e[])
+HSEP_API void hsep_trusted_follow(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
 {
-    hsep_command *command = hsep_trusted_command(self);
-    trusted_fold(self, HSEP_OF_PHYSICS, hsep_at(self, self->rows), e);
-    trusted_fold(self, HSEP_OF_COMMAND, hsep_at(command, command->rows), hsep_at(self, self->e_0));
+    if (self->followed == 0 && last > 0) {
+        trusted_begin_window(self, x_d, x_pb);
+    }
+    for (uint64_t i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
+        trusted_follow_sample(self, x_pb, e, 1);
+    }
+    if (last + 1 == self->Np) { /* the solution comes with the next row */
+        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
+        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+    }
 }
 
 /* Update the weights of the stack with the samples that were published, of those accepted. */
@@ -128,16 +151,24 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
     double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (uint64_t j = 0; j < self->Np - first; j++) {
         double of_sample[HSEP_N_EXPERTS + 1];
+        if (!(accepted[j] > 0.0)) {
+            continue;
+        }
         for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
             of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
-        for (int i = 0; accepted[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
-            for (int l = 0; l <= HSEP_N_EXPERTS; l++) {
+        for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
+            for (int l = i; l <= HSEP_N_EXPERTS; l++) {
                 products[i][l] += of_sample[i] * of_sample[l];
             }
         }
-        n += accepted[j];
+        n += 1.0;
+    }
+    for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
+        for (int l = 0; l < i; l++) {
+            products[i][l] = products[l][i];
+        }
     }
     if (n > 0.0) {
         hsep_stack_update(&self->stack, products, n, self->least_variance);
@@ -187,53 +218,30 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
     }
 }
 
-/* Take over the scales of the window; rows at lower velocities are forgotten where it outgrows them. */
-static void trusted_take_scales(hsep_trusted *self)
-{
-    if (self->forecast_scale != self->velocity_scale) {
-        hsep_trusted_forget(self, HSEP_OF_PHYSICS);
-        hsep_trusted_believe_earlier(self, HSEP_OF_COMMAND);
-        hsep_stack_forget(&self->stack, HSEP_DOUBTING);
-    }
-    self->velocity_scale = self->forecast_scale;
-    self->largest_step = self->forecast_step;
-    memcpy(
-        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
-}
-
-/* Features of the window as it was measured, and the residual of the command. */
-static void trusted_take_rows(hsep_trusted *self, const double x_d[], const double x_pb[], const double e[])
-{
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
-    for (uint64_t j = 0; j < self->Np; j++) {
-        x[j] = x_pb[j] + e[j];
-    }
-    if (self->n > self->Np) { /* what was tried last went beyond the window */
-        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, rows);
-    }
-    hsep_disturbances_motion(disturbances, x_pb, x, self->Np, rows);
-    hsep_disturbances_end(disturbances);
-    hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
-    trusted_of_command(self, x_pb, e);
-}
-
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
     const uint64_t p = self->p, of_command = hsep_trusted_command(self)->p;
     double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
-    trusted_take_scales(self);
-    hsep_reach_judge(
-        &self->reach, hsep_at(self, self->measured), x_pb, hsep_trusted_disturbances(self)->before.x_pb[0], self->Np,
-        self->scale.largest, self->T_s, hsep_at(self, self->accepted));
-    const double count = trusted_bridge(self, x_pb, e);
-    self->n_rejected += self->Np - (uint64_t)count;
-    trusted_take_rows(self, x_d, x_pb, e);
-    if (fold && count > 0.0) {
-        trusted_fold_window(self, e);
-        trusted_judge(self, e, count);
+    if (self->followed == 0) {
+        trusted_begin_window(self, x_d, x_pb);
+    }
+    while (self->followed < self->Np) {
+        trusted_follow_sample(self, x_pb, e, fold);
+    }
+    if (self->known < self->Np) { /* none is believed behind it: its residual stays */
+        const uint64_t known = self->Np - self->known;
+        for (uint64_t j = 0; j < known; j++) {
+            e[j] = e[known];
+        }
+        trusted_take_rows(self, x_pb, e, self->Np);
+    }
+    self->n_rejected += self->Np - (uint64_t)self->n_accepted;
+    hsep_disturbances_end(hsep_trusted_disturbances(self));
+    if (fold && self->n_accepted > 0.0) {
+        trusted_judge(self, e, self->n_accepted);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
     memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(double));
     memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(double));
+    self->followed = self->known = 0;
 }

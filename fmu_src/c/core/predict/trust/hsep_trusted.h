@@ -16,15 +16,13 @@
 #define HSEP_TRUSTED_H
 
 #include "hsep_api.h"
-#include "hsep_block_fold.h"
 #include "hsep_command.h"
 #include "hsep_disturbances.h"
 #include "hsep_expert.h"
+#include "hsep_gram.h"
 #include "hsep_layout.h"
-#include "hsep_penalised.h"
 #include "hsep_physics.h"
 #include "hsep_reach.h"
-#include "hsep_regression.h"
 #include "hsep_settings.h"
 #include "hsep_stack.h"
 
@@ -44,6 +42,9 @@ typedef struct {
 typedef enum { HSEP_OF_PHYSICS = 0, HSEP_OF_COMMAND } hsep_evidence;
 
 #define HSEP_N_EVIDENCE 2
+
+/* Samples of a window that are learned at one: those catch up that were measured before it was predicted. */
+#define HSEP_TRUSTED_PACE 2
 
 typedef struct {
     uint64_t Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
@@ -70,6 +71,11 @@ typedef struct {
     uint64_t leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
     hsep_reach reach;
     uint64_t n_rejected; /* samples of this run that were not accepted */
+    /* Of the window that is measured */
+    uint64_t followed; /* samples that were judged and, as far as they are believed, learned */
+    uint64_t known;    /* samples up to the last one that is believed */
+    double n_accepted; /* samples that are */
+    hsep_reach_window reach_of_window;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
@@ -83,17 +89,15 @@ typedef struct {
                                 * predict of that of the physics model */
     uint64_t variance;         /* (n,) m2, of the mixture of the experts */
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
-    uint64_t work;             /* rows to be folded, of the window or of penalties */
     uint64_t disturbances, command;
-    uint64_t evidence[HSEP_N_EVIDENCE]; /* regressions of this run's rows, */
-    uint64_t earlier[HSEP_N_EVIDENCE];  /* of those of earlier runs, */
-    uint64_t all;                       /* and of both, work */
+    uint64_t evidence[HSEP_N_EVIDENCE]; /* Gram matrices of this run's rows, */
+    uint64_t earlier[HSEP_N_EVIDENCE];  /* and of those of earlier runs */
     uint64_t experts[HSEP_N_EXPERTS];   /* hold has none, 0 */
 } hsep_trusted;
 
 HSEP_ASSERT_WORDS(
-    hsep_trusted,
-    38 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
+    hsep_trusted, 39 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS +
+                      (sizeof(hsep_stack) + sizeof(hsep_reach) + sizeof(hsep_reach_window)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -107,8 +111,8 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
 /* Whether a block, in any alignment, is one that hsep_trusted_init with these parameters began. */
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters);
 
-HSEP_API hsep_regression *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence);
-HSEP_API hsep_regression *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence);
+HSEP_API hsep_gram *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence);
+HSEP_API hsep_gram *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence);
 HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
 HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self);
 
@@ -135,9 +139,6 @@ HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 /* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
 
-/* Rows of this run, and of earlier ones weighed by weight, in to, which may be the regression of this run's. */
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to);
-
 /* Forget all rows of some evidence; go on with all of them as with those of this run; weigh all so far by kept; begin
  * another run, of which all so far are earlier ones, at a bounded weight. */
 HSEP_API void hsep_trusted_forget(hsep_trusted *self, hsep_evidence evidence);
@@ -147,8 +148,8 @@ HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
 
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
- * them, m, of a compensator; or NULL. Cost: m^3 / 6 multiply-adds for each expert's m
- * features, last m^2 / 2, last n / 2, and 6 n tanh. */
+ * them, m, of a compensator; or NULL. Cost: m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last
+ * n / 2, and 6 n tanh. */
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path, double e[],
     uint64_t last);
@@ -171,10 +172,15 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 /* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, Np > 1, with the motion before it. */
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[]);
 
-/* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
- * believed, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
- * from it in any case. Cost: that of hsep_block_fold with Np rows of physics, of command, and in a warm run of
- * doubt. */
+/* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
+ * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
+ * residuals; where the measurement is not believed, between those beside it; behind it those before it. Cost for a
+ * sample: that of hsep_gram_fold, of physics and of command. */
+HSEP_API void hsep_trusted_follow(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);
+
+/* Learn the rest of that window, and judge the experts by it. fold: whether it is learned, as it was followed if so;
+ * the next window starts from it in any case. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
 /* Discount what earlier runs have learned, and begin to doubt it: a machine may have changed meanwhile. */

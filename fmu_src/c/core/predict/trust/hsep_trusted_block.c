@@ -16,14 +16,14 @@ HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self)
 
 HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self) { return (hsep_command *)hsep_at(self, self->command); }
 
-HSEP_API hsep_regression *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence)
+HSEP_API hsep_gram *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence)
 {
-    return (hsep_regression *)hsep_at(self, self->evidence[evidence]);
+    return (hsep_gram *)hsep_at(self, self->evidence[evidence]);
 }
 
-HSEP_API hsep_regression *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence)
+HSEP_API hsep_gram *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence)
 {
-    return (hsep_regression *)hsep_at(self, self->earlier[evidence]);
+    return (hsep_gram *)hsep_at(self, self->earlier[evidence]);
 }
 
 HSEP_API hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_expert_place expert)
@@ -63,17 +63,6 @@ static double trusted_expert_size(const hsep_trusted *self, uint64_t expert)
     return expert == HSEP_DOUBTING ? fmax(size, hsep_expert_size(&other)) : size;
 }
 
-/* Doubles of work: for the rows of a window, and for as many as features. */
-static double trusted_work(const hsep_trusted *self)
-{
-    double most = 0.0;
-    for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
-        const uint64_t n = trusted_n_features(self, i);
-        most = fmax(most, hsep_block_fold_size(n, self->Np > n ? self->Np : n));
-    }
-    return most;
-}
-
 /* Set what follows from the parameters; return the bytes of the block. */
 static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters *parameters)
 {
@@ -104,17 +93,13 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->stacked = hsep_take(&end, 2.0 * n);
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
-    self->work = hsep_take(&end, trusted_work(self));
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));
     self->command = hsep_take_block(&end, hsep_command_size(settings, parameters->n));
-    double largest = 0.0;
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
-        const double size = hsep_regression_size(trusted_n_features(self, i));
+        const double size = hsep_gram_size(trusted_n_features(self, i));
         self->evidence[i] = hsep_take_block(&end, size);
         self->earlier[i] = hsep_take_block(&end, size);
-        largest = fmax(largest, size);
     }
-    self->all = hsep_take_block(&end, largest);
     self->experts[HSEP_HOLD] = 0;
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         self->experts[i] = hsep_take_block(&end, trusted_expert_size(self, i));
@@ -139,8 +124,8 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     hsep_command_init(hsep_trusted_command(self), parameters->settings, parameters->n);
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
         const uint64_t features = trusted_n_features(self, i);
-        hsep_regression_init(hsep_trusted_evidence(self, (hsep_evidence)i), features, HSEP_NO_PENALTY);
-        hsep_regression_init(hsep_trusted_earlier(self, (hsep_evidence)i), features, HSEP_NO_PENALTY);
+        hsep_gram_init(hsep_trusted_evidence(self, (hsep_evidence)i), features);
+        hsep_gram_init(hsep_trusted_earlier(self, (hsep_evidence)i), features);
     }
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_expert_shape shape = trusted_shape(self, i);
@@ -161,14 +146,15 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound = memcmp(&got, block, sizeof got) == 0 && (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) &&
+                got.followed <= got.Np && got.known <= got.followed && got.reach_of_window.known <= 1 &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters->settings, parameters->n);
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
         const uint64_t features = trusted_n_features(&got, i);
-        sound = sound && hsep_regression_valid(hsep_at_bytes(block, got.evidence[i]), features) &&
-                hsep_regression_valid(hsep_at_bytes(block, got.earlier[i]), features) && got.n_earlier[i] >= 0.0 &&
+        sound = sound && hsep_gram_valid(hsep_at_bytes(block, got.evidence[i]), features) &&
+                hsep_gram_valid(hsep_at_bytes(block, got.earlier[i]), features) && got.n_earlier[i] >= 0.0 &&
                 got.n_earlier[i] <= HSEP_PREDICTION_MAX;
     }
     for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {

@@ -2,14 +2,11 @@
 #include "hsep_trusted.h"
 
 #include "hsep_predict_constants.h"
+#include "hsep_range.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <stddef.h>
-
-/* Experts of the physics model's residual, that without lags first: the stiffness acts at the position, which the
- * physics model alone does not give well enough. */
-static const hsep_expert_place trusted_experts_of_physics[] = {HSEP_STATIC, HSEP_LAGGED, HSEP_DOUBTING};
 
 /* Those of the command's. */
 #define TRUSTED_OF_COMMAND 2
@@ -52,24 +49,14 @@ static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint
     return hsep_at(self, self->forecast_largest)[feature];
 }
 
-/* Rows of this run and of earlier ones, these weighed by weight. */
-static const hsep_regression *trusted_all(hsep_trusted *self, hsep_evidence evidence, double weight)
-{
-    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
-    if (!(self->n_earlier[evidence] > 0.0)) {
-        return of_run;
-    }
-    hsep_regression *all = (hsep_regression *)hsep_at(self, self->all);
-    hsep_trusted_gather(self, evidence, weight, all);
-    return all;
-}
-
-/* Solve for the weights of an expert, from its rows. */
-static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hsep_regression *regression, double n_rows)
+/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
+static void trusted_solve(hsep_trusted *self, hsep_expert_place place, double weight)
 {
     const int of_command = hsep_trusted_is_of_command(self, place);
     const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
     const double effect = self->effect > 0.0 ? self->effect : sqrt(square);
+    const hsep_evidence evidence = of_command ? HSEP_OF_COMMAND : HSEP_OF_PHYSICS;
+    const double n_earlier = self->n_earlier[evidence];
     hsep_expert *expert = hsep_trusted_expert(self, place);
     double *scales = hsep_at(self, self->scales);
     for (uint64_t i = 0; i < expert->n_static; i++) {
@@ -78,30 +65,24 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
         scales[i] = effect * share / fmax(trusted_largest(self, place, i), HSEP_EXPERT_LEAST);
     }
     const hsep_expert_evidence solved = {
-        .regression = regression,
-        .n_rows = n_rows,
+        .gram = hsep_trusted_evidence(self, evidence),
+        .other = n_earlier > 0.0 ? hsep_trusted_earlier(self, evidence) : NULL,
+        .weight = weight,
+        .n_rows = self->n_rows[evidence] + weight * n_earlier,
         .scales = scales,
         .first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square,
-        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square),
-        .work = hsep_at(self, self->work)};
+        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square)};
     hsep_expert_solve(expert, &solved);
 }
 
 /* Solve for the weights of the experts of some evidence, the first one with lags, that know something. */
-static void trusted_solve_of(
-    hsep_trusted *self, hsep_evidence evidence, const hsep_expert_place experts[], uint64_t count)
+static void trusted_solve_of(hsep_trusted *self, const hsep_expert_place experts[], uint64_t count)
 {
-    const double n_rows = self->n_rows[evidence], n_earlier = self->n_earlier[evidence];
-    if (!self->predicted[experts[0]]) {
-        return;
+    for (uint64_t i = 0; self->predicted[experts[0]] && i < count; i++) {
+        trusted_solve(self, experts[i], 1.0);
     }
-    const hsep_regression *all = trusted_all(self, evidence, 1.0);
-    for (uint64_t i = 0; i < count; i++) {
-        trusted_solve(self, experts[i], all, n_rows + n_earlier);
-    }
-    if (self->leading == (uint64_t)experts[0] && self->predicted[HSEP_DOUBTING]) {
-        all = trusted_all(self, evidence, HSEP_TRUST_LESS);
-        trusted_solve(self, HSEP_DOUBTING, all, n_rows + HSEP_TRUST_LESS * n_earlier);
+    if (self->predicted[experts[0]] && self->leading == (uint64_t)experts[0] && self->predicted[HSEP_DOUBTING]) {
+        trusted_solve(self, HSEP_DOUBTING, HSEP_TRUST_LESS);
     }
 }
 
@@ -130,7 +111,8 @@ static void trusted_scale(
     }
     for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
         for (uint64_t i = 0; i < self->n_static; i++) {
-            largest[i] = fmax(largest[i], fabs(rows[i]));
+            const double size = fabs(rows[i]);
+            largest[i] = size > largest[i] ? size : largest[i];
         }
     }
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
@@ -143,8 +125,8 @@ static void trusted_scale(
     self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;
     self->predicted[HSEP_COMMAND] = n_of_command > 0.0 && self->scale_of_command.largest_square > 0.0;
     self->predicted[HSEP_DOUBTING] = self->predicted[self->leading] && hsep_trusted_doubts(self);
-    trusted_solve_of(self, HSEP_OF_PHYSICS, (const hsep_expert_place[]){HSEP_LAGGED, HSEP_STATIC}, 2);
-    trusted_solve_of(self, HSEP_OF_COMMAND, (const hsep_expert_place[]){HSEP_COMMAND}, 1);
+    trusted_solve_of(self, (const hsep_expert_place[]){HSEP_LAGGED, HSEP_STATIC}, 2);
+    trusted_solve_of(self, (const hsep_expert_place[]){HSEP_COMMAND}, 1);
 }
 
 /* What the experts of the command predict of the physics model's residual, at places begin ... end - 1. */
@@ -157,51 +139,64 @@ static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint
         const double *e_h = hsep_at_const(expert, expert->e_h);
         const int predicts = trusted_predicts_command(self, trusted_experts_of_command[i]);
         for (uint64_t j = begin; predicts && j < end; j++) {
-            stacked[j] = fmax(-most, fmin(e_h[j] + late[j] - x_pb[j], most));
+            stacked[j] = hsep_clip(e_h[j] + late[j] - x_pb[j], most);
         }
     }
 }
 
-/* Predict by the experts of the physics model's residual, whose rows hold the commands and stiffness and damping at
- * x_pb. past: (p,), m. */
-static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const double past[], uint64_t varied)
+/* Largest mean square, m2, and bound, m, of an expert. */
+static double trusted_square_of(hsep_trusted *self, uint64_t expert)
 {
-    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
-    hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
-    hsep_expert_predict(first, rows, past, self->scale.largest_square, self->bound, varied > 0 ? self->n : 0);
-    for (uint64_t j = 0; j < self->n; j++) {
-        x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
-    }
-    hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
-    for (uint64_t i = 0; i < sizeof trusted_experts_of_physics / sizeof trusted_experts_of_physics[0]; i++) {
-        if (self->predicted[trusted_experts_of_physics[i]] &&
-            !hsep_trusted_is_of_command(self, trusted_experts_of_physics[i])) {
-            hsep_expert_predict(
-                hsep_trusted_expert(self, trusted_experts_of_physics[i]), rows, past, self->scale.largest_square,
-                self->bound, varied);
-        }
-    }
+    return hsep_trusted_is_of_command(self, expert)
+               ? self->growth * self->growth * self->scale_of_command.largest_square
+               : self->scale.largest_square;
 }
 
-/* Predict by all experts that know something. */
+static double trusted_bound_of(hsep_trusted *self, uint64_t expert)
+{
+    return hsep_trusted_is_of_command(self, expert)
+               ? HSEP_TRUST_BOUND_OF_COMMAND * (self->growth * self->scale_of_command.largest)
+               : self->bound;
+}
+
+/* The last residuals before a window as an expert takes them. past: (p,) m, of the physics model. */
+static const double *trusted_past_of(hsep_trusted *self, uint64_t expert, const double past[])
+{
+    return hsep_trusted_is_of_command(self, expert) ? hsep_at(self, self->e_0) + self->Np : past;
+}
+
+/* Predict by an expert. rows: features without lags. */
+static void trusted_predict_by(
+    hsep_trusted *self, hsep_expert_place expert, const double rows[], const double past[], uint64_t varied)
+{
+    hsep_expert_predict(
+        hsep_trusted_expert(self, expert), rows, trusted_past_of(self, expert, past), trusted_square_of(self, expert),
+        trusted_bound_of(self, expert), varied);
+}
+
+/* Predict by all experts that know something, whose rows hold the commands and stiffness and damping at x_pb. past:
+ * (p,), m. */
 static void trusted_by_experts(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double past[], uint64_t varied)
 {
     hsep_command *command = hsep_trusted_command(self);
+    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) {
-        trusted_by_physics(self, x_pb, past, varied);
+        const hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
+        trusted_predict_by(self, HSEP_STATIC, rows, past, varied > 0 ? self->n : 0);
+        for (uint64_t j = 0; j < self->n; j++) {
+            x[j] = x_pb[j] + hsep_at_const(first, first->e_h)[j];
+        }
+        hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
     }
-    if (!self->predicted[HSEP_COMMAND]) {
-        return;
+    if (self->predicted[HSEP_COMMAND]) {
+        hsep_command_take(command, x_d, self->n);
     }
-    hsep_command_take(command, x_d, self->n);
-    for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++) {
-        if (trusted_predicts_command(self, trusted_experts_of_command[i])) {
-            hsep_expert_predict(
-                hsep_trusted_expert(self, trusted_experts_of_command[i]), hsep_at(command, command->rows),
-                hsep_at(self, self->e_0) + self->Np,
-                self->growth * self->growth * self->scale_of_command.largest_square,
-                HSEP_TRUST_BOUND_OF_COMMAND * (self->growth * self->scale_of_command.largest), varied);
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            trusted_predict_by(
+                self, (hsep_expert_place)i,
+                hsep_trusted_is_of_command(self, i) ? hsep_at(command, command->rows) : rows, past, varied);
         }
     }
     trusted_follow_command(self, x_pb, 0, self->n);
@@ -272,20 +267,55 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
     }
 }
 
+/* Begin the prediction of a window part by part. */
+static void trusted_begin(hsep_trusted *self, const double x_d[], const double past[])
+{
+    hsep_command_take_in(hsep_trusted_command(self), x_d, self->n);
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_begin(
+                hsep_trusted_expert(self, (hsep_expert_place)i), trusted_past_of(self, i, past),
+                trusted_square_of(self, i), trusted_bound_of(self, i));
+        }
+    }
+}
+
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path, double e[],
     uint64_t last)
 {
     trusted_scale(self, x_d, x_pb, path, n_path, e[self->n]);
-    trusted_by_experts(self, x_d, x_pb, e + self->n, last); /* the rows are those of the scales */
-    trusted_stack(self, e, 0, last);
+    if (path == NULL) {
+        trusted_begin(self, x_d, e + self->n);
+        hsep_trusted_go_on(self, x_pb, e, 0, last);
+    } else {
+        trusted_by_experts(self, x_d, x_pb, e + self->n, last); /* the rows are those of the scales */
+        trusted_stack(self, e, 0, last);
+    }
 }
 
 HSEP_API void hsep_trusted_go_on(hsep_trusted *self, const double x_pb[], double e[], uint64_t first, uint64_t last)
 {
-    hsep_trusted_vary(self, first, last);
-    if (self->predicted[HSEP_COMMAND]) {
-        trusted_follow_command(self, x_pb, self->n - last, self->n - first);
+    hsep_command *command = hsep_trusted_command(self);
+    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
+        hsep_expert *at_first = hsep_trusted_expert(self, HSEP_STATIC);
+        hsep_expert_go_on(at_first, rows, first, last);
+        for (uint64_t j = self->n - last; j < self->n - first; j++) {
+            x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
+        }
+        hsep_disturbances_motion_of(hsep_trusted_disturbances(self), x_pb, x, self->n, first, last, rows);
     }
+    if (self->predicted[HSEP_COMMAND]) {
+        hsep_command_fill(command, self->n, first, last);
+    }
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_go_on(
+                hsep_trusted_expert(self, (hsep_expert_place)i),
+                hsep_trusted_is_of_command(self, i) ? hsep_at(command, command->rows) : rows, first, last);
+        }
+    }
+    trusted_follow_command(self, x_pb, self->n - last, self->n - first);
     trusted_stack(self, e, first, last);
 }

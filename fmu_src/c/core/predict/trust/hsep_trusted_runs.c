@@ -1,7 +1,6 @@
 /* Rows that a residual model that can be trusted has learned, of this run and of earlier ones. */
 #include "hsep_trusted.h"
 
-#include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
@@ -12,31 +11,15 @@ HSEP_API int hsep_trusted_doubts(const hsep_trusted *self) { return self->n_earl
 
 HSEP_API void hsep_trusted_forget(hsep_trusted *self, hsep_evidence evidence)
 {
-    hsep_regression *regression = hsep_trusted_evidence(self, evidence);
-    hsep_regression_init(regression, regression->n, HSEP_NO_PENALTY);
+    hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
+    hsep_gram_init(of_run, of_run->n);
     self->n_rows[evidence] = self->n_earlier[evidence] = 0.0;
-}
-
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to)
-{
-    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
-    const hsep_regression *earlier = hsep_trusted_earlier(self, evidence);
-    const size_t size = (size_t)hsep_regression_size(of_run->n);
-    if (self->n_rows[evidence] > 0.0) {
-        memmove(to, of_run, size);
-        hsep_penalised_add(to, earlier, weight, hsep_at(self, self->work));
-    } else {
-        memcpy(to, earlier, size);
-        if (weight < 1.0) {
-            hsep_regression_discount(to, weight);
-        }
-    }
 }
 
 HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence)
 {
     if (self->n_earlier[evidence] > 0.0) {
-        hsep_trusted_gather(self, evidence, 1.0, hsep_trusted_evidence(self, evidence));
+        hsep_gram_add(hsep_trusted_evidence(self, evidence), hsep_trusted_earlier(self, evidence), 1.0);
         self->n_rows[evidence] += self->n_earlier[evidence];
         self->n_earlier[evidence] = 0.0;
     }
@@ -45,8 +28,8 @@ HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evi
 HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept)
 {
     if (kept < 1.0) {
-        hsep_regression_discount(hsep_trusted_evidence(self, evidence), kept);
-        hsep_regression_discount(hsep_trusted_earlier(self, evidence), kept);
+        hsep_gram_discount(hsep_trusted_evidence(self, evidence), kept);
+        hsep_gram_discount(hsep_trusted_earlier(self, evidence), kept);
         self->n_rows[evidence] *= kept;
         self->n_earlier[evidence] *= kept;
     }
@@ -54,12 +37,13 @@ HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, 
 
 HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
 {
-    const hsep_regression *regression = hsep_trusted_evidence(self, evidence);
+    hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
     const double most = HSEP_TRUST_CARRIED * (double)self->Np;
     hsep_trusted_believe_earlier(self, evidence);
     hsep_trusted_discount(self, evidence, most / fmax(self->n_rows[evidence], most));
     const double n_rows = self->n_rows[evidence];
-    memcpy(hsep_trusted_earlier(self, evidence), regression, (size_t)hsep_regression_size(regression->n));
+    hsep_gram_settle(of_run);
+    memcpy(hsep_trusted_earlier(self, evidence), of_run, (size_t)hsep_gram_size(of_run->n));
     hsep_trusted_forget(self, evidence);
     self->n_earlier[evidence] = n_rows;
 }
