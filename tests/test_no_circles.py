@@ -49,6 +49,7 @@ def c_sources() -> Graph:
     return graph
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("graph", "some"), [(library, 200), (c_sources, 60)], ids=["hybridsep", "c"])
 def test_there_are_no_circles(graph: Callable[[], Graph], some: int) -> None:
     needed = graph()
@@ -70,6 +71,7 @@ def test_imports_are_found_wherever_they_are() -> None:
     }
 
 
+@pytest.mark.slow
 def test_packages_import_those_below_them_alone() -> None:
     """Hold the order that ARCHITECTURE.md states against what the packages import."""
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")

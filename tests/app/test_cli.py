@@ -21,6 +21,7 @@ from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest
 
 
+@pytest.mark.slow
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=6001)
     paper = ("-m", "spring_mass_damper", "--trust", "false")
@@ -72,6 +73,7 @@ def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: P
     assert json.loads(out)["n_batches"] == 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     """The measured position counts, not the true one beside it, unless it is asked for."""
@@ -92,6 +94,7 @@ def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: s
     assert true["rms_h_um"] != pytest.approx(expected["rms_h_um"], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
 def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
     """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
@@ -120,6 +123,7 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
 
 
+@pytest.mark.slow
 def test_build_for_both_versions_of_fmi(hybridsep: Run, tmp_path: Path) -> None:
     names = ["FeedDrive", "FeedDriveFmi3"]
     options = ("--fmi", "both", "--target", "host", "--out", tmp_path, "--json")
@@ -327,6 +331,7 @@ def test_each_parameter_of_the_predictor_is_an_option(hybridsep: Run, name: str)
         assert " ".join(parameter.help.split()) in " ".join(out.split())
 
 
+@pytest.mark.slow
 def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     command = write_log(tmp_path / "log.csv", n=600)
     given = (

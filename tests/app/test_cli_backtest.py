@@ -61,6 +61,7 @@ def test_a_log_that_would_flatter_is_refused_fixed_or_taken_as_it_is(
     assert "--fix and --as-is exclude each other" in hybridsep("backtest", log, *MACHINE, "--as-is", "--fix")[2]
 
 
+@pytest.mark.slow
 def test_gaps_and_jitter(hybridsep: Run, tmp_path: Path) -> None:
     t = np.arange(3000) * 1e-3
     t += np.random.default_rng(1).uniform(-2e-4, 2e-4, len(t))
@@ -84,6 +85,7 @@ def test_gaps_and_jitter(hybridsep: Run, tmp_path: Path) -> None:
     assert [finding["name"] for finding in json.loads(out)["findings"]] == ["gaps", "jitter"]
 
 
+@pytest.mark.slow
 def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
     rows = np.column_stack((np.arange(3000) * 1e-3, commanded()[:3000], measured(0)[:3000]))
     keep = np.setdiff1d(np.arange(3000), np.random.default_rng(5).integers(1, 2999, 30))
@@ -135,6 +137,7 @@ def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     assert "--figure must end in .png or .pdf or .svg" in hybridsep("backtest", log, *MACHINE, "--figure", "a.jpg")[2]
 
 
+@pytest.mark.slow
 def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=1000)
     drawn = []
@@ -147,6 +150,7 @@ def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path:
     assert "<!-- linear hybrid model, after the warm-up -->" in drawn[1]
 
 
+@pytest.mark.slow
 def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     log, state, table = write_log(tmp_path / "log.csv"), tmp_path / "my.state", tmp_path / "my.csv"
     cold = json.loads(hybridsep("backtest", log, *MACHINE, "--save", state, "--save", table, "--json")[1])
@@ -199,6 +203,7 @@ def test_arx_models_stand_beside_hold(hybridsep: Run, tmp_path: Path, monkeypatc
     assert "ARX20" not in out
 
 
+@pytest.mark.slow
 def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=1000)
     files = {name: tmp_path / name for name in ("batches.csv", "errors.png", "my.state", "run.npz")}
@@ -211,6 +216,7 @@ def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -
     assert "wrote" not in hybridsep("backtest", log, *MACHINE, *options, "--json")[1]
 
 
+@pytest.mark.slow
 def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
     """Brackets of a name are no markup: not in titles and cells, not in notes and errors."""
     log = write_log(tmp_path / "x[b]axis[red].csv", n=1000)
@@ -226,6 +232,7 @@ def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
     assert "[bold]" in err
 
 
+@pytest.mark.slow
 def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     text = (data_folder("models") / "emps.toml").read_text(encoding="utf-8").partition("[log]")[0]
     linear, rotary = tmp_path / "axis.toml", tmp_path / "table.toml"

@@ -53,6 +53,7 @@ def interrupted(arguments: list[object], moment: Callable[[], object]) -> tuple[
     return process.returncode, err
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_while_the_library_is_loaded() -> None:
     begun = time.monotonic()
@@ -61,6 +62,7 @@ def test_ctrl_c_while_the_library_is_loaded() -> None:
     assert err.splitlines()[-1] in ("interrupted", SAID)  # the longer one between loading two parts of it
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     """The demo's FMUs are Python ones: a KeyboardInterrupt inside them would be fmi2Fatal."""
@@ -163,6 +165,7 @@ def test_commands_end_with_the_first_that_fails(tmp_path: Path, monkeypatch: pyt
     assert [path.name for path in tmp_path.iterdir()] == ["pid"]
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_in_the_middle_of_a_step_of_a_python_fmu(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -119,6 +119,7 @@ def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch
         fit([read_log(log)], out, FitOptions(NP + 1, "axis"))
 
 
+@pytest.mark.slow
 def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
     used, findings = take_in([read_log(log, uniform=False)], fix=False)
     fit_report(fitted, used, findings).write(tmp_path / "report.html")
@@ -196,6 +197,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert machine.read_text(encoding="utf-8") != edited
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:800], -measured(0)[:800])
@@ -215,6 +217,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_log_that_cannot_train_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
@@ -233,6 +236,7 @@ def test_a_log_that_cannot_train_a_model_is_predicted_by_its_command(tmp_path: P
     fit_report(found, used, {}).write(tmp_path / "report.html")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     """It was the log whose commanded position does not move, where only the training half rests."""
@@ -247,6 +251,7 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "Np", "words"),
     [
@@ -285,6 +290,7 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     assert "The window after a gap is no test window" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 @pytest.mark.parametrize("fix", [[], pytest.param(["--fix"], marks=pytest.mark.nightly)])
 def test_missing_measurements(hybridsep: Run, tmp_path: Path, fix: list[str]) -> None:

@@ -36,6 +36,7 @@ def command() -> Array:
     return rest_to_rest(targets, PAPER_LIMITS, T_S, start_times=starts, duration=3.3)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_path: Path) -> None:
     x_d = command()

@@ -49,6 +49,7 @@ def test_a_vibration_in_time_is_no_period() -> None:
     assert residual_period([(np.zeros(50), np.zeros(50))], AXIS, T_S, "zoh") == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves()
@@ -77,6 +78,7 @@ def start_of(fmu: Path, name: str) -> float:
     return float(variable.start)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves(2, n=3)
@@ -103,6 +105,7 @@ def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     assert results[LATE]["judged"]["rms_h"] < 2 * results[0]["judged"]["rms_h"]
 
 
+@pytest.mark.slow
 def test_identify_takes_a_late_encoder(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves(3, n=4)
     x = screw(x_d, 0.0)

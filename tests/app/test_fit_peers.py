@@ -35,6 +35,7 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
     return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 @pytest.mark.parametrize("name", ["cnc_a_axis2", "cnc_a_axis6"])
 @pytest.mark.usefixtures("quick_fit")
@@ -63,6 +64,7 @@ def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tm
         assert f"<td>{peer}</td>" in page
 
 
+@pytest.mark.slow
 def test_the_physics_model_is_judged_with_its_offset(hybridsep: Run, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     x_d = commanded()[:800]
@@ -76,6 +78,7 @@ def test_the_physics_model_is_judged_with_its_offset(hybridsep: Run, tmp_path: P
     assert "judged with the offset" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_path: Path) -> None:
     """1 kHz, its times rounded to 2 ms, in degrees."""
@@ -154,6 +157,7 @@ def test_a_unit_of_the_other_kind_is_not_shown() -> None:
     assert shown_of("m", "rad") == shown_of("", "rad") == shown_in("rad")
 
 
+@pytest.mark.slow
 def test_commands_on_a_log_in_degrees_speak_of_degrees(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(
         tmp_path / "axis.csv", 3000 * commanded()[:1200], 3000 * measured(0)[:1200], header="t,x_d/deg,x/deg"

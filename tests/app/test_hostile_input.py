@@ -27,6 +27,7 @@ def test_damaged_files_are_read_or_refused(tmp_path: Path, n: int) -> None:
     assert all(kind in done.stdout for kind in mutations.KINDS)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_what_goes_wrong_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The judge of the runs tells every way to fail from a refusal."""

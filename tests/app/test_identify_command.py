@@ -78,6 +78,7 @@ def test_a_swept_sine(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(printed)["modes"][0]["f_n"] == pytest.approx(20.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_an_accelerometer_file(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "raw_data_x.csv"
     t = np.arange(0, 32, 1 / 1000)
@@ -115,6 +116,7 @@ def test_what_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     assert "an axis at rest shows neither its model nor its errors; record it while it moves" in " ".join(err.split())
 
 
+@pytest.mark.slow
 def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
     """Swapped columns gave a model of 290 Hz without a word."""
     x_d = moves(1200)
@@ -137,6 +139,7 @@ def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
     assert machine.model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     x_d = moves(1200)
     x = measured(TRUTH, x_d, "zoh", 1e-6)
@@ -157,6 +160,7 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     assert "--trust" not in err
 
 
+@pytest.mark.slow
 def test_a_changed_position_is_a_source_of_the_machine(hybridsep: Run, tmp_path: Path) -> None:
     x_d = moves(1200)
     log, out = tmp_path / "flipped.csv", tmp_path / "axis.toml"

@@ -54,6 +54,7 @@ def test_what_is_quick_and_what_prints_json_says_nothing(clock: Clock, capsys: p
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_the_demo_says_in_a_pipe_how_long_it_takes_and_where_it_is(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "hybridsep_main", "demo", "--out", str(tmp_path / "demo")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

@@ -19,6 +19,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_log(tmp_path_factory.mktemp("report") / "my axis.csv")
 
 
+@pytest.mark.slow
 def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     page, charts = tmp_path / "page.html", tmp_path / "charts.pdf"
     options = (log, *MACHINE, "--Np", 50)
@@ -42,6 +43,7 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
     assert "exists and is no figure of hybridsep" in " ".join(err.split())
 
 
+@pytest.mark.slow
 def test_a_page_about_60_000_samples_stays_below_2_mb(hybridsep: Run, tmp_path: Path) -> None:
     x_d = np.tile(commanded()[:6000], 10)
     x = np.tile(measured(0)[:6000], 10) + np.random.default_rng(0).normal(0.0, 2e-6, 60_000)
@@ -54,6 +56,7 @@ def test_a_page_about_60_000_samples_stays_below_2_mb(hybridsep: Run, tmp_path: 
     assert charts.stat().st_size < 500_000
 
 
+@pytest.mark.slow
 def test_warm_start_and_step_times(hybridsep: Run, log: Path, fmus: BuiltFmus, tmp_path: Path) -> None:
     saved = tmp_path / "learned.state"
     assert hybridsep("backtest", log, *MACHINE, "--save", saved)[0] == 0

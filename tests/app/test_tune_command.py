@@ -22,6 +22,7 @@ PAPER = (*MACHINE, "--trust", "false")
 FEW = ("--Np", "50", "--p", "5,40", "--q", "0:1", "--lambda", "1e-12:1e-8:x100", "--t_init", "0.1")
 
 
+@pytest.mark.slow
 def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hybridsep: Run, tmp_path: Path) -> None:
     log, out, figure = write_log(tmp_path / "log.csv"), tmp_path / "tuned.toml", tmp_path / "tuned.png"
     before = log.read_bytes()
@@ -60,6 +61,7 @@ def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hy
     assert replayed["rms_pb_um"] == pytest.approx(1e6 * found["logs"]["log.csv"]["rms_pb"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
     logs = [write_log(tmp_path / name, n=n) for name, n in (("a.csv", 400), ("b.csv", 600))]
     (tmp_path / "sub").mkdir()
@@ -90,6 +92,7 @@ def test_a_log_with_a_gap_is_tuned_on_in_pieces(hybridsep: Run, tmp_path: Path) 
     assert "gaps" in [finding["name"] for finding in json.loads(text)["findings"]["log.csv"]]
 
 
+@pytest.mark.slow
 def test_changed_positions_are_among_the_sources(hybridsep: Run, tmp_path: Path) -> None:
     log, machine, again = write_log(tmp_path / "log.csv", n=600), tmp_path / "machine.toml", tmp_path / "again.toml"
     columns = np.genfromtxt(log, delimiter=",", skip_header=1)
@@ -149,6 +152,7 @@ def test_a_compensator_that_the_lags_do_not_fit_is_told_before_the_replays(hybri
     assert "compensator: q must be 0 … Np − 1 = 19, got 30" in err
 
 
+@pytest.mark.slow
 def test_what_diverges_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     own = PredictorSettings(trust=False)
     settings = (own, replace(own, p=20), replace(own, p=30))

@@ -219,6 +219,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_killed_process_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
@@ -241,6 +242,7 @@ def test_a_killed_process_leaves_a_whole_file(tmp_path: Path) -> None:
     assert not left_over(tmp_path)
 
 
+@pytest.mark.slow
 @POSIX
 def test_what_is_written_elsewhere_at_the_same_time_stays(tmp_path: Path) -> None:
     """Three processes write for ever; their files in the making survive other writes into the folder."""

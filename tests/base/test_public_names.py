@@ -82,6 +82,7 @@ def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
     assert not {"numpy", "scipy"} & modules
 
 
+@pytest.mark.slow
 def test_a_replay_loads_no_plots_and_no_fmus(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3},0,0\n" for k in range(200)))

@@ -77,6 +77,7 @@ def test_results_do_not_depend_on_the_number_of_threads() -> None:
     assert with_threads(1) == with_threads(2)
 
 
+@pytest.mark.slow
 def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callable[[str], Path]) -> None:
     machine = paper_machine("spring_mass_damper")
     x_d = staircase()[:300]

@@ -162,6 +162,7 @@ def test_digits_do_not_wear_off() -> None:
         assert abs(Fraction(float(found)) - expected) <= Fraction(3e-16) * abs(expected)
 
 
+@pytest.mark.slow
 def test_vectors_change_no_bit(tmp_path: Path) -> None:
     numeric = C_SOURCES / "core" / "numeric"
     sources = [Path(__file__).with_name("lanes.c"), numeric / "hsep_gram.c", numeric / "hsep_cholesky.c"]

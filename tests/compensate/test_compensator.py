@@ -20,6 +20,7 @@ from hybridsep.plants.trajectory import PAPER_LIMITS
 from hybridsep.predict.predictor import HybridPredictor
 
 
+@pytest.mark.slow
 def test_figures_with_the_papers_settings() -> None:
     assert 1e6 * closed(compensator("off")).tracking_rms == pytest.approx(88.5, abs=0.2)
     assert 1e6 * closed(compensator("physics")).tracking_rms == pytest.approx(20.2, abs=0.2)
@@ -30,6 +31,7 @@ def test_figures_with_the_papers_settings() -> None:
     assert (warm.state == SepState.HYBRID).all()
 
 
+@pytest.mark.slow
 def test_figures_with_the_recommended_settings() -> None:
     sep = compensator(**asdict(RECOMMENDED))
     cold, warm = closed(sep), closed(sep, 1000, t_init=0.0)

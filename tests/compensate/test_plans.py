@@ -92,6 +92,7 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     assert residual <= 1e-3 * np.linalg.norm(cost.v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limits", "n_bounded"), [(PAPER_LIMITS, 30), (DRIVE_LIMITS, 3)], ids=["tight", "usual"])
 def test_a_bounded_plan_costs_what_another_solver_finds(
     monkeypatch: pytest.MonkeyPatch, limits: Limits, n_bounded: int

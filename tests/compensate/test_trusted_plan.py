@@ -147,6 +147,7 @@ def test_plans_follow_friction_that_follows_the_command() -> None:
         assert beyond(found.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     x_d = moves()[:200]
     expected = SepCompensator.from_bytes(learned())
@@ -175,6 +176,7 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
     return sensed
 
 
+@pytest.mark.slow
 def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
     sep = compensator(change_max=2e-4)
     run(sep)
@@ -189,6 +191,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
     assert run(sep, t_init=0.0).state.max() == SepState.HYBRID  # another run
 
 
+@pytest.mark.slow
 def test_without_a_largest_change_no_plan_runs_away() -> None:
     sep = compensator(change_max=None)
     run(sep)

@@ -151,6 +151,7 @@ def test_recommended_settings_cold_and_warm(flavour: str, fmus: BuiltFmus, by_li
     assert second.summary()["tracking_rms_um"] < 0.6
 
 
+@pytest.mark.slow
 def test_a_held_sensor_is_the_librarys(python_pair: Pair) -> None:
     class Held:
         def __init__(self) -> None:
@@ -168,6 +169,7 @@ def test_a_held_sensor_is_the_librarys(python_pair: Pair) -> None:
     assert np.ptp(run.x_meas[1050:1250]) == 0.0
 
 
+@pytest.mark.slow
 def test_summary_is_what_the_signals_say(short: Run) -> None:
     summary = short.summary()
     error = 1e6 * (short.x_d - short.x)
@@ -187,6 +189,7 @@ def test_summary_is_what_the_signals_say(short: Run) -> None:
     assert summary["n_samples"] == 600
 
 
+@pytest.mark.slow
 def test_start_time_and_a_shifted_start(python_pair: Pair, short: Run) -> None:
     moved = cosimulate(*python_pair, staircase()[:600] + 0.1, start_time=50.0)
     np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
@@ -230,6 +233,7 @@ def test_what_is_refused(python_pair: Pair, python_fmu: Fmu) -> None:
         cosimulate(compensator, plant, [0.0, 0.0], controller_values={"preview": 60})
 
 
+@pytest.mark.slow
 def test_figures(short: Run, tmp_path: Path) -> None:
     several = {"off": short, "physics": short, "hybrid_cold": short, "hybrid_warm": short}
     tracking_figure(several, "several", tmp_path / "several.png")

@@ -99,6 +99,7 @@ def test_members_that_must_not_be_unpacked(
     assert not list(nothing_left.iterdir())
 
 
+@pytest.mark.slow
 def test_a_bomb_is_not_unpacked(native: Path, tmp_path: Path, nothing_left: Path) -> None:
     path = with_member(native, tmp_path / "Bomb.fmu", "resources/zeros", bytes(150 * 2**20))
     with pytest.raises(FmuError, match=r"Bomb\.fmu must not be unpacked: its 0\.\d MB become 15\d MB, more than any"):
@@ -188,6 +189,7 @@ def beginning(kept: float, content: bytes) -> bytes:
     return content[: int(kept * len(content))]
 
 
+@pytest.mark.slow
 def test_truncated_libraries(native: Path, tmp_path: Path, hybridsep: Run, nothing_left: Path) -> None:
     """A truncated library ended the process by SIGBUS."""
     for kept in (0.0, 0.0005, 0.3, 0.7, 0.999):
@@ -277,6 +279,7 @@ def count(n: int, progress: Callable[[int, int], object]) -> list[int]:
     return list(range(n))
 
 
+@pytest.mark.slow
 def test_a_run_apart(nothing_left: Path) -> None:
     seen: list[tuple[int, int]] = []
     assert run_apart(faulty("x.fmu"), count, 3, progress=lambda *done: seen.append(done)) == [0, 1, 2]
@@ -310,6 +313,7 @@ def test_a_missing_function_is_named(native: Path, tmp_path: Path) -> None:
         FmuInstance(path)
 
 
+@pytest.mark.slow
 def test_a_library_that_crashes_is_one_line(native: Path, tmp_path: Path, hybridsep: Run, nothing_left: Path) -> None:
     """The first instructions of a step are an invalid one: headers and symbols are intact."""
 

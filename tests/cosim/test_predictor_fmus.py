@@ -44,6 +44,7 @@ def test_fmus_equal_the_library(run: Run) -> None:
     np.testing.assert_allclose(run.batch_rms()["x_h"], result.batch_rms_h, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_shifted_start_gives_the_same_errors(pair: tuple[Path, Path], run: Run) -> None:
     shifted = cosimulate(*pair, staircase() + 0.1)
     np.testing.assert_allclose(shifted.x_h - 0.1, run.x_h, rtol=0, atol=1e-10)

@@ -100,6 +100,7 @@ def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
         }
 
 
+@pytest.mark.slow
 def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:
     """SSP 2.0 has the namespaces of 1.0; without its version and the types of FMI 3.0 it is the same document."""
     machine, command = load_machine("spring_mass_damper"), staircase()[:100]
@@ -157,6 +158,7 @@ print("ends", *observer.last_real_values(drive, [places["x"], places["x_meas"]])
     assert np.all(np.asarray(ends) > 1e-3)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "axis.ssp"
     arguments = ("system", "--machine", "als25010_x", "--compensate", "--target", "host", "--out", path)

@@ -72,6 +72,7 @@ def test_recorded_axis(emps: Log) -> None:
     assert summary["n_samples_after_warm_up"] == 24_841 - 1242
 
 
+@pytest.mark.slow
 def test_recorded_axis_from_the_file_in_chunks(emps: Log) -> None:
     whole = backtest(emps_predictor(), emps.x_d, emps.x_meas)
     streamed = backtest_stream(emps_predictor(), open_log(EMPS, columns=EMPS_COLUMNS).chunks(777))

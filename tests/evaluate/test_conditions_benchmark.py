@@ -16,6 +16,7 @@ from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.trajectory import staircase
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "within"), [(250.0, 0.1), (2000.0, 0.05)])
 def test_the_same_horizon_in_seconds_gives_the_same_error(rate: float, within: float) -> None:
     def path(T_s: float) -> Array:
@@ -37,6 +38,7 @@ def test_runs_are_cut_where_they_move(monkeypatch: pytest.MonkeyPatch) -> None:
     assert abs(x_d[cuts[0] + 1] - x_d[cuts[0]]) == np.abs(np.diff(x_d[580:680])).max()
 
 
+@pytest.mark.slow
 def test_a_changed_plant_is_relearned_as_from_nothing() -> None:
     machine = load_machine("spring_mass_damper")
     changed = conditions._scaled(machine.new_plant(), {"k": 1.2})

@@ -27,6 +27,7 @@ def made_run(kind: Kind, n: int, peak: int | None = None) -> Run:
     return Run(kind, t, x_d, x_d + 1e-5, x, x, x_d, x_h, np.full(n, 1e-6), state, T_s=1e-3, Np=100)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [6000, 60_000])
 def test_a_prediction_hides_and_cuts_nothing(n: int, tmp_path: Path) -> None:
     with figures_drawn() as drawn:
@@ -50,6 +51,7 @@ def test_of_60_000_samples_few_are_drawn_and_every_peak(peak: int, tmp_path: Pat
     assert np.nanmin(np.asarray(hybrid.get_ydata(), dtype=np.float64)) < -4900.0
 
 
+@pytest.mark.slow
 def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
     run = made_run(COMPENSATOR, 3000)
     several = {"off": run, "physics": run, "hybrid_cold": run, "hybrid_warm": run}

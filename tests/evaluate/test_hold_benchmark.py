@@ -14,6 +14,7 @@ EACH_KIND = ("cnc_a_axis1", "cnc_a_capture", "xl330_kp100_raw_jitter")
 """A recording of each device and reader; of all recordings at night."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "log",
     [pytest.param(log, id=log.stem, marks=[] if log.stem in EACH_KIND else [pytest.mark.nightly]) for log in LOGS],

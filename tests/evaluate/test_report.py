@@ -150,6 +150,7 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         Report("a", "b").write(tmp_path / "nowhere" / "report.html")
 
 
+@pytest.mark.slow
 def test_charts_for_print_are_one_column_wide_a_page_each(tmp_path: Path) -> None:
     t = np.arange(50_000) * 1e-3
     band = Line("band", t, -np.ones(len(t)), "#010203", upper=np.ones(len(t)), panel=1)

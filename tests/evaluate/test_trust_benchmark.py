@@ -58,6 +58,7 @@ def test_paths_begin_and_end_at_rest() -> None:
         assert np.abs(np.diff(x_d)[[0, -1]]).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_errors_of_a_drive(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     case = simulated("short", paper_machine("spring_mass_damper"), short_staircase()[:2500])
     row = replayed(case)

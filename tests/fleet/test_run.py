@@ -85,6 +85,7 @@ def test_rows_are_those_of_single_replays(folder: Path) -> None:
     assert sorted(row["key"] for row in stored) == sorted(row["key"] for row in found.rows)
 
 
+@pytest.mark.slow
 def test_what_is_unchanged_is_left_alone(folder: Path) -> None:
     first = {row["url"]: row for row in run(folder).rows}
     again = run(folder, idle=True)
@@ -129,6 +130,7 @@ def test_a_run_that_was_killed_goes_on(folder: Path, monkeypatch: pytest.MonkeyP
     assert len(keys) == len(set(keys)) == 5
 
 
+@pytest.mark.slow
 def test_a_fit_is_that_of_fit(folder: Path) -> None:
     source = folder / "logs" / "mill" / DAYS[0]
     settings = FleetSettings(Np=20, fmus=False)
@@ -157,6 +159,7 @@ def test_axes_of_a_log(folder: Path) -> None:
     assert [row["axis"] for row in run(folder, source=str(path), unit="mm", axes=("Z1",)).rows] == ["Z1"]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 @pytest.mark.parametrize("kind", ["memory", "s3"])
 def test_an_object_store_gives_the_same(folder: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:

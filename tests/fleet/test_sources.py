@@ -82,6 +82,7 @@ def test_memory() -> None:
     store("memory://fleet")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_s3(monkeypatch: pytest.MonkeyPatch) -> None:
     with s3_server(monkeypatch, "fleet") as bucket:

@@ -38,6 +38,7 @@ def bill_in(path: Path) -> dict[str, Any]:
     return dict(json.loads(text))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["HybridPredictor", "HybridPredictorFmi3"])
 def test_the_bill_of_a_native_fmu(fmus: BuiltFmus, name: str) -> None:
     assert name in NATIVE + FMI3

@@ -44,6 +44,7 @@ def test_a_state_is_reused_in_place_and_freeing_nothing_is_fine(fmu: Library) ->
     fmu.FreeInstance(component)
 
 
+@pytest.mark.slow
 def test_damaged_truncated_and_foreign_states_are_refused(fmu: Library, folders: Callable[[str], Path]) -> None:
     component = component_in(fmu, "stepping")
     steps(fmu, component, 0, 230)

@@ -56,6 +56,7 @@ def test_all_values_are_the_same_bit_for_bit(twins: tuple[FmuInstance, FmuInstan
     assert rows == drive(old, range(700))
 
 
+@pytest.mark.slow
 def test_a_whole_closed_loop_is_the_same_bit_for_bit(fmus: BuiltFmus) -> None:
     runs = [
         cosimulate(fmus(f"SepCompensator{suffix}"), fmus(f"FeedDrive{suffix}"), staircase()) for suffix in ("Fmi3", "")
@@ -65,6 +66,7 @@ def test_a_whole_closed_loop_is_the_same_bit_for_bit(fmus: BuiltFmus) -> None:
     assert new == old
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twins", ["HybridPredictorFmi3", "SepCompensatorFmi3", "FeedDriveFmi3"], indirect=True)
 def test_a_state_saved_between_two_samples_goes_on_as_the_twin_does(twins: tuple[FmuInstance, FmuInstance]) -> None:
     """Steps of 0.3 T_s, so that the state is saved and restored in mid-sample."""

@@ -167,6 +167,7 @@ def test_names_of_platforms() -> None:
         expanded(("sparc",))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
 @pytest.mark.parametrize(
     "target",

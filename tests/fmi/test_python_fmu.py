@@ -140,6 +140,7 @@ def test_interface_of_the_plants(python_fmu: Fmu, name: str, parameters: set[str
         assert by_causality == {"input": {"x_d"}, "output": {"x", "v", "x_meas"}, "parameter": parameters}
 
 
+@pytest.mark.slow
 def test_different_fmus_and_instances_in_one_process(python_fmu: Fmu, tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     smaller = machine.model_copy(update={"predictor": machine.predictor.model_copy(update={"Np": 60, "p": 20})})

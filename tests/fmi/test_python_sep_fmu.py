@@ -109,6 +109,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
     assert "HybridPredictor.x_d" not in page
 
 
+@pytest.mark.slow
 def test_the_reference_result_is_what_the_fmu_gives(compensator: FmuInstance) -> None:
     with zipfile.ZipFile(compensator.path) as archive:
         description = json.loads(archive.read("resources/machine.json"))
@@ -155,6 +156,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) -> None:
     predictor = MACHINE.new_predictor()
     predictor.predict(np.linspace(0, 1e-3, 50))

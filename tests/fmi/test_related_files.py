@@ -64,6 +64,7 @@ def test_the_rules_find_damages(fmus: BuiltFmus) -> None:
     assert findings({**files, f"{FOLDER}/other.csv": b""}) == [f"{FOLDER}/other.csv is not named"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUN)
 def test_fmpy_reruns_the_experiment_to_the_stated_tolerance(fmus: BuiltFmus, tmp_path: Path, name: str) -> None:
     """From the manifest alone, as a tool would that knows nothing of the FMU."""

@@ -71,6 +71,7 @@ def test_table_1_is_found_within_its_deviations(axis: str, seed: int) -> None:
             assert abs(estimate.value - getattr(mode, name)) < 3.5 * estimate.std
 
 
+@pytest.mark.slow
 def test_deviations_are_those_of_repetitions() -> None:
     truth = ModalModel([Mode(30.0, 0.05, (60 * np.pi) ** 2, 10.0)])
     G = truth.frequency_response(OMEGA[::5])
@@ -95,6 +96,7 @@ def two_modes() -> ModalModel:
     return ModalModel([Mode(35.0, 0.3, 0.9 * (70 * np.pi) ** 2), Mode(80.0, 0.05, 0.1 * (160 * np.pi) ** 2)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 20])
 def test_errors_of_single_lines_are_no_modes(seed: int) -> None:
     """Noise alike at all lines, where the response is small: once eight undamped modes, each on one line."""
@@ -107,6 +109,7 @@ def test_errors_of_single_lines_are_no_modes(seed: int) -> None:
     assert "is not significantly above 0: the mode may be one line's error" in " ".join(given.findings)
 
 
+@pytest.mark.slow
 def test_friction_in_a_swept_sine_is_no_mode() -> None:
     truth, T_s = ModalModel([Mode(35.0, 0.3, (70 * np.pi) ** 2)]), 1e-3
     t = np.arange(10_000) * T_s
@@ -151,6 +154,7 @@ def test_vector_fitting_reflects_unstable_poles() -> None:
     assert poles.real.max() < 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_table_1_from_a_swept_sine(axis: str) -> None:
     """60 s, 1 % noise: the response within 1.2 %, every mode within 0.2 Hz."""
@@ -202,6 +206,7 @@ def test_what_trains_nothing_is_refused() -> None:
         identify_frequency_response(F, 1 / (1 + 0.01j * OMEGA), n_modes=0)
 
 
+@pytest.mark.slow
 def test_findings_tell_of_gain_and_modes_outside() -> None:
     truth = ModalModel([Mode(20.0, 0.1, 0.5 * (40 * np.pi) ** 2), Mode(300.0, 0.1, 0.2 * (600 * np.pi) ** 2)])
     found = identify_frequency_response(F, noisy(truth.frequency_response(OMEGA), 0.001, 0))
@@ -237,6 +242,7 @@ def test_text_files_of_responses(tmp_path: Path, header: str, columns: tuple[Arr
     assert (std is not None) == ("std" in header)
 
 
+@pytest.mark.slow
 def test_complex_vectors_of_a_matlab_file(tmp_path: Path) -> None:
     path = tmp_path / "frf.mat"
     io.savemat(path, {"f": F[:50], "H": G_FILE})

@@ -56,6 +56,7 @@ def test_a_measured_phase_is_drawn_beside_the_model(tmp_path: Path) -> None:
     assert sum(len(np.asarray(line.get_xdata())) == 200 for line in figure.axes[1].get_lines()) == 2
 
 
+@pytest.mark.slow
 def test_nothing_is_cut_off_or_hidden(klipper: Figure, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     x_d = np.cumsum(np.repeat(rng.choice([-1e-5, 0.0, 1e-5], 20), 150))

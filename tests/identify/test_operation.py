@@ -45,6 +45,7 @@ def test_a_lag_as_a_mode_is_exact() -> None:
     np.testing.assert_allclose(G, 0.9 / (1 + 5e-3j * omega), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_lag_with_dead_time_is_found() -> None:
     x_d = moves(2000)
     found = identify_operation([(x_d, measured(LAG, x_d, "zoh", 1e-6))], T_S)
@@ -79,6 +80,7 @@ def test_two_modes_are_found_with_a_gain() -> None:
     assert difference(found, truth, "foh", x_d) < 2e-6
 
 
+@pytest.mark.slow
 def test_a_recording_that_starts_in_motion_is_used() -> None:
     x_d = moves(2000)
     x = measured(SECOND, x_d, "foh", 1e-6)
@@ -98,6 +100,7 @@ def rubbed(x_d: Array, friction: float) -> Array:
     return np.asarray(x_d - friction * z)
 
 
+@pytest.mark.slow
 def test_friction_is_no_slow_part_of_the_model() -> None:
     """A lag of 35 Hz became a mode of 4.8 Hz with ζ = 4 and a zero that cancels its slow pole."""
     x_d = moves(5000)
@@ -126,6 +129,7 @@ def test_slow_parts_that_cancel() -> None:
     assert slow_parts([Mode(f_n, zeta, gain, 0.0)]) == []
 
 
+@pytest.mark.slow
 def test_lag_and_dead_time_that_cannot_be_told_apart() -> None:
     """A slow command tells their sum alone; the moves tell each."""
     t = T_S * np.arange(6000)
@@ -147,6 +151,7 @@ def test_a_mode_that_the_log_does_not_resolve_is_not_chosen() -> None:
     assert all(mode.zeta >= 1.0 or mode.f_n <= 0.25 / T_S for mode in found.model.modes)
 
 
+@pytest.mark.slow
 def test_a_drive_beyond_its_bandwidth_has_no_wrong_sign() -> None:
     """There it moves against its command; a correlation of -0.7 was taken for a flipped sign."""
     t = T_S * np.arange(4000)
@@ -158,6 +163,7 @@ def test_a_drive_beyond_its_bandwidth_has_no_wrong_sign() -> None:
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_pieces_of_a_long_recording_are_no_starts() -> None:
     """Of more than 60 000 samples the liveliest pieces are fitted to, and those begin anywhere."""
     x_d = np.concatenate([0.01 * i + moves(2000) for i in range(35)])
@@ -167,6 +173,7 @@ def test_the_pieces_of_a_long_recording_are_no_starts() -> None:
     assert "starts in motion" not in " ".join(found.findings)
 
 
+@pytest.mark.slow
 def test_a_recording_that_rests_most_of_the_time_is_used() -> None:
     x_d = np.concatenate((np.zeros(3000), moves(600), np.full(3000, moves(600)[-1])))
     x = measured(LAG, x_d, "zoh", 1e-6)
@@ -175,6 +182,7 @@ def test_a_recording_that_rests_most_of_the_time_is_used() -> None:
     assert value(found, "lag.tau")[0] == pytest.approx(8e-3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_pieces_between_gaps_count_together() -> None:
     x_d = moves(2000)
     x = measured(SECOND, x_d, "foh", 1e-6)
@@ -183,6 +191,7 @@ def test_pieces_between_gaps_count_together() -> None:
     assert found.n_samples == 1900
 
 
+@pytest.mark.slow
 def test_missing_measurements_are_left_out() -> None:
     """What is interpolated over a stretch in motion is wrong by up to millimetres."""
     x_d = moves(3000)
@@ -204,6 +213,7 @@ def test_missing_measurements_are_left_out() -> None:
     assert bridged.rms > 3 * found.rms
 
 
+@pytest.mark.slow
 def test_pieces_of_few_samples_do_no_harm() -> None:
     x_d = moves(3000)
     x = measured(SECOND, x_d, "foh", 1e-6)
@@ -243,6 +253,7 @@ def test_an_offset_is_no_part_of_the_model() -> None:
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
 
 
+@pytest.mark.slow
 def test_the_static_gain_may_be_given() -> None:
     x_d = moves(1500)
     x = 0.9 * measured(SECOND, x_d, "foh", 1e-6)
@@ -257,6 +268,7 @@ def test_the_static_gain_may_be_given() -> None:
     assert unit.rms > 10 * free.rms
 
 
+@pytest.mark.slow
 def test_deviations_hold_for_a_residual_that_is_not_white() -> None:
     x_d = moves(3000)
     x = measured(LAG, x_d)
@@ -291,6 +303,7 @@ def test_what_trains_nothing_is_refused(x_d: Array, x: Array, reason: str) -> No
         identify_operation([(x_d, x)], T_S)
 
 
+@pytest.mark.slow
 def test_too_little_motion_gives_a_gain_of_one() -> None:
     x_d = moves(1500) * 2e-4
     found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 5e-7))], T_S)

@@ -32,6 +32,7 @@ def swept(first: float, last: float, f_n: float, zeta: float, *, dead_time: int 
 RANGES = [(0.5, 80.0), (5.0, 80.0), (20.0, 100.0), (0.1, 30.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("band", RANGES)
 @pytest.mark.parametrize("f_n", [10.0, 30.0, 60.0])
 @pytest.mark.parametrize("zeta", [0.2, pytest.param(0.45, marks=pytest.mark.nightly)])

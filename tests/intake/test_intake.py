@@ -45,6 +45,7 @@ def test_a_good_log_is_not_accused(name: str) -> None:
         assert check(log).findings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPOILED)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_found_and_named(name: str, fault: str) -> None:
@@ -66,6 +67,7 @@ def test_a_fault_is_found_and_named(name: str, fault: str) -> None:
     assert set(names(found)) <= {expected, "gaps"} if expected == "time order" else names(found) == [expected]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault", [fault for fault, (name, _) in FAULTS.items() if name != HOPELESS and not fault.endswith("late")]
 )
@@ -93,6 +95,7 @@ def test_one_column_for_both_positions_is_found() -> None:
     assert not intake.usable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize("delay", [10.0, 6.5, -8.0])
 def test_a_delay_is_measured_against_the_model(name: str, delay: float) -> None:
@@ -119,6 +122,7 @@ def test_a_resonance_behind_a_servo_is_not_shifted() -> None:
     assert "or another mode, which the log alone cannot tell apart" in intake.findings[0].words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["flipped", "offset of a third", "slow sensor", "five spikes", "10 samples late"])
 @pytest.mark.parametrize("scale", [1e-4, 30.0])
 def test_findings_do_not_depend_on_the_scale(fault: str, scale: float) -> None:
@@ -129,6 +133,7 @@ def test_findings_do_not_depend_on_the_scale(fault: str, scale: float) -> None:
         assert one.name == same.name
 
 
+@pytest.mark.slow
 def test_several_faults_at_once() -> None:
     log = needed("staircase")
     spoiled = log
@@ -208,6 +213,7 @@ def test_missing_measurements_and_rows_are_told_apart() -> None:
     assert np.flatnonzero(np.isnan(fixed.x_meas)).tolist() == [500, 700]
 
 
+@pytest.mark.slow
 def test_words() -> None:
     log = needed("staircase")
 

@@ -141,6 +141,7 @@ def test_what_an_operator_does_in_motion_keeps_the_joints_limits(installed: Path
         assert {0, 1, 3} <= set(np.unique(samples.state[:, axis]))
 
 
+@pytest.mark.slow
 def test_a_sampled_log_is_read_as_it_is(hybridsep: Run, tmp_path: Path) -> None:
     n = 4000
     command = 10.0 * np.sin(2e-3 * np.arange(n))

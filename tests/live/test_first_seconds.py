@@ -45,6 +45,7 @@ def test_wrong_columns_are_said(name: str, ahead: bool) -> None:
     assert said == ([name] if name else [])
 
 
+@pytest.mark.slow
 def test_an_axis_that_rests_is_said_and_a_few_samples_are_not_judged() -> None:
     rest = np.full(20_000, commanded()[0])
     [finding] = found(rest, rest)
@@ -54,6 +55,7 @@ def test_an_axis_that_rests_is_said_and_a_few_samples_are_not_judged() -> None:
     assert [one.name for one in found(np.r_[rest, x_d], np.r_[rest, -x])] == ["sign"]
 
 
+@pytest.mark.slow
 def test_the_command_says_them_and_starts_warm(tmp_path: Path, hybridsep: Run) -> None:
     machine = load_machine("spring_mass_damper")
     predictor = machine.new_predictor()

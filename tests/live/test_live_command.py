@@ -36,6 +36,7 @@ def read(receiver: socket.socket, n: int, found: list[dict[str, Any]]) -> None:
         found.append(json.loads(receiver.recv(65536)))
 
 
+@pytest.mark.slow
 def test_what_plotjuggler_gets_is_the_cosimulation_bit_for_bit(
     run: Cosimulation, fmus: BuiltFmus, tmp_path: Path, hybridsep: Run
 ) -> None:
@@ -75,6 +76,7 @@ def test_what_is_printed(tmp_path: Path, hybridsep: Run) -> None:
     assert "x_d" in out
 
 
+@pytest.mark.slow
 def test_lines_on_standard_input(tmp_path: Path, hybridsep: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     lines = "k,x_d [mm],x_meas [mm]\n" + "".join(f"{k},{k * 1e-3},{k * 1e-3}\n" for k in (*range(150), 149))
     (tmp_path / "lines").write_text(lines)

@@ -99,6 +99,7 @@ def session_token(text: str) -> str:
     return found[1]
 
 
+@pytest.mark.slow
 def test_without_the_token_there_is_nothing(page: Page) -> None:
     for path in ("/", "/?token=", "/?token=wrong", "/metadata", "/autoload.js?bokeh-autoload-element=x", "/ws"):
         status, _, body = fetch(page, path)
@@ -141,6 +142,7 @@ def test_it_is_bound_to_this_machine(page: Page) -> None:
         Page(TITLE, SHOWN, page.port)
 
 
+@pytest.mark.slow
 def test_the_end_is_told_and_the_process_ends() -> None:
     page = Page(TITLE, SHOWN)
     page.take(rows(0, 10), {})  # before it has begun: not shown

@@ -114,6 +114,7 @@ def test_a_replay_agrees_from_the_second_window_on(fmus: BuiltFmus, case: Case) 
     assert difference[NP:].max() < 1e-11
 
 
+@pytest.mark.slow
 def test_a_log_at_its_speed(fmus: BuiltFmus, case: Case, tmp_path: Path) -> None:
     run, late, arrived = case
     log = open_log(write_rows(tmp_path / "log.csv", run.x_d, np.array(arrived)), may_miss=True)

@@ -79,6 +79,7 @@ def test_lines() -> None:
     os.close(reader)
 
 
+@pytest.mark.slow
 def test_mqtt(monkeypatch: pytest.MonkeyPatch) -> None:
     broker = Broker([json.dumps({"k": k, "x_d": 0.0, "x_meas": 1.0}).encode() for k in range(300)])
     monkeypatch.setenv(USER, "ann")
@@ -94,6 +95,7 @@ def test_mqtt(monkeypatch: pytest.MonkeyPatch) -> None:
             come(source, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("broker", "words"),
     [
@@ -131,6 +133,7 @@ def encrypted(broker: Broker) -> LiveSource:
 MESSAGES = [json.dumps({"k": k, "x_d": 0.0, "x_meas": 1.0}).encode() for k in range(50)]
 
 
+@pytest.mark.slow
 def test_mqtt_by_tls(monkeypatch: pytest.MonkeyPatch, authority: Authority) -> None:
     monkeypatch.setenv(CA, str(authority.path))
     monkeypatch.setenv(USER, "ann")
@@ -140,6 +143,7 @@ def test_mqtt_by_tls(monkeypatch: pytest.MonkeyPatch, authority: Authority) -> N
         assert b"ann" in broker.connect
 
 
+@pytest.mark.slow
 def test_mqtt_by_tls_with_a_certificate_of_the_client(monkeypatch: pytest.MonkeyPatch, authority: Authority) -> None:
     certificate, key = authority.issue("client", "a secret")
     for name, value in ((CA, authority.path), (CERTIFICATE, certificate), (KEY, key), (KEY_PASSWORD, "a secret")):
@@ -160,6 +164,7 @@ def test_mqtt_by_tls_with_a_certificate_of_the_client(monkeypatch: pytest.Monkey
         come(source, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # paho's, of the connection that it did not make
 def test_a_broker_that_is_not_trusted(monkeypatch: pytest.MonkeyPatch, authority: Authority, tmp_path: Path) -> None:
     """Signed by nobody whom the system knows, or by another than the one that is named."""

@@ -30,6 +30,7 @@ def test_version_4_of_matlab(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_log(tmp_path / "log.mat").x_d, columns()["x_d"])
 
 
+@pytest.mark.slow
 def test_structs(tmp_path: Path) -> None:
     io.savemat(tmp_path / "log.mat", {"rec": columns(), "name": "axis"})
     with pytest.raises(

@@ -24,6 +24,7 @@ def recording(**changes: Any) -> str:
     return json.dumps(content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "text"),
     [

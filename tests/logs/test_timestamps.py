@@ -137,6 +137,7 @@ def test_midnights_in_blocks_of_any_size(
     np.testing.assert_array_equal(t, (np.array(times) - start) / 1e9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [8000, 4000, 3000, 1000, 1024])
 def test_intervals_at_the_end_of_a_day(tmp_path: Path, rate: int) -> None:
     """Microseconds at the drives' rates, a day after the first sample."""

@@ -233,6 +233,7 @@ def test_the_same_times_in_several_groups(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_log(path).x_meas, X)
 
 
+@pytest.mark.slow
 def test_resampling_takes_constant_memory(tmp_path: Path) -> None:
     peaks = []
     for n in (500_000, 1_000_000):

@@ -245,6 +245,7 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
             predictor_alone.new_compensator()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (1500, 2000, 2)])
 def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int, preview: int, spacing: int) -> None:
     text = COMPENSATED.replace("[compensator]\n", "").replace("Np = 50", f"Np = {Np}")

@@ -32,6 +32,7 @@ def numbers(done: list[Done]) -> list[int]:
     return sorted(one.result[0] for one in done if not one.failure)
 
 
+@pytest.mark.slow
 def test_every_task_once_elsewhere(engine: Engine) -> None:
     done = list(engine.run(squared, [(i, "") for i in range(20)]))
     assert numbers(done) == [i**2 for i in range(20)]
@@ -46,6 +47,7 @@ def test_what_fails_says_why(engine: Engine) -> None:
     assert done[3].result[0] == 9
 
 
+@pytest.mark.slow
 def test_processes_that_end(engine: Engine, tmp_path: Path) -> None:
     deadly = {3: str(tmp_path / "once"), 5: str(tmp_path / "always")}
     done = list(engine.run(squared, [(i, deadly.get(i, "")) for i in range(8)]))
@@ -62,6 +64,7 @@ def test_one_process_is_this_one() -> None:
     assert done[1].failure == "no log"
 
 
+@pytest.mark.slow
 def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     async def waits_in_vain(_: object) -> None:
         await asyncio.sleep(3600)
@@ -73,6 +76,7 @@ def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     until(lambda: not psutil.pid_exists(done.result[1]), 10)
 
 
+@pytest.mark.slow
 def test_engines_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hybridsep.parallel.engine._REACHED", 0.5)
     with (

@@ -30,6 +30,7 @@ BELOW = {"FeedDrive": 1e-11, "FeedDrive_als25010_x": 3e-10, "FeedDrive_als25010_
 NAMES = dict(zip(BELOW, modelica.MODELS.items(), strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["staircase", "spiral"])
 @pytest.mark.parametrize("fmu", BELOW)
 def test_a_drive_in_modelica_moves_as_its_fmu(fmu: str, path: str, fmus: BuiltFmus) -> None:

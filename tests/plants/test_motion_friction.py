@@ -81,6 +81,7 @@ def test_the_error_on_the_x_axis_hardly_depends_on_the_internal_step(monkeypatch
     assert fine > 4e-5
 
 
+@pytest.mark.slow
 def test_both_implementations_move_the_same() -> None:
     values = {**STAGE_DRIVE, "friction_on": 1, "noise_std": 0.0}
     core = CModel("stage_drive", values)

@@ -112,6 +112,7 @@ def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time:
             assert core["x"] == pytest.approx(plant.x, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f_n", [25.0, 500.0, 2000.0, 5000.0])
 def test_fast_modes_are_resolved(f_n: float) -> None:
     x_d = staircase()[:300]

@@ -69,6 +69,7 @@ def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> Non
             look_ahead.sample(0.0, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive"])
 def test_whatever_a_state_holds_outputs_are_finite(name: str) -> None:
     small = {"Np": 10, "p": 4, "q": 2, "preview": 24, "T_s": TS, "t_init": 0.01}

@@ -37,6 +37,7 @@ def replayed() -> tuple[Array, Array, Array]:
 
 
 class TestStaircase:
+    @pytest.mark.slow
     def test_equals_the_oracle(self) -> None:
         x_pb, x_h, active = replayed()
         slow = oracle.run(NUMERATOR, DENOMINATOR, staircase.commanded(), staircase.measured(0), **PAPER)
@@ -45,6 +46,7 @@ class TestStaircase:
         np.testing.assert_array_equal(active, slow.active)
         assert active.sum() == 6001 - 300
 
+    @pytest.mark.slow
     def test_equals_the_oracle_elsewhere_on_the_axis(self) -> None:
         x_d, x = staircase.commanded() + 0.1, staircase.measured(0) + 0.1
         _, x_h, _ = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, trust=False)), x_d, x)

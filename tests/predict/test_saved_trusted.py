@@ -77,6 +77,7 @@ def test_before_anything_is_learned(samples: int) -> None:
     assert twin.to_bytes() == predictor.to_bytes()
 
 
+@pytest.mark.slow
 def test_with_dead_time_first_order_hold_and_a_restart() -> None:
     x_d, x = signals()
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 4)

@@ -177,6 +177,7 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * largest < 1e-4
 
 
+@pytest.mark.slow
 def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
     x_d = cycles(12 * PERIOD)
     x_pb, changed = physics(x_d), 6 * PERIOD

@@ -38,6 +38,7 @@ def cold_and_warm(name: str, x_d: Array, noise_std: float) -> tuple[float, float
     return cold, rms_um(predictor, x_d, Encoder(noise_std, 1000).measure_all(x))
 
 
+@pytest.mark.slow
 def test_staircase() -> None:
     """Noise: 5 µm; the physics model alone: 33.8 µm."""
     cold, warm = cold_and_warm("spring_mass_damper", staircase(), 5e-6)

@@ -164,6 +164,7 @@ def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:
     return [coverage(x - result.x_h, result.x_h_std, level) for level in LEVELS]
 
 
+@pytest.mark.slow
 def test_a_warm_run_over_the_staircase_covers_at_each_third_of_the_window() -> None:
     machine = load_machine("spring_mass_damper")
     x_d = staircase()

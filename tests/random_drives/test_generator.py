@@ -46,6 +46,7 @@ def simulated(recipes: list[Recipe], commands: list[Array], **changes: Any) -> l
     return simulate([recipe.true.model for recipe in recipes], disturbances, commands)
 
 
+@pytest.mark.slow
 def test_shape(drives: list[RandomDrive]) -> None:
     for drive in drives:
         assert 6000 <= len(drive.x_d) <= 10000
@@ -56,6 +57,7 @@ def test_shape(drives: list[RandomDrive]) -> None:
         assert drive.x_d[1] == drive.x_d[0]
 
 
+@pytest.mark.slow
 def test_a_drive_does_not_depend_on_the_others(drives: list[RandomDrive]) -> None:
     alone = random_drive(57, SEED)
     for name in ("x_d", "x", "x_meas"):
@@ -63,6 +65,7 @@ def test_a_drive_does_not_depend_on_the_others(drives: list[RandomDrive]) -> Non
     assert (alone.model, alone.text) == (drives[2].model, drives[2].text)
 
 
+@pytest.mark.slow
 def test_a_position_does_not_depend_on_the_number_of_others(recipes: list[Recipe]) -> None:
     commands = [recipe.x_d[: 200 + recipe.index] for recipe in recipes]
     together = simulated(recipes, commands)
@@ -82,6 +85,7 @@ def test_other_seeds_are_other_drives(recipes: list[Recipe]) -> None:
     assert recipes[0].true != Recipe.draw(0, SEED + 1).true
 
 
+@pytest.mark.slow
 def test_a_linear_drive_is_its_modal_model(recipes: list[Recipe]) -> None:
     some = recipes[:12]
     commands = [recipe.x_d[:1500] for recipe in some]
@@ -97,6 +101,7 @@ def test_a_linear_drive_is_its_modal_model(recipes: list[Recipe]) -> None:
         assert np.abs(position - x_d[0] - response).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_every_drive_comes_to_rest(recipes: list[Recipe]) -> None:
     """No nonlinearity feeds energy into a drive: after a move it vibrates no more than the linear one."""
     x_d = rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=1.0)
@@ -116,6 +121,7 @@ def test_friction_takes_energy_out_of_a_vibration() -> None:
     assert abs(damped[-100:].mean() - 1e-3) <= 1.3 * friction.coulomb + 1e-9  # it sticks within the friction
 
 
+@pytest.mark.slow
 def test_sub_steps_are_short_enough(recipes: list[Recipe]) -> None:
     some = recipes[:40]
     commands = [recipe.x_d[400:800] for recipe in some]

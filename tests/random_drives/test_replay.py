@@ -41,6 +41,7 @@ def diverging(predictor: str, model: ModalModel, settings: PredictorSettings, x_
     return x_meas + np.linspace(0.0, 1.1, len(x_d))
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_backtest(drive: RandomDrive) -> None:
     result = replay(drive, "paper")
     scores = backtest(HybridPredictor(drive.model, PredictorSettings(trust=False)), drive.x_d, drive.x_meas)

@@ -76,6 +76,7 @@ def test_a_drive_does_not_depend_on_the_others(drives: list[Drive]) -> None:
     assert np.array_equal(again.x_meas, alone.x_meas)
 
 
+@pytest.mark.slow
 def test_distributions(recipes: list[Recipe]) -> None:
     assert {recipe.kind for recipe in recipes} == set(KINDS)
     assert {round(1 / recipe.axis.T_s) for recipe in recipes} == set(RATES)

@@ -135,6 +135,7 @@ def faulty(k: int, x_meas: float, last: float) -> float:
     return x_meas + (2e-4 if k > 2300 else 0.0)
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("values", [{}, {"Np": 30, "p": 7, "q": 1}], ids=named)
 def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
@@ -149,6 +150,7 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
     assert not closed_loop(new_stream.model, 2850, {}).column(PREDICTOR, "n_rejected").any()  # without trust
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
@@ -198,6 +200,7 @@ def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, val
     assert_agreement(new_stream, 800, values, 1e-9)
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.1, pytest.param(0.0, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
@@ -232,6 +235,7 @@ def test_every_parameter_compensates_with_trust_as_in_the_library(
     assert_agreement(new_stream, 150 if values.get("Np") == 2 else 750, values, 1e-9)
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -253,6 +257,7 @@ def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamM
     assert_agreement(new_stream, 800, values, 1e-9, start=start, delay=delay)
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 def test_late_and_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
     values: dict[str, Value] = {"p": 20, "measurement_delay": 5}
@@ -261,6 +266,7 @@ def test_late_and_faulty_measurements_are_compensated_as_by_the_library(new_stre
     assert loop.column(COMPENSATOR, "n_rejected")[-1] > 100
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
     loop = assert_agreement(new_stream, 2500, {"p": 20}, 1e-9, sensor=faulty)
@@ -272,6 +278,7 @@ def slow(k: int, x_meas: float, last: float) -> float:
     return last + min(max(x_meas - last, -7e-5), 7e-5)  # a motor that does not get beyond 70 of 80 mm/s
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 def test_a_plan_that_runs_away_ends_the_hybrids_plans(new_stream: StreamMaker) -> None:
     values: dict[str, Value] = {"p": 10, "change_max": 2e-4}

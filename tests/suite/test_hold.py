@@ -34,6 +34,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     return x_d, x
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR, COMPENSATOR), alike=(NATIVE,))
 @pytest.mark.parametrize(
     "more",

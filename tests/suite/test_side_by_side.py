@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 
+import pytest
 from driving import SHORT, T_S, set_inputs, steps
 from stream import (
     COMPENSATOR,
@@ -36,6 +37,7 @@ def instances_of(model: str) -> list[tuple[str, dict[str, Value], float]]:
     ]
 
 
+@pytest.mark.slow
 @on_all((*LOOK_AHEADS, *PLANTS))
 def test_instances_side_by_side_do_what_each_does_alone(new_stream: StreamMaker) -> None:
     kinds = instances_of(new_stream.model)
@@ -60,6 +62,7 @@ def test_instances_side_by_side_do_what_each_does_alone(new_stream: StreamMaker)
     assert len({str(row) for row in rows}) == len(kinds)
 
 
+@pytest.mark.slow
 @on_all(LOOK_AHEADS)
 def test_threads_with_an_instance_each(new_stream: StreamMaker) -> None:
     values = SHORT[new_stream.model]

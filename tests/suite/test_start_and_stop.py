@@ -52,6 +52,7 @@ def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> No
         stream.step(t, T_S)
 
 
+@pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
     loop, stream = closed_loop(new_stream.model, 700), new_stream()

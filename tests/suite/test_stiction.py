@@ -47,6 +47,7 @@ def of_library(Np: int) -> dict[str, Array]:
     return shown(LookAheadStream(PREDICTOR), "to and fro", Np)[0]
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("Np", [20, 100])
 def test_a_servo_with_stiction_is_predicted_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:

@@ -72,6 +72,7 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
         assert loop.column(model, "rms_e")[-1] < 5.5e-6  # the encoder's noise is 5 µm
 
 
+@pytest.mark.slow
 @on_adapters((COMPENSATOR,))
 def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, led: Path) -> None:
     """Its counterpart doubts it, and has a part in the plans."""
@@ -103,6 +104,7 @@ def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMake
         assert [row[OUTPUTS[model].index(name)] for row in shown[first : first + len(expected)]] == expected
 
 
+@pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker, weights: Trained) -> None:
     stream, other = (new_stream(weights=weights(new_stream.model)) for _ in range(2))

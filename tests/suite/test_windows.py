@@ -71,6 +71,7 @@ def directly_solved(n: int) -> Array:
     return np.array(oracle.run(numerator, denominator, loop.r[:-100], loop.x[100:], **settings).x_h)
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
     shown = shown_by(new_stream, 4001, {})
@@ -78,6 +79,7 @@ def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream
     assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(4001))) < tolerance
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,))
 @pytest.mark.parametrize(("preview", "start"), [(200, 0.0), (170, 0.1)])
 def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker, preview: int, start: float) -> None:
@@ -162,6 +164,7 @@ def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream
     np.testing.assert_array_equal(first, second)
 
 
+@pytest.mark.slow
 @on_all(LOOK_AHEADS)
 @pytest.mark.parametrize("t_init", [0.05, 0.25])
 def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker, t_init: float) -> None:

@@ -45,6 +45,7 @@ def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
     assert len(set(tried)) == len(tried)
 
 
+@pytest.mark.slow
 def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     recordings = ringing()
     settings = settings_for(40, 1e-3, "zoh")
@@ -60,6 +61,7 @@ def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     assert choose_settings(MODEL, spoiled, settings).settings == choice.settings
 
 
+@pytest.mark.slow
 def test_errors_over_the_window() -> None:
     recordings, settings = ringing(), settings_for(40, 1e-3, "zoh")
     scores = window_scores(MODEL, recordings, settings)

@@ -36,6 +36,7 @@ def test_losses_are_those_of_a_replay_without_its_first_window() -> None:
     np.testing.assert_allclose([losses.rms_pb, losses.rms_hold, losses.rms_h], expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, FIRST])
 def test_both_figures_are_said(hybridsep: Run, tmp_path: Path, first: int) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[first:2000], measured(0)[first:2000])

@@ -17,6 +17,7 @@ LOGS: Logs = {"one": [small_signals(300)], "two": [small_signals(130, seed=1), s
 CANDIDATES = [PredictorSettings(Np=20, p=p, q=1, trust=False) for p in (2, 5)]
 
 
+@pytest.mark.slow
 def test_engines_give_the_same_losses() -> None:
     candidates = [*CANDIDATES, PredictorSettings(Np=20, p=2, q=1)]
     here = tune(MODEL, LOGS, candidates)

@@ -16,6 +16,7 @@ from hybridsep.tune.figures import tuning_figure
 from hybridsep.tune.joint import Tuning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("Np", [50, 100, 400])
 @pytest.mark.parametrize("names", [("p",), ("p", "q"), ("p", "q", "lam")])
 def test_no_label_is_cut_off(Np: int, names: tuple[str, ...], tmp_path: Path) -> None:
