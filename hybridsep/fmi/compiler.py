@@ -218,6 +218,7 @@ def compiler_for(target: str) -> Compiler:
 def compiled(
     jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
     on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
+    on_library: Callable[[tuple[str, str], bytes], object] = lambda _job, _content: None,
 ) -> dict[tuple[str, str], bytes]:
     """Compile and link ``all.c`` into stripped shared libraries, always as many as there are processors.
 
@@ -227,12 +228,15 @@ def compiled(
         (name of the library, key of :data:`TARGETS`) → its compiler, and its sources by file name.
     on_job : callable, optional
         Called with each key when its compilation begins.
+    on_library : callable, optional
+        Called with each key and its library when it is there, also where a later one fails or is interrupted.
 
     Raises
     ------
     FmuError
         If a compiler refuses.
     """
+    made: dict[tuple[str, str], bytes] = {}
     with TemporaryDirectory() as place:
         commands = []
         for (name, target), (compiler, sources) in jobs.items():
@@ -246,12 +250,15 @@ def compiled(
             output = f"{name}{TARGETS[target].suffix}"
             commands.append(([*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags], folder))
         keys = list(jobs)
-        for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i])).items():
+
+        def take(i: int) -> None:
+            name, target = keys[i]
+            made[keys[i]] = (commands[i][1] / f"{name}{TARGETS[target].suffix}").read_bytes()
+            on_library(keys[i], made[keys[i]])
+
+        for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i]), take).items():
             if status != 0:
                 (name, target), (arguments, _) = keys[i], commands[i]
                 said = f"{' '.join(arguments)}\n{complaint.strip()}"
                 raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
-        return {
-            (name, target): (folder / f"{name}{TARGETS[target].suffix}").read_bytes()
-            for (name, target), (_, folder) in zip(keys, commands, strict=True)
-        }
+    return {key: made[key] for key in jobs}

@@ -67,7 +67,7 @@ def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
 def library_paths(
     wanted: Sequence[Library], on_library: Callable[[Library], object] = lambda _wanted: None
 ) -> dict[Library, Path]:
-    """Return the files of libraries; those that are not there are compiled and kept.
+    """Return the files of libraries; those that are not there are compiled, and each is kept as soon as it is there.
 
     Parameters
     ----------
@@ -82,13 +82,14 @@ def library_paths(
     """
     compilers = {target: compiler_for(target) for _, target in missing(wanted)}
     jobs = {(kind, target): (compilers[target], _sources(kind)) for kind, target in missing(wanted)}
-    made = compiled(jobs, on_library)
-    for library, content in made.items():
+
+    def keep(library: Library, content: bytes) -> None:
         place = _place(compilers[library[1]].name, library)
         place.parent.mkdir(parents=True, exist_ok=True)
         with written_whole(place) as file:
             file.write(content)
-    if made:
+
+    if compiled(jobs, on_library, keep):
         _forget_old_versions()
     return {library: kept(library) or _place(compiler_for(library[1]).name, library) for library in wanted}
 

@@ -22,7 +22,9 @@ _PAUSE = 0.02
 
 
 def run_together(
-    commands: Sequence[tuple[Sequence[str], Path]], on_start: Callable[[int], object] = lambda _i: None
+    commands: Sequence[tuple[Sequence[str], Path]],
+    on_start: Callable[[int], object] = lambda _i: None,
+    on_success: Callable[[int], object] = lambda _i: None,
 ) -> dict[int, tuple[int, str]]:
     """Run commands, each in its folder, always as many as there are processors.
 
@@ -31,6 +33,8 @@ def run_together(
     commands : sequence of pairs
     on_start : callable, optional
         Called with the number of each command, from 0, before it starts.
+    on_success : callable, optional
+        Called with the number of each command that has ended with status 0.
 
     Returns
     -------
@@ -52,6 +56,7 @@ def run_together(
                 results[i] = _taken(*running.pop(i))
                 if results[i][0] != 0:
                     return results
+                on_success(i)
             if not ended:
                 time.sleep(_PAUSE)
         return results

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -131,6 +132,22 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
     assert all(path.is_relative_to(without / "kept") for library, path in paths.items() if library in began)
     assert library_paths(wanted, began.append) == paths
     assert len(began) == 4
+
+
+def test_a_library_is_kept_where_a_later_one_is_interrupted(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w')"
+    monkeypatch.setattr(module, "compiler_for", lambda target: Compiler((sys.executable, "-c", program), ZIG))
+    monkeypatch.setattr("hybridsep.fmi.compiler._understands", lambda command, flag: False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    wanted = [("FeedDrive", target) for target in ALL_TARGETS[:3]]
+
+    def interrupt_at_the_third(library: tuple[str, str]) -> None:
+        if library == wanted[2]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        library_paths(wanted, interrupt_at_the_third)
+    assert [kept(library) is not None for library in wanted] == [True, True, False]
 
 
 def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
