@@ -20,10 +20,9 @@ from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
-from hybridsep.fmi.description import fmu_description
+from hybridsep.fmi.fmu import table_of
 from hybridsep.fmi.tables import grouped_table
 from hybridsep.fmi.terminals import TERMINALS
-from hybridsep.fmi.variables import shown_variables
 from hybridsep.machines.machine import Machine
 
 __all__ = ["FMUS", "pages"]
@@ -168,7 +167,7 @@ def fmu_variables() -> str:
     ]
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]
-        for heading, rows in grouped_table(shown_variables(fmu_description(machine, model, model))).items():
+        for heading, rows in grouped_table(table_of(machine, model, model).shown).items():
             cells = ((f"`{name}`", kind, start, allowed, meaning) for name, kind, _, start, allowed, meaning in rows)
             parts += [f"**{heading}**", _table(("name", "type, unit", "start", "range", "meaning"), cells)]
     types = (

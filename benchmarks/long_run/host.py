@@ -6,12 +6,12 @@ import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep.fmi.c_sources import fmi_headers
+from hybridsep.fmi.fmu import table_of
 from hybridsep.fmi.native_flavour import sources
 from hybridsep.machines.paper import paper_machine
 
@@ -44,11 +44,8 @@ class Host:
     def __init__(self, folder: Path, compiler: list[str], flags: list[str]) -> None:
         self.folder, self.program = folder, folder / "long_run"
         machine = paper_machine("spring_mass_damper")
-        mode = machine.model.modes[0]
-        description: dict[str, Any] = {"model": "HybridPredictor", "name": "HybridPredictor"}
-        description["parameters"] = machine.fmi_parameters()
-        description["modes"] = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}]
-        for file, content in (sources(description, "{long run}") | fmi_headers()).items():
+        table = table_of(machine, "HybridPredictor", "HybridPredictor")
+        for file, content in (sources(table, "{long run}") | fmi_headers()).items():
             (folder / file).write_bytes(content)
         (folder / "all.c").unlink()  # what main.c calls has internal linkage there
         files = [f"-I{folder}", str(MAIN), *map(str, folder.glob("*.c")), "-lm", "-o", str(self.program)]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 
-from c_core import DESCRIPTIONS, CModel, RefusedError
+from c_core import TABLES, CModel, RefusedError
 
 from benchmarks.random_drives.replay import PREDICTORS
 from hybridsep.base.errors import SignalError
@@ -39,8 +39,8 @@ def core_outputs(
     used = PREDICTORS[predictor](settings)
     Np, n, modes = used.Np, len(x_d), model.modes
     name = f"predictor of {len(modes)} modes"
-    any_modes = DESCRIPTIONS["predictor"]["modes"] * len(modes)
-    DESCRIPTIONS.setdefault(name, {**DESCRIPTIONS["predictor"], "modes": any_modes})
+    any_modes = TABLES["predictor"].modes * len(modes)
+    TABLES.setdefault(name, replace(TABLES["predictor"], name=name, modes=any_modes))
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     start |= {**used.to_fmi(), "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
     core = CModel(name, start).initialise()

@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.compiler import compile_flags
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.weights import WEIGHTS_FILE, weights_file
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.feed_drive import FeedDrive
@@ -61,9 +62,8 @@ def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
     """Compile the host with a model of the paper's drive."""
     folder.mkdir()
     mode = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0).modes[0]
-    modes = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
-    description = {"model": model, "name": model, "parameters": parameters, "modes": modes}
-    (folder / "hsep_fmu.h").write_text(c_header(description, "{benchmark}"), encoding="utf-8")
+    table = FmuTable(model, model, parameters, (asdict(mode),))
+    (folder / "hsep_fmu.h").write_text(c_header(table, "{benchmark}"), encoding="utf-8")
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
     sources = [path for part in ("core", "model") for path in sorted((C_SOURCES / part).rglob("*.c"))]

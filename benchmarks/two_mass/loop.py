@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 
-from c_core import COMPENSATOR, DESCRIPTIONS, CModel, RefusedError
+from c_core import TABLES, CModel, RefusedError
 
 from benchmarks.two_mass.axis import Axis
 from benchmarks.two_mass.generator import Recipe
@@ -82,8 +82,8 @@ def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = la
     assert compensator.preview is not None
     modes, late, start = recipe.model.modes, compensator.preview, float(x_d[0])
     name = f"compensator of {len(modes)} modes"
-    any_modes = DESCRIPTIONS["compensator"]["modes"] * len(modes)
-    DESCRIPTIONS.setdefault(name, {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": any_modes})
+    any_modes = TABLES["compensator"].modes * len(modes)
+    TABLES.setdefault(name, replace(TABLES["compensator"], name=name, modes=any_modes))
     values = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     values |= {**predictor.to_fmi(), **compensator.to_fmi(), "dead_time": recipe.model.dead_time}
     assert compensator.limits is not None

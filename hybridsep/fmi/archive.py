@@ -19,11 +19,11 @@ from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..fmi import native_flavour, python_flavour
 from ..machines.machine import Machine
-from .description import fmu_description
 from .flavours import FLAVOURS, FMI_VERSIONS, check_version
+from .fmu import Fmu
 from .warm_start import load_trained
 
-__all__ = ["archived", "build_fmu", "fmu_files", "fmu_name", "fmu_names"]
+__all__ = ["archived", "build_fmu", "fmu_name", "fmu_names"]
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
@@ -135,52 +135,17 @@ def build_fmu(
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
     if embed_weights and (weights is None or flavour != "native"):
         raise FmuError("embed_weights is for a native FMU with weights")
-    how: dict[str, Any] = {} if flavour == "python" else {"targets": targets, "samples": samples, "fmi": fmi}
-    how |= {"embed_weights": True} if embed_weights else {}
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
-        files = fmu_files(machine, model, name, flavour, weights=weights, origin=origin, windows=windows, **how)
+        trained = None if weights is None else load_trained(weights, machine, model)
+        fmu = Fmu.of(machine, model, name, fmi=fmi, samples=samples, trained=trained, origin=origin, windows=windows)
+        if flavour == "native":
+            files = native_flavour.files(fmu, targets=targets, embed_weights=embed_weights)
+        else:
+            files = python_flavour.files(fmu)
         file.write(archived(files))
     return path
-
-
-def fmu_files(
-    machine: Machine,
-    model: str,
-    name: str,
-    flavour: str,
-    *,
-    weights: str | Path | None = None,
-    origin: Mapping[str, Any] | None = None,
-    windows: bool = True,
-    **how: Any,
-) -> dict[str, bytes]:
-    """Return the content of an FMU: archive name → content.
-
-    Parameters
-    ----------
-    machine, flavour, weights, origin, windows
-        As in :func:`build_fmu`.
-    model : str
-        ``HybridPredictor``, ``FeedDrive``, …
-    name : str
-        Model identifier.
-    how
-        Further arguments of the flavour's ``files``.
-
-    Raises
-    ------
-    FmuError, SignalError, StateError
-        As :func:`build_fmu`.
-    """
-    trained = None if weights is None else load_trained(weights, machine, model)
-    description = fmu_description(
-        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None, windows=windows
-    )
-    if flavour == "native":
-        return native_flavour.files(machine, description, trained=trained, origin=origin, **how)
-    return python_flavour.files(machine, description, trained=trained, origin=origin)
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:

@@ -14,21 +14,25 @@ from dataclasses import dataclass
 
 from .angular_units import angular_unit
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, Variable, variables_of
+from .fmu_table import FmuTable
+from .variables import INTERPOLATED, Value, Variable
 
-__all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "kind_of", "layout_of"]
+__all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "layout_of"]
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
-_ANY: Mapping[str, object] = {"parameters": defaultdict(lambda: 1), "modes": [_MODE]}
+_ANY: Mapping[str, Value] = defaultdict(lambda: 1)
 
-KINDS: Mapping[str, Mapping[str, object]] = {
-    "HybridPredictor": {**_ANY, "model": "HybridPredictor"},
-    "SepCompensator": {**_ANY, "model": "SepCompensator"},
-    "FeedDrive": {**_ANY, "model": "FeedDrive", "modes": []},
-    "StageDrive": {**_ANY, "model": "FeedDrive"},
-    "ReferenceTrajectory": {**_ANY, "model": "ReferenceTrajectory", "modes": []},
+KINDS: Mapping[str, FmuTable] = {
+    table.kind: table
+    for table in (
+        FmuTable("HybridPredictor", "", _ANY, (_MODE,)),
+        FmuTable("SepCompensator", "", _ANY, (_MODE,)),
+        FmuTable("FeedDrive", "", _ANY),
+        FmuTable("FeedDrive", "", _ANY, (_MODE,)),
+        FmuTable("ReferenceTrajectory", "", _ANY),
+    )
 }
-"""Kinds of FMU, each with a description that stands for all FMUs of it."""
+"""Kinds of FMU, each with a table that stands for all FMUs of it."""
 
 _MACROS = {
     "HybridPredictor": "HYBRID_PREDICTOR",
@@ -37,12 +41,6 @@ _MACROS = {
     "StageDrive": "STAGE_DRIVE",
     "ReferenceTrajectory": "REFERENCE_TRAJECTORY",
 }
-
-
-def kind_of(description: Mapping[str, object]) -> str:
-    """Return which of :data:`KINDS` an FMU is."""
-    model = str(description["model"])
-    return "StageDrive" if model == "FeedDrive" and description["modes"] else model
 
 
 @dataclass(frozen=True)
@@ -98,15 +96,12 @@ def kind_header(kind: str) -> str:
     return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
 
 
-def c_header(
-    description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0], weights: bytes | None = None
-) -> str:
+def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: bytes | None = None) -> str:
     """Return the header of one FMU, with its table.
 
     Parameters
     ----------
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``, as :func:`hybridsep.fmi.variables.variables_of` reads it.
+    table : FmuTable
     guid : str
         The modelDescription's.
     fmi : {"2", "3"}
@@ -114,14 +109,14 @@ def c_header(
     weights : bytes, optional
         Content of the weights file, with which the FMU starts instead of with the resources' file.
     """
-    name, layout = str(description["name"]), layout_of(variables_of(description))
+    layout = layout_of(table.variables)
     starts = ",\n".join(
         f"    {_double(start)} /* {variable.name} */"
         for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
     )
-    table = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
+    text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
 #ifndef FMI{fmi}_FUNCTION_PREFIX
-#define FMI{fmi}_FUNCTION_PREFIX {name}_
+#define FMI{fmi}_FUNCTION_PREFIX {table.name}_
 #endif
 
 #define HSEP_GUID {_string(guid)}
@@ -142,9 +137,9 @@ static const double hsep_starts[HSEP_N_STARTS] = {{
     .n_variables = HSEP_N_VARIABLES,
     .starts = hsep_starts,
     .guid = HSEP_GUID,
-    .angular = {int(description.get("unit", "m") != "m")}{_EMBEDDED if weights else ""}}};
+    .angular = {int(table.is_angular)}{_EMBEDDED if weights else ""}}};
 """
-    return _header(kind_of(description), name, table)
+    return _header(table.kind, table.name, text)
 
 
 def interface_number(kind: str) -> int:
@@ -172,8 +167,7 @@ def _header(kind: str, whose: str, table: str) -> str:
 
 def _interface(kind: str) -> str:
     """Return what all FMUs of a kind share: value references and the rows of the table."""
-    description = KINDS[kind]
-    layout, model = layout_of(variables_of(description)), str(description["model"])
+    layout, model = layout_of(KINDS[kind].variables), KINDS[kind].model
     slopes = INTERPOLATED[model]
     assert slopes == tuple(variable.name for variable in layout.scalars[: len(slopes)])  # their places are the inputs'
     places = [f"    HSEP_VR_{variable.name} = {i}" for i, variable in enumerate(layout.scalars)]
@@ -188,7 +182,7 @@ def _interface(kind: str) -> str:
     rows = [_row(variable, variable.name) for variable in layout.scalars]
     rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
     rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
-    references, table = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
+    references, lines = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
     return f"""#define HSEP_MODEL_NAME {_string(model)}
 #define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
 #define HSEP_N_SCALARS {len(layout.scalars)}
@@ -202,7 +196,7 @@ enum {{
 {macros}
 /* Rows of the table: single variables, the numbers of a mode, windows. */
 static const hsep_variable hsep_variables[{len(rows)}] = {{
-{table}
+{lines}
 }};
 """
 

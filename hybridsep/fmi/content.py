@@ -13,6 +13,7 @@ from ..base.errors import FmuError
 from ..base.version import VERSION_DATE
 from ..machines.machine import Machine
 from ..machines.paper import PAPER_SETTINGS
+from .fmu_table import FmuTable
 
 __all__ = ["author", "content_guid", "copyright_notice", "fmu_title", "generation_time", "paper_note"]
 
@@ -67,17 +68,16 @@ def generation_time() -> str:
         raise FmuError(f"SOURCE_DATE_EPOCH must be a number of seconds since 1970, got {epoch!r}; unset it") from None
 
 
-def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) -> str:
-    """Return a GUID that follows from files and description, and from nothing else.
+def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
+    """Return a GUID that follows from files and table, and from nothing else.
 
     Parameters
     ----------
     files : mapping
         Archive name → content, without the binaries and reference results made from it.
-    description : mapping
-        Model, name, start values and modes.
+    table : FmuTable
     """
-    digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(table.as_json(), sort_keys=True).encode())
     for arcname in sorted(files):
         digest.update(arcname.encode() + hashlib.sha256(files[arcname]).digest())
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"

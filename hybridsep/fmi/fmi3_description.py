@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
-from numpy.typing import ArrayLike
-
-from ..machines.machine import Machine
 from .fmi3_variables import Fmi3Variable, fmi3_variables
+from .fmu import Fmu
 from .model_description import add_items, begun, document, types_of, variable_attributes, xml_text
 
 __all__ = ["fmi3_description"]
@@ -18,35 +15,24 @@ _OWN_STEPS = ("FeedDrive",)
 """Models whose internal steps divide the communication step; all others sample at T_s."""
 
 
-def fmi3_description(
-    machine: Machine,
-    description: Mapping[str, Any],
-    token: str,
-    generation_tool: str,
-    *,
-    samples: ArrayLike | None = None,
-) -> bytes:
+def fmi3_description(fmu: Fmu, token: str, generation_tool: str) -> bytes:
     """Return the XML document of a native FMU, the same bytes for the same arguments.
 
     Parameters
     ----------
-    machine : Machine
-        Its sampling interval and trajectory make the default experiment.
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``; the name is also the model identifier.
+    fmu : Fmu
+        The machine's sampling interval and trajectory make the default experiment.
     token : str
         The instantiation token, which follows from the content; see :mod:`hybridsep.fmi.content`.
     generation_tool : str
-    samples : (n,) array_like, m, optional
-        Trajectory that a ReferenceTrajectory was built with.
     """
-    table = fmi3_variables(description)
+    table = fmi3_variables(fmu.table)
     own_table = [each.variable for each in table]
     named = {"instantiationToken": token}
-    root = begun("modelDescription3.xml", machine, description, own_table, named, generation_tool, samples)
+    root = begun("modelDescription3.xml", fmu, own_table, named, generation_tool)
     simulation, _, types, _, _, variables, structure = root
-    if description["model"] not in _OWN_STEPS:
-        simulation.set("fixedInternalStepSize", xml_text(machine.T_s))
+    if fmu.table.model not in _OWN_STEPS:
+        simulation.set("fixedInternalStepSize", xml_text(fmu.machine.T_s))
     for variable, attributes in types_of(own_table):
         # fmpy up to 0.3.23 reads no EnumerationType that has a description; the variable and the items have theirs
         del attributes["description"]

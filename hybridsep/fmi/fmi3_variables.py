@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from .c_header import layout_of
-from .variables import Variable, shown_variables
+from .fmu_table import FmuTable
+from .variables import Variable
 
 __all__ = ["Fmi3Variable", "fmi3_variables"]
 
@@ -37,15 +37,14 @@ class Fmi3Variable:
         return own if self.size is None else replace(own, kind=f"{own.kind}[{self.size}]")
 
 
-def fmi3_variables(description: Mapping[str, object]) -> list[Fmi3Variable]:
+def fmi3_variables(table: FmuTable) -> list[Fmi3Variable]:
     """Return the variables: single ones, then the modes, then windows, then the time.
 
     Parameters
     ----------
-    description : mapping
-        ``model``, ``parameters``, ``modes`` and ``unit`` unless it is m.
+    table : FmuTable
     """
-    layout = layout_of(shown_variables(description))
+    layout = layout_of(table.shown)
     found = [Fmi3Variable(variable) for variable in (*layout.scalars, *layout.modes)]
     for window in layout.windows:
         name = window[0].name.partition("[")[0]

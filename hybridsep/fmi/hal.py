@@ -15,7 +15,7 @@ from ..machines.machine import Machine
 from .c_header import kind_header
 from .c_sources import c_sources
 from .content import content_guid
-from .description import fmu_description
+from .fmu import table_of
 from .table_file import TABLE_FILE, table_file
 
 if TYPE_CHECKING:
@@ -63,10 +63,10 @@ def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = N
             f"the compensator needs what the drive allows: [drive_limits] in the machine file of {machine.name}; "
             "--predictor writes the component that predicts alone"
         )
-    description = fmu_description(machine, model, machine.name, warm=trained is not None)
+    table = table_of(machine, model, machine.name, warm=trained is not None)
     files: dict[str, bytes] = {}
     if trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
         files[WEIGHTS_FILE] = weights_file(trained)
-    return {TABLE_FILE: table_file(description, content_guid(files, description)), **files}
+    return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}

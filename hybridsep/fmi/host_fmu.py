@@ -16,11 +16,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..base.errors import FmuError
-from .c_header import kind_of
 from .compiler import TARGETS, host_target
+from .fmu_table import FmuTable
 from .libraries import libraries
 from .table_file import TABLE_FILE, table_file
-from .variables import variables_of
 
 __all__ = ["HostFmu", "host_fmu"]
 
@@ -54,28 +53,25 @@ class HostFmu:
     ----------
     library : ctypes.CDLL
         Of its kind.
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    table : FmuTable
     guid : str
     resources : Path
     T_s : float, s
     """
 
-    def __init__(
-        self, library: ctypes.CDLL, description: Mapping[str, Any], guid: str, resources: Path, T_s: float
-    ) -> None:
-        table = list(enumerate(variables_of(description)))
-        self._inputs = [i for i, variable in table if variable.causality == "input"]
-        outputs = [(i, _KINDS[variable.kind]) for i, variable in table if variable.causality == "output"]
+    def __init__(self, library: ctypes.CDLL, table: FmuTable, guid: str, resources: Path, T_s: float) -> None:
+        variables = list(enumerate(table.variables))
+        self._inputs = [i for i, variable in variables if variable.causality == "input"]
+        outputs = [(i, _KINDS[variable.kind]) for i, variable in variables if variable.causality == "output"]
         self._outputs = [_Values(kind, [i for i, _ in same]) for kind, same in groupby(outputs, lambda each: each[1])]
         self._library, self._T_s, self._k = library, T_s, 0
         library.fmi2Instantiate.restype = ctypes.c_void_p
-        text = [description["name"].encode(), guid.encode(), resources.as_uri().encode()]
+        text = [table.name.encode(), guid.encode(), resources.as_uri().encode()]
         self._component = ctypes.c_void_p(
             library.fmi2Instantiate(text[0], _CO_SIMULATION, text[1], text[2], None, 0, 0)
         )
         if not self._component:
-            raise FmuError(f"{description['name']}: the FMU that is being built cannot be instantiated")
+            raise FmuError(f"{table.name}: the FMU that is being built cannot be instantiated")
         self._call("SetupExperiment", 0, ctypes.c_double(0.0), ctypes.c_double(0.0), 0, ctypes.c_double(0.0))
         self._call("EnterInitializationMode")
         self._call("ExitInitializationMode")
@@ -103,29 +99,26 @@ class HostFmu:
 
 
 @contextmanager
-def host_fmu(
-    description: Mapping[str, Any], guid: str, resources: Mapping[str, bytes], T_s: float
-) -> Iterator[HostFmu | None]:
+def host_fmu(table: FmuTable, guid: str, resources: Mapping[str, bytes], T_s: float) -> Iterator[HostFmu | None]:
     """Run an FMU on this machine; None where no library of its kind can be loaded here.
 
     Parameters
     ----------
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    table : FmuTable
     guid : str
     resources : mapping
         Content of its resources by file name; the table is added.
     T_s : float, s
     """
     with TemporaryDirectory(ignore_cleanup_errors=True) as place:
-        library = _loaded(kind_of(description), Path(place))
+        library = _loaded(table.kind, Path(place))
         if library is None:
             yield None
             return
-        for file, content in {**resources, TABLE_FILE: table_file(description, guid)}.items():
+        for file, content in {**resources, TABLE_FILE: table_file(table, guid)}.items():
             (Path(place) / file).write_bytes(content)
         try:
-            fmu = HostFmu(library, description, guid, Path(place), T_s)
+            fmu = HostFmu(library, table, guid, Path(place), T_s)
             try:
                 yield fmu
             finally:

@@ -12,10 +12,9 @@ from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .archive import fmu_names
-from .c_header import kind_of
 from .compiler import expanded
-from .description import fmu_description
 from .flavours import FMI_VERSIONS, versions_of
+from .fmu import table_of
 from .libraries import Library, check_available, default_targets
 from .warm_start import load_trained
 
@@ -55,7 +54,7 @@ def jobs_of(
 
 def libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
     """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
-    kinds = dict.fromkeys(kind_of(fmu_description(axis, model, name)) for axis, name, model, _ in jobs)
+    kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model, _ in jobs)
     return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
 
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
-from numpy.typing import ArrayLike
-
 from ..base.version import __version__
-from ..machines.machine import Machine
 from .content import author, copyright_notice, fmu_title, generation_time, paper_note
 from .experiment import stop_time
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, Variable, shown_variables
+from .fmu import Fmu
+from .variables import INTERPOLATED, Variable
 
 __all__ = [
     "add_items",
@@ -32,38 +29,26 @@ __all__ = [
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def model_description(
-    machine: Machine,
-    description: Mapping[str, Any],
-    guid: str,
-    generation_tool: str,
-    *,
-    native: bool,
-    samples: ArrayLike | None = None,
-) -> bytes:
+def model_description(fmu: Fmu, guid: str, generation_tool: str, *, native: bool) -> bytes:
     """Return the XML document, the same bytes for the same arguments.
 
     Parameters
     ----------
-    machine : Machine
-        Its sampling interval and trajectory make the default experiment.
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``; the name is also the model identifier.
+    fmu : Fmu
+        The machine's sampling interval and trajectory make the default experiment.
     guid : str
         Follows from the content; see :mod:`hybridsep.fmi.content`.
     generation_tool : str
     native : bool
         Whether the FMU is made of C sources, which take their memory from the importer's functions, extrapolate inputs
         and need no more than their own binary; otherwise it needs a Python.
-    samples : (n,) array_like, m, optional
-        Trajectory that a ReferenceTrajectory was built with.
     """
-    table = shown_variables(description)
-    root = begun("modelDescription.xml", machine, description, table, {"guid": guid}, generation_tool, samples)
+    table = fmu.table.shown
+    root = begun("modelDescription.xml", fmu, table, {"guid": guid}, generation_tool)
     simulation, _, types, _, _, variables, structure = root
     simulation.attrib |= {
         "needsExecutionTool": xml_text(not native),
-        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[str(description["model"])])),
+        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[fmu.table.model])),
         "canNotUseMemoryManagementFunctions": xml_text(not native),
     }
     if native:
@@ -79,28 +64,20 @@ def model_description(
     return document(root)
 
 
-def begun(
-    file: str,
-    machine: Machine,
-    description: Mapping[str, Any],
-    table: Sequence[Variable],
-    token: Mapping[str, str],
-    generation_tool: str,
-    samples: ArrayLike | None,
-) -> ET.Element:
+def begun(file: str, fmu: Fmu, table: Sequence[Variable], token: Mapping[str, str], generation_tool: str) -> ET.Element:
     """Return a template with what all versions of FMI say alike: names, units and the default experiment.
 
     Parameters
     ----------
     file : str
         The template.
-    machine, description, generation_tool, samples
+    fmu, generation_tool
         As :func:`model_description` has them.
     table : sequence of Variable
     token : mapping
         What the version calls the GUID → the GUID.
     """
-    model, name, root = str(description["model"]), str(description["name"]), template(file)
+    machine, model, name, root = fmu.machine, fmu.table.model, fmu.table.name, template(file)
     simulation, units, _, _, experiment, _, _ = root
     root.attrib |= {
         "modelName": name,
@@ -115,8 +92,7 @@ def begun(
     simulation.set("modelIdentifier", name)
     used = {variable.unit for variable in table}
     units[:] = [unit for unit in unit_elements() if unit.get("name") in used]
-    stop = stop_time(machine, description, samples)
-    experiment.attrib |= {"stopTime": xml_text(stop), "stepSize": xml_text(machine.T_s)}
+    experiment.attrib |= {"stopTime": xml_text(stop_time(fmu)), "stepSize": xml_text(machine.T_s)}
     return root
 
 

@@ -13,23 +13,23 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
 from ..base.data_files import data_folder
 from ..base.signals import as_samples
 from ..base.version import __version__
-from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from .bill_of_materials import BILL_FILE, bill_of_materials, native_parts
-from .c_header import c_header, kind_of
+from .c_header import c_header
 from .c_sources import FMI_HEADERS, c_sources, fmi_headers
 from .compiler import placed
 from .content import content_guid
 from .flavours import FMI_VERSIONS
 from .fmi3_description import fmi3_description
+from .fmu import Fmu
+from .fmu_table import FmuTable
 from .libraries import compilers_of, default_targets, libraries
 from .model_description import build_description, model_description
 from .pages import compile_note, dependencies_note, icon, index_page, reference_note
@@ -39,9 +39,6 @@ from .related_files import MANIFEST_FILE, manifest
 from .resource_data import RESOURCE_DATA_FILE, resource_data
 from .table_file import TABLE_FILE, table_file
 from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
-
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
 
 __all__ = ["files", "sources"]
 
@@ -66,29 +63,13 @@ Those for Windows have parts of mingw-w64 besides:
 {}"""
 
 
-def files(
-    machine: Machine,
-    description: Mapping[str, object],
-    *,
-    targets: Sequence[str] | None = None,
-    samples: ArrayLike | None = None,
-    trained: HybridPredictor | None = None,
-    origin: Mapping[str, Any] | None = None,
-    fmi: str = FMI_VERSIONS[0],
-    embed_weights: bool = False,
-) -> dict[str, bytes]:
+def files(fmu: Fmu, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
     Parameters
     ----------
-    machine : Machine
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples, fmi, embed_weights
-        As in :func:`hybridsep.fmi.archive.build_fmu`.
-    trained : HybridPredictor, optional
-        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
-    origin : mapping, optional
+    fmu : Fmu
+    targets, embed_weights
         As in :func:`hybridsep.fmi.archive.build_fmu`.
 
     Raises
@@ -96,64 +77,60 @@ def files(
     FmuError
         If it cannot be compiled.
     """
-    model, name = str(description["model"]), str(description["name"])
-    content = {f"sources/{file}": text for file, text in sources(description, "", fmi).items()}
+    table, fmi = fmu.table, fmu.fmi
+    model, name = table.model, table.name
+    content = {f"sources/{file}": text for file, text in sources(table, "", fmi).items()}
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
     content |= dependencies_note(_DEPENDENCIES)
-    reference = "this FMU" if has_reference(description) else None
+    reference = "this FMU" if has_reference(table) else None
     if reference:
-        content |= reference_note(description)
-    content["documentation/index.html"] = index_page(
-        machine, description, needs, reference=reference, sources=compile_note(name, fmi), fmi=fmi
-    )
+        content |= reference_note(table)
+    content["documentation/index.html"] = index_page(fmu, needs, reference=reference, sources=compile_note(name, fmi))
     if fmi == "3":
         content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
     else:
         content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
-        content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
+        content |= {f"resources/{file}": data for file, data in _trajectories(fmu.machine.T_s, fmu.samples).items()}
     weights = None
-    if trained is not None:
+    if fmu.trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
-        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
-    guid = content_guid(content, description)
-    content[f"resources/{TABLE_FILE}"] = table_file(description, guid)
-    content["sources/hsep_fmu.h"] = c_header(description, guid, fmi, weights if embed_weights else None).encode()
+        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(fmu.trained)
+    guid = content_guid(content, table)
+    content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
+    content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
     tool = f"hybridsep {__version__}"
     if fmi == "3":
-        content["modelDescription.xml"] = fmi3_description(machine, description, guid, tool, samples=samples)
+        content["modelDescription.xml"] = fmi3_description(fmu, guid, tool)
     else:
-        content["modelDescription.xml"] = model_description(
-            machine, description, guid, tool, native=True, samples=samples
-        )
+        content["modelDescription.xml"] = model_description(fmu, guid, tool, native=True)
     if reference:
-        content |= reference_run(machine, description, guid, content, native=True, samples=samples, trained=trained)
-    if origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(name, guid, origin)
-    kind, targets = kind_of(description), targets or default_targets()
+        content |= reference_run(fmu, guid, content, native=True)
+    if fmu.origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
+    kind, targets = table.kind, targets or default_targets()
     compiled = libraries(kind, targets)
     content[BILL_FILE] = bill_of_materials(name, guid, native_parts(compilers_of(kind, targets), list(compiled)))
     content[MANIFEST_FILE] = manifest(content)
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 
 
-def sources(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
+def sources(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
     """Return the C sources with the generated ``hsep_fmu.h``, without the FMI headers: file name → content.
 
     Parameters
     ----------
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    table : FmuTable
     guid : str
         The modelDescription's.
     fmi : {"2", "3"}
         Version of FMI.
     """
-    return {**c_sources((fmi,)), "hsep_fmu.h": c_header(description, guid, fmi).encode()}
+    return {**c_sources((fmi,)), "hsep_fmu.h": c_header(table, guid, fmi).encode()}
 
 
 def _licenses() -> dict[str, bytes]:

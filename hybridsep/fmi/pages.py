@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
-from ..machines.machine import Machine
 from .content import fmu_title, paper_note
-from .flavours import FMI_VERSIONS
 from .fmi3_variables import fmi3_variables
+from .fmu import Fmu
+from .fmu_table import FmuTable
 from .related_files import AGREEMENT, RELATED_FOLDER
 from .tables import grouped_table
-from .variables import shown_variables
 
 __all__ = ["compile_note", "dependencies_note", "filled", "icon", "index_page", "reference_note"]
 
@@ -60,34 +58,28 @@ def filled(template: str, **values: object) -> str:
 
 
 def index_page(
-    machine: Machine,
-    description: Mapping[str, object],
+    fmu: Fmu,
     needs: str,
     *,
     reference: str | None = None,
     limits: str = "",
     sources: str = "",
-    fmi: str = FMI_VERSIONS[0],
 ) -> bytes:
     """Return the documentation page of an FMU.
 
     Parameters
     ----------
-    machine : Machine
-        Its sources are listed.
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    fmu : Fmu
+        The machine's sources are listed, and types named as its version of FMI has them.
     needs : str
         Requirements of the FMU, one sentence.
     reference : str, optional
         What the archive's reference result comes from; None if it has none.
     limits, sources : str
         Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
-    fmi : {"2", "3"}
-        Version of FMI, whose types are named.
     """
-    model, name = str(description["model"]), str(description["name"])
-    table = shown_variables(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
+    machine, model, name = fmu.machine, fmu.table.model, fmu.table.name
+    table = fmu.table.shown if fmu.fmi == "2" else [each.shown for each in fmi3_variables(fmu.table)]
     rows = "\n".join(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
@@ -125,9 +117,9 @@ def dependencies_note(text: str) -> dict[str, bytes]:
     return {"documentation/externalDependencies.txt": text.encode()}
 
 
-def reference_note(description: Mapping[str, object]) -> dict[str, bytes]:
+def reference_note(table: FmuTable) -> dict[str, bytes]:
     """Return the file that says how to use the reference experiment, LS-REF's name for it → its content."""
-    model, name = str(description["model"]), str(description["name"])
+    model, name = table.model, table.name
     inputs = f"{name}_in.csv   inputs at every communication point\n" if model != "ReferenceTrajectory" else ""
     text = _REFERENCE_NOTE.format(name=name, inputs=inputs, digits=AGREEMENT.get(model, 11))
     return {"documentation/fmi-ls-ref.txt": text.encode()}

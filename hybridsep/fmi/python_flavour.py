@@ -10,17 +10,15 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import pythonfmu
 
 from ..base.data_files import data_folder
 from ..base.version import __version__
-from ..machines.machine import Machine
 from .bill_of_materials import BILL_FILE, bill_of_materials, python_parts
 from .content import content_guid
+from .fmu import Fmu
 from .imported import imported_modules
 from .model_description import model_description
 from .pages import dependencies_note, filled, icon, index_page, reference_note
@@ -29,9 +27,6 @@ from .reference import has_reference
 from .reference_run import reference_run
 from .related_files import MANIFEST_FILE, manifest
 from .resource_data import RESOURCE_DATA_FILE, resource_data
-
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
 
 __all__ = ["files"]
 
@@ -56,59 +51,50 @@ _LAUNCHER = "launcher.py"
 """The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
 
 
-def files(
-    machine: Machine,
-    description: Mapping[str, object],
-    *,
-    trained: HybridPredictor | None = None,
-    origin: Mapping[str, Any] | None = None,
-) -> dict[str, bytes]:
+def files(fmu: Fmu) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
     Parameters
     ----------
-    machine : Machine
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
-    trained : HybridPredictor, optional
-        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
-    origin : mapping, optional
-        As in :func:`hybridsep.fmi.archive.build_fmu`.
+    fmu : Fmu
+        Of FMI 2.0.
 
     Raises
     ------
     FmuError
         If the pythonfmu that is installed is of another series than 0.7.
     """
-    model, name = str(description["model"]), str(description["name"])
+    model, name = fmu.table.model, fmu.table.name
     version = checked_version()
     content = _resources(model)
-    if trained is not None:
+    if fmu.trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
-        content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
+        content[f"resources/{WEIGHTS_FILE}"] = weights_file(fmu.trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)
     content["model.png"] = icon(model)
     content |= dependencies_note(_DEPENDENCIES.format(version))
-    reference = "its native twin" if has_reference(description) else None
+    reference = "its native twin" if has_reference(fmu.table) else None
     if reference:
-        content |= reference_note(description)
-    page = index_page(machine, description, needs, limits=limits, reference=reference)
+        content |= reference_note(fmu.table)
+    page = index_page(fmu, needs, limits=limits, reference=reference)
     content["documentation/index.html"] = page
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
     content["documentation/licenses/license.txt"] = (data_folder("fmu_src").parent / "LICENSE").read_bytes()
     content["documentation/licenses/pythonfmu.txt"] = pythonfmu_license()
-    guid = content_guid(content, description)
-    content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
+    guid = content_guid(content, fmu.table)
+    content["resources/machine.json"] = json.dumps(
+        {**fmu.table.as_json(), "content": guid}, indent=1, sort_keys=True
+    ).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
-    content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=False)
+    content["modelDescription.xml"] = model_description(fmu, guid, tool, native=False)
     if reference:
-        content |= reference_run(machine, description, guid, content, native=False, trained=trained)
-    if origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(name, guid, origin)
+        content |= reference_run(fmu, guid, content, native=False)
+    if fmu.origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
     content[BILL_FILE] = bill_of_materials(name, guid, python_parts(version))
     content[MANIFEST_FILE] = manifest(content)
     return content

@@ -21,8 +21,8 @@ from ..base.signals import Array
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
+from .fmu_table import FmuTable
 from .related_files import EXPERIMENT_FILE, RELATED_FOLDER, experiment
-from .variables import variables_of
 
 __all__ = ["ReferenceModel", "has_reference", "reference_files"]
 
@@ -59,39 +59,36 @@ class ReferenceModel(Protocol):
         """Do one step of T_s, with all inputs in the order of the table."""
 
 
-def has_reference(description: Mapping[str, Any]) -> bool:
+def has_reference(table: FmuTable) -> bool:
     """Return whether an FMU gets a reference result."""
-    parameters = description["parameters"]
-    return int(parameters.get("preview", parameters.get("Np", 0))) <= _WINDOW_MAX
+    return int(table.parameters.get("preview", table.parameters.get("Np", 0))) <= _WINDOW_MAX
 
 
 def reference_files(
-    machine: Machine, description: Mapping[str, Any], model: ReferenceModel, drive: ReferenceModel | None = None
+    machine: Machine, table: FmuTable, model: ReferenceModel, drive: ReferenceModel | None = None
 ) -> dict[str, bytes]:
     """Return experiment, input, result and options of one FMU: archive name → content.
 
     Parameters
     ----------
     machine : Machine
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    table : FmuTable
     model : ReferenceModel
     drive : ReferenceModel, optional
         The machine's plant, behind a look-ahead; a linear drive 2 % off if left out.
     """
-    table, T_s = variables_of(description), machine.T_s
-    outputs = {variable.name: variable.kind for variable in table if variable.causality == "output"}
-    names = list(outputs)
-    given = [variable.name for variable in table if variable.causality == "input"]
-    if description["model"] in ("HybridPredictor", "SepCompensator"):
+    T_s = machine.T_s
+    outputs = {name: variable.kind for name, variable in table.named("output").items()}
+    names, given = list(outputs), list(table.named("input"))
+    if table.model in ("HybridPredictor", "SepCompensator"):
         measure = _measurement(machine, drive)
-        rows = _look_ahead_run(machine, description["parameters"], names, model, measure)
+        rows = _look_ahead_run(machine, table.parameters, names, model, measure)
     elif given:
         rows = _played(model, [(x_d,) for x_d in _command(machine, _SAMPLES + 1).tolist()])
     else:
         rows = _played(model, [()] * (_SAMPLES + 1))
     times = [k * T_s for k in range(len(rows))]
-    base = f"{RELATED_FOLDER}/{description['name']}"
+    base = f"{RELATED_FOLDER}/{table.name}"
     options = {"StartTime": 0.0, "StopTime": times[-1], "StepSize": T_s, "RelTol": _REL_TOL}
     files = {
         f"{base}_ref.csv": _csv(times, outputs, [row[0] for row in rows], _RESULT_RESOLUTION),
@@ -99,8 +96,7 @@ def reference_files(
     }
     if given:
         files[f"{base}_in.csv"] = _csv(times, dict.fromkeys(given, "Real"), [row[1] for row in rows], _RESOLUTION)
-    name, model_name = str(description["name"]), str(description["model"])
-    files[EXPERIMENT_FILE] = experiment(name, model_name, options, inputs=bool(given))
+    files[EXPERIMENT_FILE] = experiment(table.name, table.model, options, inputs=bool(given))
     return files
 
 

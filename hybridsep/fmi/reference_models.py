@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
-
-from numpy.typing import ArrayLike
 
 from ..base.signals import as_samples
 from ..machines.machine import Machine
@@ -14,9 +11,8 @@ from ..online.look_ahead import LookAhead
 from ..plants.encoder import Encoder
 from ..plants.plant import Drive
 from ..plants.trajectory import staircase
-from ..predict.predictor import HybridPredictor
+from .fmu import Fmu
 from .reference import ReferenceModel
-from .variables import variables_of
 from .weights import restore_weights, weights_file
 
 __all__ = ["library_model", "library_models"]
@@ -62,55 +58,34 @@ class _TrajectoryModel:
         self._k += 1
 
 
-def library_models(
-    machine: Machine,
-    description: Mapping[str, Any],
-    *,
-    samples: ArrayLike | None = None,
-    trained: HybridPredictor | None = None,
-) -> tuple[ReferenceModel, ReferenceModel | None]:
+def library_models(fmu: Fmu) -> tuple[ReferenceModel, ReferenceModel | None]:
     """Return the models of a reference run: :func:`library_model`, and the machine's plant if it has one."""
-    model = library_model(machine, description, samples=samples, trained=trained)
-    plant = None if machine.plant is None else library_model(machine, {"model": "FeedDrive"})
-    return model, plant
+    plant = None if fmu.machine.plant is None else _plant(fmu.machine)
+    return library_model(fmu), plant
 
 
-def library_model(
-    machine: Machine,
-    description: Mapping[str, Any],
-    *,
-    samples: ArrayLike | None = None,
-    trained: HybridPredictor | None = None,
-) -> ReferenceModel:
-    """Return the model of an FMU, at its start values.
-
-    Parameters
-    ----------
-    machine : Machine
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
-    samples : (n,) array_like, m, optional
-        Trajectory 3 of ReferenceTrajectory.
-    trained : HybridPredictor, optional
-        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
-    """
-    model = str(description["model"])
-    if model == "FeedDrive":
-        assert machine.plant is not None  # by fmu_names
-        encoder = Encoder(machine.plant.noise_std, machine.plant.seed)
-        return _PlantModel(machine.new_plant(), encoder, machine.T_s)
-    if model == "ReferenceTrajectory":
-        played = staircase(machine.T_s) if samples is None else as_samples(samples, "samples")
+def library_model(fmu: Fmu) -> ReferenceModel:
+    """Return the model of an FMU, at its start values."""
+    machine, table = fmu.machine, fmu.table
+    if table.model == "FeedDrive":
+        return _plant(machine)
+    if table.model == "ReferenceTrajectory":
+        played = staircase(machine.T_s) if fmu.samples is None else as_samples(fmu.samples, "samples")
         return _TrajectoryModel(played.tolist())
-    t_init = description["parameters"]["t_init"]
-    names = [variable.name for variable in variables_of(description) if variable.causality == "output"]
-    if model == "HybridPredictor":
+    t_init = table.parameters["t_init"]
+    if table.model == "HybridPredictor":
         predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=t_init))
         look_ahead = LookAhead(predictor, 0.0)
     else:
         compensator = machine.new_compensator(predictor=replace(machine.compensator_predictor, t_init=t_init))
         predictor = compensator.predictor
         look_ahead = LookAhead(compensator, 0.0)
-    if trained is not None:
-        restore_weights(predictor, weights_file(trained))
-    return _LookAheadModel(look_ahead, names)
+    if fmu.trained is not None:
+        restore_weights(predictor, weights_file(fmu.trained))
+    return _LookAheadModel(look_ahead, list(table.named("output")))
+
+
+def _plant(machine: Machine) -> _PlantModel:
+    assert machine.plant is not None  # by fmu_names
+    encoder = Encoder(machine.plant.noise_std, machine.plant.seed)
+    return _PlantModel(machine.new_plant(), encoder, machine.T_s)

@@ -4,35 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
-from numpy.typing import ArrayLike
-
-from ..machines.machine import Machine
-from .c_header import kind_of
-from .description import fmu_description
+from .fmu import Fmu, table_of
 from .host_fmu import host_fmu
 from .libraries import is_kept_here
 from .reference import reference_files
-
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
 
 __all__ = ["reference_run"]
 
 _FOLDER = "resources/"
 
 
-def reference_run(
-    machine: Machine,
-    description: Mapping[str, object],
-    guid: str,
-    content: Mapping[str, bytes],
-    *,
-    native: bool,
-    samples: ArrayLike | None = None,
-    trained: HybridPredictor | None = None,
-) -> dict[str, bytes]:
+def reference_run(fmu: Fmu, guid: str, content: Mapping[str, bytes], *, native: bool) -> dict[str, bytes]:
     """Return the files of :func:`~hybridsep.fmi.reference.reference_files`.
 
     Platforms differ in the last digits, so they stay out of the GUID, as the binaries do. A Python FMU's are its native
@@ -40,34 +23,28 @@ def reference_run(
 
     Parameters
     ----------
-    machine : Machine
-    description : mapping
-        ``model``, ``name``, ``parameters`` and ``modes``.
+    fmu : Fmu
     guid : str
         The modelDescription's.
     content : mapping
         Archive name → content; a native model reads ``resources/``.
     native : bool
         Whether the FMU is native, so that its library is compiled where it is not there.
-    samples, trained
-        As in :func:`hybridsep.fmi.native_flavour.files`.
     """
     resources = {
         file.removeprefix(_FOLDER): data
         for file, data in content.items()
         if file.startswith(_FOLDER) and file.endswith(".bin")
     }
-    plant = None if machine.plant is None else fmu_description(machine, "FeedDrive", "drive")
-    kinds = [kind_of(each) for each in (description, plant) if each is not None]
-    if native or all(map(is_kept_here, kinds)):
+    machine, table = fmu.machine, fmu.table
+    plant = None if machine.plant is None else table_of(machine, "FeedDrive", "drive")
+    if native or all(is_kept_here(each.kind) for each in (table, plant) if each is not None):
         with ExitStack() as running:
-            fmu = running.enter_context(host_fmu(description, guid, resources, machine.T_s))
-            if fmu is not None:
+            model = running.enter_context(host_fmu(table, guid, resources, machine.T_s))
+            if model is not None:
                 drive = None if plant is None else running.enter_context(host_fmu(plant, "{drive}", {}, machine.T_s))
-                return reference_files(machine, description, fmu, drive)
+                return reference_files(machine, table, model, drive)
     # what the library's models need loads slowly
     from .reference_models import library_models
 
-    return reference_files(
-        machine, description, *library_models(machine, description, samples=samples, trained=trained)
-    )
+    return reference_files(machine, table, *library_models(fmu))

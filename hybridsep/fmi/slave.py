@@ -25,7 +25,8 @@ from ..base.errors import FmuError, HybridSepError, SignalError, StateError
 from ..base.saved import Saved
 from ..base.signals import check_position
 from ..base.state import pack, unpack
-from .variables import Variable, variables_of
+from .fmu_table import FmuTable
+from .variables import Variable
 
 __all__ = ["DESCRIPTION_FILE", "TableSlave"]
 
@@ -101,9 +102,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.vars = _References()
-        self.table_description = _read_description(self.resources)
-        self.modelName = self.table_description["name"]
-        self.table = variables_of(self.table_description)
+        described = _read_description(self.resources)
+        self.content, table = described["content"], FmuTable.from_json(described)
+        self.modelName, self.table = table.name, table.variables
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
         self.running = self.terminated = False
         self.warned: set[str] = set()
@@ -188,7 +189,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _get_fmu_state(self) -> bytes:
         meta: dict[str, Any] = {
-            "content": self.table_description["content"],
+            "content": self.content,
             "running": self.running,
             "terminated": self.terminated,
             "start_time": self.start_time,
@@ -202,7 +203,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _set_fmu_state(self, state: bytes) -> None:
         saved = Saved(_KIND, *unpack(_KIND, state))
-        if saved.text("content") != self.table_description["content"]:
+        if saved.text("content") != self.content:
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
         running, terminated, values = saved.flag("running"), saved.flag("terminated"), saved.table("values")
         start_time, stop_time = saved.real("start_time"), saved.number_or_none("stop_time")

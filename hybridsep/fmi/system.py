@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..base.signals import as_samples
+from ..fmi import native_flavour
 from ..machines.machine import Machine
-from .archive import archived, fmu_files, fmu_name
-from .description import fmu_description
+from .archive import archived, fmu_name
 from .flavours import FMI_VERSIONS
 from .fmi3_variables import fmi3_variables
+from .fmu import Fmu
 from .system_structure import SSP_VERSIONS, Component, Connection, parameter_set, system_structure
-from .variables import Variable, shown_variables
+from .variables import Variable
+from .warm_start import load_trained
 
 __all__ = ["build_system", "check_system"]
 
@@ -83,13 +84,12 @@ def build_system(
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
         name = fmu_name(kind, machine.name, "native", fmi)
-        how: dict[str, Any] = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
-        how["windows"] = False  # no connectors, and thousands of errors of one importer's
-        files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
-        content[f"resources/{name}.fmu"] = archived(files)
-        warm = weights is not None and part == look_ahead
-        description = fmu_description(machine, kind, name, samples=part == "reference", warm=warm, windows=False)
-        components.append(Component(part, f"{name}.fmu", _variables(description, fmi)))
+        trained = load_trained(weights, machine, kind) if weights is not None and part == look_ahead else None
+        played = samples if part == "reference" else None
+        # windows are no connectors, and thousands of errors of one importer's
+        fmu = Fmu.of(machine, kind, name, fmi=fmi, samples=played, trained=trained, windows=False)
+        content[f"resources/{name}.fmu"] = archived(native_flavour.files(fmu, targets=targets))
+        components.append(Component(part, f"{name}.fmu", _variables(fmu)))
         sets[part] = f"{machine.name}_{part}.ssv"
         content[f"resources/{sets[part]}"] = parameter_set(components[-1], ssp)
     connections: list[Connection] = [
@@ -107,8 +107,8 @@ def build_system(
     return Path(path)
 
 
-def _variables(description: Mapping[str, Any], fmi: str) -> tuple[Variable, ...]:
+def _variables(fmu: Fmu) -> tuple[Variable, ...]:
     """Return an FMU's variables, of FMI 3.0 the scalar ones."""
-    if fmi == FMI_VERSIONS[0]:
-        return tuple(shown_variables(description))
-    return tuple(each.variable for each in fmi3_variables(description) if each.size is None)
+    if fmu.fmi == FMI_VERSIONS[0]:
+        return fmu.table.shown
+    return tuple(each.variable for each in fmi3_variables(fmu.table) if each.size is None)

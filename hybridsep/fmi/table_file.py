@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
 
-from .c_header import interface_number, kind_of, layout_of
-from .variables import variables_of
+from .c_header import interface_number, layout_of
+from .fmu_table import FmuTable
 
 __all__ = ["TABLE_FILE", "table_file"]
 
@@ -23,21 +22,19 @@ _CHECKSUM = struct.Struct("<Q")
 _MAGIC = b"HSEPVAR2"
 
 
-def table_file(description: Mapping[str, object], guid: str) -> bytes:
+def table_file(table: FmuTable, guid: str) -> bytes:
     """Return the content of the file.
 
     Parameters
     ----------
-    description : mapping
-        ``model``, ``parameters``, ``modes``, ``unit`` unless it is m, and ``windows`` where they are left out.
+    table : FmuTable
     guid : str
         The modelDescription's.
     """
-    layout, kind = layout_of(variables_of(description)), kind_of(description)
+    layout = layout_of(table.variables)
     starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
     size = _HEAD.size + len(starts) + _CHECKSUM.size
     n_modes = len(layout.modes) // 4
-    angular = int(description.get("unit", "m") != "m")
-    numbers = size, interface_number(kind), n_modes, angular, layout.window
+    numbers = size, interface_number(table.kind), n_modes, int(table.is_angular), layout.window
     content = _HEAD.pack(_MAGIC, *numbers, guid.encode()) + starts
     return content + _CHECKSUM.pack(zlib.crc32(content))

@@ -7,13 +7,12 @@ same in all FMUs of a kind. This module is packed into the FMUs: it needs nothin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
-from .angular_units import angular_unit
 
 __all__ = [
     "COMPENSATOR_SETTINGS",
@@ -21,17 +20,17 @@ __all__ = [
     "MODELS",
     "PREDICTOR_SETTINGS",
     "TRUST_SETTINGS",
+    "Value",
     "Variable",
     "compensator_variables",
     "modes_from",
     "plant_variables",
     "predictor_variables",
-    "shown_variables",
     "trajectory_variables",
-    "variables_of",
 ]
 
 Value = float | int | bool
+"""A start value."""
 
 _PREDICTOR = PredictorSettings.fmi_parameters()
 
@@ -349,7 +348,7 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     ]
 
 
-MODELS = {
+MODELS: Mapping[str, Callable[[Mapping[str, Value], Sequence[Mapping[str, float]]], list[Variable]]] = {
     "HybridPredictor": predictor_variables,
     "SepCompensator": compensator_variables,
     "FeedDrive": plant_variables,
@@ -364,44 +363,3 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
     "ReferenceTrajectory": (),
 }
 """The first variables of each model: inputs that a native FMU extrapolates by their time derivative."""
-
-
-def variables_of(description: Mapping[str, object]) -> list[Variable]:
-    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes, unit and windows."""
-    table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
-    if not description.get("windows", True):
-        table = [variable for variable in table if variable.causality != "local"]
-    return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
-
-
-def shown_variables(description: Mapping[str, object]) -> list[Variable]:
-    """Return :func:`variables_of` with the ranges that hold in one FMU, where its kind has wider ones.
-
-    A ReferenceTrajectory plays what lies in its archive: at the interval of its samples, and samples of the user's only
-    where it was built with some, which it then starts with.
-    """
-    table = variables_of(description)
-    if description["model"] != "ReferenceTrajectory":
-        return table
-    starts: Any = description["parameters"]
-    n = len(PARAMETERS["trajectory"].choices)
-    played = n if starts["trajectory"] == n - 1 else n - 1
-    own: dict[str, dict[str, Any]] = {
-        "T_s": {"minimum": starts["T_s"], "maximum": starts["T_s"]},
-        "trajectory": {"maximum": played - 1},
-    }
-    return [
-        replace(
-            variable,
-            items=variable.items[:played],
-            item_meanings=variable.item_meanings[:played],
-            **own.get(variable.name, {}),
-        )
-        for variable in table
-    ]
-
-
-def _angular(variable: Variable) -> Variable:
-    """Return a variable of a rotary axis for that of a linear one."""
-    unit, display = angular_unit(variable.unit), angular_unit(variable.display_unit)
-    return replace(variable, unit=unit, display_unit=display)

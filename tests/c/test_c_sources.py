@@ -76,7 +76,7 @@ def test_the_core_needs_libm_alone() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(c_core.DESCRIPTIONS))
+@pytest.mark.parametrize("name", list(c_core.TABLES))
 def test_everything_compiles_as_one_file(name: str) -> None:
     """Optimised once: the models differ in a table and in which of the core's functions they call."""
     folder = build_folder() / f"all_{name}"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from places import SUPPORT
 
 from hybridsep import paper_machine
-from hybridsep.fmi.variables import variables_of
+from hybridsep.fmi.fmu import table_of
 
 N_INSTANCES = 1000
 N_SAMPLES = 350  # the hybrid predicts from sample 200 on, if t_init is 0
@@ -57,9 +57,8 @@ def array_bytes() -> int:
     n = 2 + p + q
     factor = (n + 1) * (n + 2) + 2 * (n + 1)  # twice the triangle; the scales and the incoming row
     windows = (5 + 2 + 7) * Np + (Np + q) + (Np + p) + n + p
-    modes = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
-    table = variables_of({"model": "HybridPredictor", "parameters": values, "modes": modes})
-    return 8 * (factor + windows + 11 * len(modes) + len(table))
+    table = table_of(machine, "HybridPredictor", "HybridPredictor")
+    return 8 * (factor + windows + 11 * len(table.modes) + len(table.variables))
 
 
 def signals(i: int) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitise
 from c_core import STAGE_DRIVE
 from places import ROOT
 
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.native_flavour import sources
 from hybridsep.machines.machine import load_machine
 
@@ -84,14 +85,13 @@ CLANG = pytest.param([sys.executable, "-m", "ziglang", "cc"], id="clang")
     ("model", "fmi"), [("HybridPredictor", "2"), ("SepCompensator", "2"), ("FeedDrive", "2"), ("HybridPredictor", "3")]
 )
 def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], model: str, fmi: str) -> None:
-    parameters: dict[str, object] = dict(STAGE_DRIVE)
     mode = {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
-    description = {"model": "FeedDrive", "name": "Stage", "parameters": parameters, "modes": [mode]}
+    table = FmuTable("FeedDrive", "Stage", STAGE_DRIVE, (mode,))
     if model != "FeedDrive":
         machine = load_machine("spring_mass_damper")
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
-        description = {"model": model, "name": model, "parameters": values, "modes": [mode]}
-    for file, content in sources(description, "{}", fmi).items():
+        table = FmuTable(model, model, values, (mode,))
+    for file, content in sources(table, "{}", fmi).items():
         (tmp_path / file).write_bytes(content)
     # The core knows nothing of the model, and what is not an adapter nothing of FMI: compiled with the first of them
     core = {path.name for path in (C_SOURCES / "core").rglob("*.c")} if model != "HybridPredictor" else set()

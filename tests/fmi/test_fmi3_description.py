@@ -18,8 +18,8 @@ from fmpy.validation import validate_fmu
 from hybridsep.base.data_files import data_folder
 from hybridsep.fmi.archive import fmu_names
 from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, placed
-from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.fmi3_description import fmi3_description
+from hybridsep.fmi.fmu import Fmu
 from hybridsep.fmi.model_description import build_description
 from hybridsep.fmi.terminals import ICON_FILE, TERMINALS, terminals_and_icons
 from hybridsep.machines.machine import load_machine
@@ -151,7 +151,7 @@ def test_a_rotary_axis_keeps_the_rules(tmp_path: Path) -> None:
     path.write_text(text + "[drive_limits]\nvelocity = 1.0\nacceleration = 9.0\njerk = 900.0\n", encoding="utf-8")
     machine = load_machine(path)
     for name, model in fmu_names(machine, fmi="3").items():
-        xml = ET.fromstring(fmi3_description(machine, fmu_description(machine, model, name), "{1}", "tool"))
+        xml = ET.fromstring(fmi3_description(Fmu.of(machine, model, name), "{1}", "tool"))
         assert xml.find("ModelVariables/Float64[@unit='rad']") is not None
         build, icons = ET.fromstring(build_description(name, "3")), ET.fromstring(terminals_and_icons(model))
         assert violations(Archive(xml, icons, build, [ICON_FILE, "sources/all.c"])) == []

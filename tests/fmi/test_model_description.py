@@ -15,8 +15,8 @@ from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
 from hybridsep.fmi.archive import fmu_names
-from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.fmi.fmu import Fmu
 from hybridsep.fmi.model_description import model_description
 from hybridsep.machines.machine import Machine, load_machine
 
@@ -79,8 +79,7 @@ def test_a_rotary_axis_keeps_the_rules(rotary: Machine) -> None:
         names = fmu_names(rotary, flavour)
         assert list(names.values()) == ["HybridPredictor", "SepCompensator"]
         for name, model in names.items():
-            description = fmu_description(rotary, model, name)
-            xml = model_description(rotary, description, "{1}", "tool", native=flavour == "native")
+            xml = model_description(Fmu.of(rotary, model, name), "{1}", "tool", native=flavour == "native")
             assert violations(ET.fromstring(xml)) == []
 
 

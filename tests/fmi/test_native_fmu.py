@@ -26,8 +26,9 @@ from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import archived, build_fmu, fmu_names
 from hybridsep.fmi.compiler import ALL_TARGETS, compile_flags, host_target
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.macho import universal
-from hybridsep.fmi.variables import Variable, variables_of
+from hybridsep.fmi.variables import Variable
 from hybridsep.machines.machine import load_machine
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
@@ -300,7 +301,7 @@ def plain(instance: FmuInstance, k: int) -> float:
 
 def test_the_tables_hold_together() -> None:
     parameters = {"trajectory": 0, "T_s": 1e-3}
-    table = variables_of({"model": "ReferenceTrajectory", "parameters": parameters, "modes": []})
+    table = FmuTable("ReferenceTrajectory", "trajectory", parameters).variables
     assert [variable.name for variable in table] == ["r", "trajectory", "T_s"]
     assert all(isinstance(variable, Variable) and variable.description for variable in table)
     assert (table[2].minimum, table[2].maximum) == (1e-5, 1.0)

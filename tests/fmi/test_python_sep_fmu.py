@@ -20,6 +20,8 @@ from hybridsep.compensate.compensator import SepState
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
+from hybridsep.fmi.fmu import Fmu
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.reference_models import library_models
 from hybridsep.fmi.related_files import RELATED_FOLDER
@@ -32,11 +34,11 @@ OUTPUTS = (
     *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
 )
 
-Fmu = Callable[[str], Path]
+Build = Callable[[str], Path]
 
 
 @pytest.fixture
-def compensator(python_fmu: Fmu) -> Iterator[FmuInstance]:
+def compensator(python_fmu: Build) -> Iterator[FmuInstance]:
     with FmuInstance(python_fmu("SepCompensatorPy")) as instance:
         yield instance
 
@@ -96,11 +98,11 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
     assert initial["rms_e"] == initial["batch"] == []
 
 
-def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: Fmu) -> None:
+def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: Build) -> None:
     with zipfile.ZipFile(python_fmu("SepCompensatorPy")) as archive:
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
-    header = c_header(description, "{0}")
+    header = c_header(FmuTable.from_json(description), "{0}")
     for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 29,", "HSEP_VR_mode = 38"):
         assert line in header
     assert "SepCompensator</text>" in page
@@ -113,7 +115,8 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
 def test_the_reference_result_is_what_the_fmu_gives(compensator: FmuInstance) -> None:
     with zipfile.ZipFile(compensator.path) as archive:
         description = json.loads(archive.read("resources/machine.json"))
-    files = reference_files(MACHINE, description, *library_models(MACHINE, description))
+    fmu = Fmu(MACHINE, FmuTable.from_json(description))
+    files = reference_files(MACHINE, fmu.table, *library_models(fmu))
 
     def table(kind: str) -> tuple[list[str], Array]:
         head, *rows = files[f"{RELATED_FOLDER}/SepCompensatorPy_{kind}.csv"].decode().splitlines()
@@ -193,7 +196,7 @@ def travelling(path: Path) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
+def test_each_fmu_carries_what_it_needs(python_fmu: Build, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
     assert {"predict/window_predictor.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from built_once import BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.description import fmu_description
+from hybridsep.fmi.fmu import Fmu
 from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.reference_models import library_model, library_models
 from hybridsep.fmi.related_files import RELATED_FOLDER
@@ -75,7 +74,7 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
     """The files hold what the FMU gave when it was built."""
     axis, base = load_machine(machine), folders(name) / RELATED_FOLDER / name
     model = fmu_names(axis)[name]
-    reference = library_model(axis, fmu_description(axis, model, name))
+    reference = library_model(Fmu.of(axis, model, name))
     expected = np.genfromtxt(f"{base}_ref.csv", delimiter=",", skip_header=1)
     inputs = (
         np.genfromtxt(f"{base}_in.csv", delimiter=",", skip_header=1) if Path(f"{base}_in.csv").exists() else expected
@@ -90,12 +89,9 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
 @pytest.mark.slow
 def test_the_reference_is_short_and_the_same_every_time() -> None:
     machine = load_machine("spring_mass_damper")
-    parameters = machine.fmi_parameters()
-    description = {"model": "HybridPredictor", "name": "H", "parameters": parameters, "modes": [{}]}
-    mode = machine.model.modes[0]
-    description["modes"] = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
-    files = reference_files(machine, description, *library_models(machine, description))
-    assert files == reference_files(machine, description, *library_models(machine, description))
+    fmu = Fmu.of(machine, "HybridPredictor", "H")
+    files = reference_files(machine, fmu.table, *library_models(fmu))
+    assert files == reference_files(machine, fmu.table, *library_models(fmu))
     names = ("H_in.csv", "H_ref.csv", "H_ref.opt", "reference.exp")
     assert sorted(files) == [f"{RELATED_FOLDER}/{file}" for file in names]
     assert b"StopTime, 0.6\n" in files[f"{RELATED_FOLDER}/H_ref.opt"]
@@ -109,10 +105,8 @@ def test_the_reference_of_a_late_measurement_is_late() -> None:
     rms = []
     for late in (0, 5):
         changed = machine.changed("compensator", {"measurement_delay": late})
-        modes = [asdict(mode) for mode in changed.model.modes]
-        parameters = changed.fmi_compensator_parameters()
-        description = {"model": "SepCompensator", "name": "C", "parameters": parameters, "modes": modes}
-        files = reference_files(changed, description, *library_models(changed, description))
+        fmu = Fmu.of(changed, "SepCompensator", "C")
+        files = reference_files(changed, fmu.table, *library_models(fmu))
         table = np.genfromtxt(BytesIO(files[f"{RELATED_FOLDER}/C_ref.csv"]), delimiter=",", names=True)
         rms.append(float(table["rms_e"][-1]))
     assert rms[1] == pytest.approx(rms[0], rel=0.2)

@@ -10,8 +10,7 @@ import pytest
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import MachineError
-from hybridsep.fmi.description import fmu_description
-from hybridsep.fmi.variables import variables_of
+from hybridsep.fmi.fmu import table_of
 
 
 def rotary(folder: Path, machine: str = "emps") -> Path:
@@ -23,7 +22,7 @@ def rotary(folder: Path, machine: str = "emps") -> Path:
 
 def test_units(tmp_path: Path) -> None:
     machine = load_machine(rotary(tmp_path))
-    table = {v.name: v for v in variables_of(fmu_description(machine, "HybridPredictor", "HybridPredictor"))}
+    table = {v.name: v for v in table_of(machine, "HybridPredictor", "HybridPredictor").variables}
     assert (table["x_h"].unit, table["x_h"].display_unit) == ("rad", "deg")
     assert (table["e_servo"].unit, table["e_servo"].display_unit) == ("rad", "urad")
     assert (table["lambda"].unit, table["T_s"].unit, table["mode[1].f_n"].unit) == ("rad2", "s", "Hz")

@@ -252,7 +252,7 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
 
 
 def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
-    description = c_core.DESCRIPTIONS["predictor_2"]
+    modes_here = c_core.TABLES["predictor_2"].modes
     for changes in (
         {"p": 30, "q": 9},
         {"lambda": 1e-8},
@@ -266,8 +266,8 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
                 PredictorSettings.from_fmi(values),
             )
             for values, modes in (
-                ({**c_core.PREDICTOR, **changes}, description["modes"][::-1]),
-                (dict(c_core.PREDICTOR), description["modes"]),
+                ({**c_core.PREDICTOR, **changes}, modes_here[::-1]),
+                (dict(c_core.PREDICTOR), modes_here),
             )
         )
         content = weights_file(learned)
@@ -281,7 +281,7 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
     assert "the number of modes must be 4, with which this FMU was trained (weights.bin), got 1" in refusal(
         CModel(
             "predictor",
-            {"input_hold": 1, "dead_time": 7, **dict(zip(MODE_1, description["modes"][-1].values(), strict=True))},
+            {"input_hold": 1, "dead_time": 7, **dict(zip(MODE_1, modes_here[-1].values(), strict=True))},
             tmp_path,
         ).initialise
     )

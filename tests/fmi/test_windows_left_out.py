@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from built_once import BuiltFmus
-from c_core import DESCRIPTIONS, CModel
+from c_core import TABLES, CModel
 from command_line import Run
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
@@ -73,8 +74,8 @@ def test_windows_are_listed_in_the_order_of_their_samples(fmus: BuiltFmus, name:
 
 
 def test_the_sources_have_no_windows_either() -> None:
-    description = {**DESCRIPTIONS["predictor"], "windows": False}
-    DESCRIPTIONS.setdefault("predictor_bare", description)
+    table = replace(TABLES["predictor"], name="predictor_bare", windows=False)
+    TABLES.setdefault(table.name, table)
     model, whole = CModel("predictor_bare"), CModel("predictor")
     assert len(whole.values) - len(model.values) == 4 * 100
     for each in (model, whole):

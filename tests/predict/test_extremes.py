@@ -23,7 +23,6 @@ from properties import share
 from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
-from hybridsep.fmi.variables import variables_of
 from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
@@ -312,9 +311,9 @@ def test_a_trajectory_of_too_many_samples_is_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", c_core.DESCRIPTIONS)
+@pytest.mark.parametrize("name", c_core.TABLES)
 def test_every_parameter_of_an_fmu_has_both_bounds(name: str) -> None:
-    for variable in variables_of(c_core.DESCRIPTIONS[name]):
+    for variable in c_core.TABLES[name].variables:
         if variable.causality == "parameter":
             assert variable.minimum is not None
             assert variable.maximum is not None

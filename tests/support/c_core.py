@@ -23,12 +23,12 @@ from places import ROOT
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.variables import (
     COMPENSATOR_SETTINGS,
     INTERPOLATED,
     PREDICTOR_SETTINGS,
     TRUST_SETTINGS,
-    variables_of,
 )
 from hybridsep.machines.machine import load_machine
 from hybridsep.predict.uncertainty import N_LEARNED, Uncertainty
@@ -52,7 +52,7 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 }
 """The staircase drive's linear part, as one mode of eq. (15)."""
 
-STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
+STAGE_MODES = tuple(asdict(mode) for mode in load_machine("als25010_x").model.modes)
 """The stage's X axis, Table 1."""
 PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}), "trust": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
@@ -70,16 +70,19 @@ STAGE_DRIVE = {
 
 COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}), "trust": 0}
 
-DESCRIPTIONS: dict[str, dict[str, Any]] = {
-    "predictor": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": [SPRING_MASS_DAMPER]},
-    "predictor_2": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": STAGE_MODES},
-    "feed_drive": {"model": "FeedDrive", "parameters": FEED_DRIVE, "modes": []},
-    "stage_drive": {"model": "FeedDrive", "parameters": STAGE_DRIVE, "modes": STAGE_MODES},
-    "compensator": {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": [SPRING_MASS_DAMPER]},
-    "compensator_2": {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": STAGE_MODES},
-    "trajectory": {"model": "ReferenceTrajectory", "parameters": {"trajectory": 3, "T_s": 1e-3}, "modes": []},
+TABLES: dict[str, FmuTable] = {
+    table.name: table
+    for table in (
+        FmuTable("HybridPredictor", "predictor", PREDICTOR, (SPRING_MASS_DAMPER,)),
+        FmuTable("HybridPredictor", "predictor_2", PREDICTOR, STAGE_MODES),
+        FmuTable("FeedDrive", "feed_drive", FEED_DRIVE),
+        FmuTable("FeedDrive", "stage_drive", STAGE_DRIVE, STAGE_MODES),
+        FmuTable("SepCompensator", "compensator", COMPENSATOR, (SPRING_MASS_DAMPER,)),
+        FmuTable("SepCompensator", "compensator_2", COMPENSATOR, STAGE_MODES),
+        FmuTable("ReferenceTrajectory", "trajectory", {"trajectory": 3, "T_s": 1e-3}),
+    )
 }
-"""Models built here, described as in an FMU's machine.json."""
+"""Tables of the models built here, by name."""
 
 
 def sources() -> list[str]:
@@ -117,9 +120,9 @@ def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, 
 
 
 def write_header(name: str, folder: Path) -> None:
-    """Write hsep_fmu.h of one of :data:`DESCRIPTIONS`."""
+    """Write hsep_fmu.h of one of :data:`TABLES`."""
     folder.mkdir(exist_ok=True)
-    (folder / "hsep_fmu.h").write_text(c_header({"name": name, **DESCRIPTIONS[name]}, "{test}"), encoding="utf-8")
+    (folder / "hsep_fmu.h").write_text(c_header(TABLES[name], "{test}"), encoding="utf-8")
 
 
 class Context(ctypes.Structure):
@@ -139,7 +142,7 @@ class Context(ctypes.Structure):
 
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """Return the shared library of one of :data:`DESCRIPTIONS`, built when first asked for.
+    """Return the shared library of one of :data:`TABLES`, built when first asked for.
 
     All processes of a test session share it.
     """
@@ -170,7 +173,7 @@ class CModel:
     Parameters
     ----------
     name : str
-        Of :data:`DESCRIPTIONS`.
+        Of :data:`TABLES`.
     start : mapping
         Values that differ from the table's start values.
     resources : Path, optional
@@ -179,9 +182,9 @@ class CModel:
 
     def __init__(self, name: str, start: Mapping[str, float] | None = None, resources: Path | None = None) -> None:
         self.library = library(name)
-        table = variables_of(DESCRIPTIONS[name])
+        table = TABLES[name].variables
         self.place = {variable.name: i for i, variable in enumerate(table)}
-        slopes = INTERPOLATED[DESCRIPTIONS[name]["model"]]
+        slopes = INTERPOLATED[TABLES[name].model]
         self.slope_place = {slope: len(table) + self.place[slope] for slope in slopes}
         self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
         self.context = Context.from_buffer_copy(self.library.test_table().contents)
@@ -250,8 +253,8 @@ class CModel:
 
 def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
-    values = {"trust": 0, "period": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
-    modes = DESCRIPTIONS[name]["modes"]
+    values = {"trust": 0, "period": 0.0, **TABLES[name].parameters, **settings}
+    modes = TABLES[name].modes
     names = (*PREDICTOR_SETTINGS, "trust", "period")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}

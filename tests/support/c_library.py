@@ -6,7 +6,7 @@ import ctypes
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -144,7 +144,7 @@ class Library:
     modes : list of mappings
     """
 
-    def __init__(self, kind: str, settings: Mapping[str, float], modes: list[dict[str, float]]) -> None:
+    def __init__(self, kind: str, settings: Mapping[str, float], modes: Sequence[Mapping[str, float]]) -> None:
         self.kind, self.core = kind, interface()
         self.modes = (Mode * len(modes))(*(Mode(**mode) for mode in modes))
         self.parameters = Parameters()

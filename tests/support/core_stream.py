@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from c_core import DESCRIPTIONS, CModel, RefusedError
-from stream import OUTPUTS, Array, RefusedStreamError, Value, description_of, kind_of
+from c_core import TABLES, CModel, RefusedError
+from stream import OUTPUTS, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep.base.state import pack, unpack
 
@@ -26,7 +26,7 @@ class CoreStream:
     """
 
     def __init__(self, model: str, resources: Path, *, warm: bool = False) -> None:
-        DESCRIPTIONS.setdefault(model, description_of(model))
+        TABLES.setdefault(model, table_of_model(model))
         self.model = model
         self._kind = f"core {model}"
         self._start = {"t_init": 0.0} if warm else {}

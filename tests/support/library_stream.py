@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from library_models import library_look_ahead, library_plant, numbered, restored_look_ahead
-from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, description_of, kind_of
+from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep import HybridSepError
 from hybridsep.base.settings import CompensatorSettings
@@ -29,9 +29,9 @@ def refusing() -> Iterator[None]:
 
 def start_values(model: str) -> dict[str, Any]:
     """Return the start values of a model's inputs and parameters."""
-    description: Any = description_of(model)
+    table = table_of_model(model)
     inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0}
-    return {**inputs, **description["parameters"], **numbered(description["modes"])}
+    return {**inputs, **table.parameters, **numbered(table.modes)}
 
 
 class LibraryStream:

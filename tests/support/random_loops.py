@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel
+from c_core import COMPENSATOR, TABLES, TS, CModel
 from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
+from hybridsep.fmi.fmu import table_of
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
@@ -24,14 +25,8 @@ LIMITS = {"trajectory": (0.08, 8.0, 1000.0), "drive": (0.1, 16.0, 5000.0)}
 """v_max, a_max and j_max: those of the trajectory, so that nearly every plan is bounded, and the usual ones."""
 
 for _name in MACHINES:
-    DESCRIPTIONS[f"compensator_{_name}"] = {
-        "model": "SepCompensator",
-        "parameters": COMPENSATOR,
-        "modes": [
-            {"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}
-            for mode in load_machine(_name).model.modes
-        ],
-    }
+    _table = table_of(load_machine(_name), "SepCompensator", f"compensator_{_name}")
+    TABLES[_table.name] = replace(_table, parameters=COMPENSATOR)
 
 
 @dataclass(frozen=True)
@@ -56,7 +51,7 @@ class Loop:
 
     @property
     def model(self) -> str:
-        """Key of :data:`c_core.DESCRIPTIONS`."""
+        """Key of :data:`c_core.TABLES`."""
         return f"compensator_{self.machine}"
 
     def drive(self) -> tuple[Drive, Encoder]:
@@ -115,7 +110,7 @@ def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
     plant, encoder = loop.drive()
     start = float(loop.r[0])
-    values = {**loop.values, **numbered(DESCRIPTIONS[loop.model]["modes"])}
+    values = {**loop.values, **numbered(TABLES[loop.model].modes)}
     ahead = LookAhead(library_compensator(values), start)
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):

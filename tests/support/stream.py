@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import load_machine, paper_machine
-from hybridsep.fmi.description import fmu_description
+from hybridsep.fmi.fmu import table_of
+from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.machines.machine import Machine
 
 Array = NDArray[np.float64]
@@ -123,6 +124,6 @@ def machine_of(model: str) -> Machine:
     return paper_machine(name) if kind_of(model) == "HybridPredictor" else load_machine(name)
 
 
-def description_of(model: str) -> dict[str, object]:
-    """Return what the model's FMU is made from: start values and modes."""
-    return fmu_description(machine_of(model), kind_of(model), model)
+def table_of_model(model: str) -> FmuTable:
+    """Return the table of the model's FMU."""
+    return table_of(machine_of(model), kind_of(model), model)
