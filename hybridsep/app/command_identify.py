@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..base.errors import ParameterError
 from ..base.output import written_text
+from ..identify.kinds import KINDS
 from .options import (
     CommandColumnOption,
     ForceOption,
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from ..logs.units import Shown
 
 __all__ = ["identify"]
-
-KINDS = ("auto", "operation", "response", "sweep", "klipper")
-"""What ``--kind`` takes."""
 
 
 def identify(
@@ -82,17 +79,9 @@ def identify(
 
     From a log, a frequency response, a swept sine or Klipper's accelerometers.
     """
-    import numpy as np
-
     from ..identify.figures import operation_figure, response_figure
-    from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response
-    from ..identify.klipper import identify_resonance, is_klipper, read_klipper
-    from ..identify.operation import identify_operation
-    from ..identify.response_files import has_response, read_response
-    from ..identify.segments import in_time
-    from ..identify.swept_sine import h1
-    from ..intake.repair import changes, take_in
-    from ..logs.log import read_log
+    from ..identify.frequency_response import IdentifiedResponse
+    from ..identify.recording import Choices, Reading, identify_recording, read_recording
     from ..logs.units import shown_in
     from ..machines.naming import checked_name, machine_name
     from ..reports.extent import partly_used
@@ -101,95 +90,32 @@ def identify(
     from .progress import progress_bar
     from .tables import console, print_written
 
-    if kind not in KINDS:
-        raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
     outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, PNG))
     machine = checked_name(name) if name else machine_name(out or recording)
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
-    if kind == "auto":
-        kind = "operation"
-        if is_klipper(recording):
-            kind = "klipper"
-        elif not columns and has_response(recording):
-            kind = "response"
-    if fix and kind != "operation":
-        raise ParameterError(f"--fix is for a log of operation, {recording.name} is read as --kind {kind}")
-    if measurement_delay and kind not in ("operation", "sweep"):
-        raise ParameterError(f"--measurement-delay is for a log, {recording.name} is read as --kind {kind}")
-    interval = 1e-3 if T_s is None else T_s
-    found: IdentifiedModel | IdentifiedResponse
-    changed: list[str] = []
-    shown, partly = shown_in("m"), ""
+    reading = Reading(kind, columns, unit, T_s, axis, measurement_delay, fix)
     with progress_bar(as_json) as advance:
-        if kind == "klipper":
-            found = identify_resonance(read_klipper(recording), _klipper_axis(axis), T_s=interval)
-        elif kind == "response":
-            f, G, std = read_response(recording)
-            found = identify_frequency_response(
-                *(f, G),
-                std=std,
-                n_modes=modes,
-                unit_gain=bool(unit_gain),
-                T_s=interval,
-                input_hold=hold,
-                dead_time=dead_time,
-                progress=advance,
-            )
+        read = read_recording(recording, reading)
+        if read.log is not None and read.reading.kind == "operation":
+            show(read.log.remarks, read.findings)
+        found = identify_recording(read, Choices(unit_gain, modes, hold, dead_time), advance)
+    shown = shown_in("m") if read.log is None else read.log.shown
+    if figure is not None:
+        if isinstance(found, IdentifiedResponse):
+            response_figure(found, recording.name, figure)
         else:
-            sweeps = kind == "sweep"
-            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=sweeps, may_miss=True)
-            shown = log.shown
-            n_missing = int(np.isnan(log.x_meas).sum())
-            if sweeps and n_missing:
-                raise ParameterError(
-                    f"{recording}: a swept sine must be measured in every sample, {n_missing} measured positions are "
-                    "missing; record it again, or read it as a log of operation (--kind operation)"
-                )
-            if not sweeps:
-                (log,), findings = take_in([log], fix=fix)
-                show(log.remarks, findings[recording.name])
-                changed, partly = changes(findings), partly_used(log)
-            pieces = [in_time(piece.x_d, piece.x_meas, measurement_delay) for piece in log.segments()]
-            pieces = [piece for piece in pieces if len(piece[0])]
-            if sweeps:
-                if len(pieces) > 1:
-                    raise ParameterError(f"{recording}: a swept sine must have no gap, got {len(pieces)} pieces")
-                lines = h1(*pieces[0], log.T_s)
-                found = identify_frequency_response(
-                    *(lines.frequency, lines.response),
-                    std=lines.std,
-                    n_modes=modes,
-                    unit_gain=bool(unit_gain),
-                    T_s=log.T_s,
-                    input_hold=hold,
-                    dead_time=dead_time,
-                    sampled=True,
-                    progress=advance,
-                )
-            else:
-                found = identify_operation(
-                    pieces, log.T_s, unit_gain=unit_gain, unit=log.unit, shown=log.shown, progress=advance
-                )
-                if figure is not None:
-                    operation_figure(found, pieces, recording.name, figure, log.shown)
-    if figure is not None and isinstance(found, IdentifiedResponse):
-        response_figure(found, recording.name, figure)
+            operation_figure(found, read.pieces, recording.name, figure, shown)
     if out is not None:
         entries: dict[str, Any] = {"predictor": {"measurement_delay": measurement_delay}} if measurement_delay else {}
-        entries |= {"sources": [f"identified from {recording.name}", *changed]} if changed else {}
+        if read.changed:
+            entries["sources"] = [f"identified from {recording.name}", *read.changed]
         _write_machine(found, machine, recording.name, entries, out)
-    if partly and not as_json:
-        console.print(partly)
+    if not as_json and read.log is not None and read.reading.kind == "operation" and (line := partly_used(read.log)):
+        console.print(line)
     _print_identified(found, as_json, recording.name, shown)
     if not as_json:
         print_written(out, figure)
-
-
-def _klipper_axis(axis: str | None) -> str:
-    if axis is None or axis not in ("x", "y", "z"):
-        raise ParameterError(f"Klipper's file holds three axes: say which was shaken, --axis x, y or z, got {axis!r}")
-    return axis
 
 
 def _write_machine(
