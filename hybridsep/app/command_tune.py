@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,6 +25,12 @@ from .options import (
     takes_parameters,
     takes_reading,
 )
+
+if TYPE_CHECKING:
+    from ..base.signals import Array
+    from ..intake.finding import Finding
+    from ..logs.units import Shown
+    from ..machines.machine import Machine
 
 __all__ = ["tune"]
 
@@ -54,31 +61,81 @@ def tune(
 
     The look-ahead is the controller's.
     """
-    from ..intake.finding import findings_table
-    from ..intake.repair import changes
-    from ..logs.log import Log
-    from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
-    from ..machines.seal import sealed
-    from ..machines.text import machine_text
     from ..parallel.engine import cluster_of
-    from ..reports.extent import partly_used
-    from ..tune.choice import with_window
-    from ..tune.grid import TUNED, candidates, default_values
     from ..tune.joint import n_processors, over_windows
     from ..tune.joint import tune as tune_on
     from ..tune.losses import n_unjudged
-    from .log_intake import open_checked, reading_of, show
+    from .log_intake import show
     from .overwrite import FIGURES, MACHINE, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
-    from .tune_table import entries, print_tuning, tuning_summary
+    from .tune_table import print_tuning, tuning_summary
 
     if figure is not None:
         from ..tune.figures import tuning_figure
 
     given = load_machine(machine)
     outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, FIGURES))
+    changed, values, tried = _tried(given, parameters, writes=out is not None)
+    inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
+    check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
+    read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust, fix=fix, as_is=as_is)
+    with cluster_of(workers, scheduler) as engine, progress_bar(as_json) as advance:
+        jobs = n_processors() if jobs is None else jobs
+        tuning = tune_on(
+            *(given.model, read.pieces, tried),
+            jobs=jobs,
+            engine=engine,
+            progress=lambda done: advance(f"replay {len(tried)} candidates", 0.9 * done),
+        )
+        chosen = tuning.candidates[tuning.chosen]
+        windows = over_windows(
+            *(given.model, read.pieces, chosen),
+            jobs=jobs,
+            engine=engine,
+            progress=lambda done: advance("error over Np", 0.9 + 0.1 * done),
+        )
+    if figure is not None:
+        tuning_figure(tuning, windows, values, given.title, figure)
+    Np = changed.predictor_settings.Np
+    in_motion = [name for name, one in read.pieces.items() if any(n_unjudged(x_d, Np) for x_d, _ in one)]
+    if in_motion and not as_json:
+        show([f"{', '.join(in_motion)}: begins in motion, and is ranked without its first window"], ())
+    if as_json:
+        print_json({**tuning_summary(tuning, windows, values), "findings": read.findings_table()})
+    else:
+        for line in read.partly:
+            console.print(line)
+        print_tuning(tuning, windows, values, given.title, read.shown)
+    if out is not None:
+        _write_machine(changed, chosen, values, read, out)
+    if not as_json:
+        print_written(out, figure)
+
+
+@dataclass(frozen=True)
+class _Read:
+    """Logs by name: their segments, findings, what share of the files is used in words, and the last one's units."""
+
+    pieces: dict[str, list[tuple[Array, Array]]]
+    findings: dict[str, tuple[Finding, ...]]
+    partly: list[str]
+    shown: Shown
+
+    def findings_table(self) -> dict[str, Any]:
+        from ..intake.finding import findings_table
+
+        return {name: findings_table(found) for name, found in self.findings.items()}
+
+
+def _tried(
+    given: Machine, parameters: Mapping[str, Any], *, writes: bool
+) -> tuple[Machine, dict[str, tuple[Any, ...]], list[PredictorSettings]]:
+    """Return the machine with what is fixed, the values of what is tuned, and the settings that are tried."""
+    from ..tune.choice import with_window
+    from ..tune.grid import TUNED, candidates, default_values
+
     ranges = {
         field: parse_range(parameters[parameter.name], parameter)
         for field, parameter in TUNED.items()
@@ -87,59 +144,49 @@ def tune(
     fixed = {name: value for name, value in parameters.items() if name in ("Np", "t_init", "trust")}
     fitting = with_window(given.predictor_settings, fixed.get("Np", given.predictor_settings.Np))
     changed = given.changed("predictor", {"p": fitting.p, "q": fitting.q, **fixed})
-    settings = changed.predictor_settings
-    values = {**default_values(settings), **ranges}
-    tried = candidates(settings, values)
-    if out is not None:  # a [compensator] that takes over p and q may not allow the largest
+    values = {**default_values(changed.predictor_settings), **ranges}
+    tried = candidates(changed.predictor_settings, values)
+    if writes:  # a [compensator] that takes over p and q may not allow the largest
         changed.changed("predictor", {"p": max(one.p for one in tried), "q": max(one.q for one in tried)})
-    inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
-    check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
-    how = reading_of(given, reading, may_miss=settings.trust)
-    pieces, findings, changed_logs, partly = {}, {}, {}, []
+    return changed, values, tried
+
+
+def _read(
+    logs: Sequence[Path], given: Machine, reading: ReadingOptions, *, may_miss: bool, fix: bool, as_is: bool
+) -> _Read:
+    """Read and check the logs."""
+    from ..logs.log import Log
+    from ..logs.units import shown_of
+    from ..reports.extent import partly_used
+    from .log_intake import open_checked, reading_of
+
+    how = reading_of(given, reading, may_miss=may_miss)
+    pieces, findings, partly = {}, {}, []
     for name, path in _named(logs).items():
         opened, intake = open_checked(path, how, given, fix=fix, as_is=as_is, segments=True)
         log = opened if isinstance(opened, Log) else opened.read()
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
-        findings[name], changed_logs[name] = findings_table(intake.findings), intake.findings
+        findings[name] = intake.findings
         partly += [line] if (line := partly_used(log)) else []
-        shown = shown_of(log.file_unit, given.unit)  # the last log's
-    with cluster_of(workers, scheduler) as engine, progress_bar(as_json) as advance:
-        jobs = n_processors() if jobs is None else jobs
-        tuning = tune_on(
-            *(given.model, pieces, tried),
-            jobs=jobs,
-            engine=engine,
-            progress=lambda done: advance(f"replay {len(tried)} candidates", 0.9 * done),
-        )
-        chosen = tuning.candidates[tuning.chosen]
-        windows = over_windows(
-            *(given.model, pieces, chosen),
-            jobs=jobs,
-            engine=engine,
-            progress=lambda done: advance("error over Np", 0.9 + 0.1 * done),
-        )
-    if figure is not None:
-        tuning_figure(tuning, windows, values, given.title, figure)
-    in_motion = [
-        name for name, one in pieces.items() if any(n_unjudged(x_d, changed.predictor_settings.Np) for x_d, _ in one)
-    ]
-    if in_motion and not as_json:
-        show([f"{', '.join(in_motion)}: begins in motion, and is ranked without its first window"], ())
-    if as_json:
-        print_json({**tuning_summary(tuning, windows, values), "findings": findings})
-    else:
-        for line in partly:
-            console.print(line)
-        print_tuning(tuning, windows, values, given.title, shown)
-    if out is not None:
-        best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
-        sources = dict.fromkeys((*best.sources, *changes(changed_logs)))
-        best = best.model_copy(update={"sources": tuple(sources)} if sources else {})
-        comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
-        with written_text(out) as file:
-            file.write(sealed(machine_text(best, [comment]), "tune"))
-    if not as_json:
-        print_written(out, figure)
+        shown = shown_of(log.file_unit, given.unit)
+    return _Read(pieces, findings, partly, shown)
+
+
+def _write_machine(
+    changed: Machine, chosen: PredictorSettings, values: Mapping[str, Sequence[Any]], read: _Read, out: Path
+) -> None:
+    """Write the machine file with the settings that were chosen."""
+    from ..intake.repair import changes
+    from ..machines.seal import sealed
+    from ..machines.text import machine_text
+    from .tune_table import entries
+
+    best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
+    sources = dict.fromkeys((*best.sources, *changes(read.findings)))
+    best = best.model_copy(update={"sources": tuple(sources)} if sources else {})
+    comment = f"Settings of [predictor] from hybridsep tune on {', '.join(Path(name).name for name in read.pieces)}."
+    with written_text(out) as file:
+        file.write(sealed(machine_text(best, [comment]), "tune"))
 
 
 def _named(logs: Sequence[Path]) -> dict[str, Path]:

@@ -158,7 +158,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     def joined(name: str) -> Array:
         return np.concatenate([np.atleast_1d(getattr(batch, name)) for batch in batches])
 
-    scores = backtest_stream(predictor, [(command, measured)], on_batch=keep)
+    scores = _replayed(predictor, [np.stack((command, measured))], keep)
     return Backtest(
         scores.overall,
         scores.after_warm_up,
@@ -170,7 +170,6 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     )
 
 
-@one_blas_thread
 def backtest_stream(
     predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]], *, on_batch: OnBatch | None = None
 ) -> Scores:
@@ -196,11 +195,17 @@ def backtest_stream(
         If a chunk's samples cannot be used, there are none at all, or a prediction diverges. The windows before are
         learned.
     """
+    return _replayed(predictor, _checked(predictor, chunks), on_batch)
+
+
+@one_blas_thread
+def _replayed(predictor: HybridPredictor, chunks: Iterable[Array], on_batch: OnBatch | None) -> Scores:
+    """Replay chunks, (2, m) each, whose samples are checked."""
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
     j = k = n_rejected = n_missing = 0
     late: Array | None = None
     residual = 0.0
-    for commands, x in _windows(predictor, chunks):
+    for commands, x in _windows(chunks, predictor.Np):
         window = _predicted(predictor, commands, residual)
         if late is None:
             late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.late)
@@ -263,14 +268,10 @@ def _measure(error: Array, k: int) -> tuple[int, list[float], list[float]]:
     return error.shape[1], [float(row.dot(row)) for row in error], peaks
 
 
-def _windows(
-    predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]]
-) -> Iterator[tuple[Array, Array]]:
+def _windows(chunks: Iterable[Array], Np: int) -> Iterator[tuple[Array, Array]]:
     """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
-    waiting, k, Np = np.empty((2, 0)), 0, predictor.Np
-    for chunk in chunks:
-        samples = np.asarray(_checked(predictor, chunk, k))
-        k += samples.shape[1]
+    waiting = np.empty((2, 0))
+    for samples in chunks:
         if waiting.size:
             samples = np.concatenate((waiting, samples), axis=1)
         whole = samples.shape[1] // Np * Np
@@ -281,15 +282,18 @@ def _windows(
         yield waiting[0], waiting[1]
 
 
-def _checked(predictor: HybridPredictor, chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
-    """Return a chunk's samples; SignalError names the chunk by its first sample ``k``."""
-    place = f" of the chunk from sample {k} on" if k else ""
-    try:
-        first, second = chunk
-    except (TypeError, ValueError):
-        raise SignalError(f"each chunk must be a pair (x_d, x), got {type(chunk).__name__}{place}") from None
-    x_d = as_samples(first, f"x_d{place}")
-    return x_d, _measured(predictor, second, f"x{place}", len(x_d))
+def _checked(predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]]) -> Iterator[Array]:
+    """Yield each chunk's samples, (2, m); SignalError names the chunk by its first sample."""
+    k = 0
+    for chunk in chunks:
+        place = f" of the chunk from sample {k} on" if k else ""
+        try:
+            first, second = chunk
+        except (TypeError, ValueError):
+            raise SignalError(f"each chunk must be a pair (x_d, x), got {type(chunk).__name__}{place}") from None
+        x_d = as_samples(first, f"x_d{place}")
+        yield np.stack((x_d, _measured(predictor, second, f"x{place}", len(x_d))))
+        k += len(x_d)
 
 
 def _measured(predictor: HybridPredictor, x: ArrayLike, name: str, length: int) -> Array:
