@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,11 @@ __all__ = [
 _NOISIER = 3.0
 """Ratio of the columns' noise from which the noisier one is the measured one."""
 
-_EARLY = (-1.0, 0.5)
-"""Lag of the measured position, samples, up to which the command is late, and up to which it may be."""
+_LATE_COMMAND = -1.0
+"""Lag of the measured position, samples, up to which the command is the later column."""
+
+_PERHAPS_LATE_COMMAND = 0.5
+"""Lag, samples, up to which it may be."""
 
 _LEFT_BY_DRIVE = 0.3
 """Share of the variance that a drive may leave if it is to explain one column by the other."""
@@ -40,11 +43,17 @@ _LEFT_BY_DRIVE = 0.3
 _NOISY = -0.5
 """Correlation of neighbouring fifth differences, -5/6 in white noise, above which they are those of a motion."""
 
-_VELOCITY_SHARE, _VELOCITY_LEFT = 0.5, 0.3
-"""Variance that a velocity must explain at least, and what it may leave of what the position leaves."""
+_VELOCITY_SHARE = 0.5
+"""Share of the variance that a velocity must explain at least."""
 
-_OFFSET_TRAVEL, _OFFSET_SPREAD = 0.02, 6.0
-"""Offset, in travels and in spreads of the error around it, from which it is no servo error."""
+_VELOCITY_LEFT = 0.3
+"""Share that it may leave of what the position leaves."""
+
+_OFFSET_TRAVEL = 0.02
+"""Offset, in travels, from which it is no servo error."""
+
+_OFFSET_SPREAD = 6.0
+"""The same in spreads of the error around it."""
 
 _OFFSET_REST = 2.0
 """Offset, in what the gain leaves of the travel, below which an axis at rest may have it."""
@@ -52,20 +61,58 @@ _OFFSET_REST = 2.0
 _DELAY_MIN = 3.0
 """Dead time, in samples, below which a drive may have it."""
 
-_DELAYS = ((4.5, 0.4, 1.0), (2.0, 1.1, 0.2), (1.1, 2.5, 1.0))
-"""What a dead time must do to be noted, one of: divide the squared residual of one mode by the first
-number, be the second one times the mode's lag, and leave the third one of what a mere lag leaves. Further modes look
-like a dead time, too."""
+
+class _DelayRule(NamedTuple):
+    """What a dead time must do to be noted.
+
+    Attributes
+    ----------
+    gain : float
+        It divides the squared residual of one mode by this at least.
+    lags : float
+        It is this many times the mode's lag at least.
+    left : float
+        It leaves this share at most of what a mere lag leaves: further modes look like a dead time, too.
+    """
+
+    gain: float
+    lags: float
+    left: float
+
+
+_DELAYS = (_DelayRule(4.5, 0.4, 1.0), _DelayRule(2.0, 1.1, 0.2), _DelayRule(1.1, 2.5, 1.0))
+"""One of them must hold."""
 
 _LEAD_MIN = 3.5
 """Lead, in samples, below which modes in antiphase may show it."""
 
-_LEADS = ((50.0, -1.0), (8.0, -2.5))
-"""The same of a response before its cause: the gain, and the lag, in samples, that the whole response must be below."""
 
-_MODEL_DELAY, _MODEL_SHARE, _MODEL_GAIN = 0.4, 0.4, 10.0
-"""Delay against a known model, in samples and in the model's own lag, and what its correction must divide the squared
-error by."""
+class _LeadRule(NamedTuple):
+    """What a response before its cause must do to be noted.
+
+    Attributes
+    ----------
+    gain : float
+        It divides the squared residual by this at least.
+    lag : float
+        The whole response's lag is below this, samples.
+    """
+
+    gain: float
+    lag: float
+
+
+_LEADS = (_LeadRule(50.0, -1.0), _LeadRule(8.0, -2.5))
+"""One of them must hold."""
+
+_MODEL_DELAY = 0.4
+"""Delay against a known model, in samples, from which it is noted."""
+
+_MODEL_SHARE = 0.4
+"""The same in the model's own lag."""
+
+_MODEL_GAIN = 10.0
+"""What its correction must divide the squared error by."""
 
 
 def check_same(log: Log) -> Iterator[Finding]:
@@ -92,7 +139,7 @@ def check_swapped(log: Log) -> Iterator[Finding]:
     if not (noise[0] > _NOISIER * noise[1] and noise[0] > 1e-9 and _is_noise(x_d) and np.ptp(x) > 0.0):
         return
     lag = line_at_best_lag(x_d, x).lag
-    if lag > _EARLY[1]:
+    if lag > _PERHAPS_LATE_COMMAND:
         return
     means, means_x, _ = averaged(log)
     given, exchanged = (drive_explaining(*each).unexplained for each in ((means, means_x), (means_x, means)))
@@ -100,7 +147,7 @@ def check_swapped(log: Log) -> Iterator[Finding]:
         return
     evidence = {"lag": lag, "noise_x_d": noise[0], "noise_x": noise[1]}
     noisier = f"({noise[0]:.1e} of its travel against {noise[1]:.1e})"
-    if lag > _EARLY[0] or given < NO_BETTER * exchanged:
+    if lag > _LATE_COMMAND or given < NO_BETTER * exchanged:
         words = (
             f"x_d is noisier than x {noisier}, and not clearly ahead of it ({lag:.1f} samples): the columns may be "
             "swapped; they are taken as they are"
@@ -221,9 +268,9 @@ def _delay_of_mode(x_d: Array, x: Array) -> tuple[float, dict[str, float], str] 
     delay = free.dead_time
     left = free.unexplained / max(total.unexplained, 1e-300)
     late = delay >= _DELAY_MIN and any(
-        gain >= least and delay >= times * free.lag and left <= most for least, times, most in _DELAYS
+        gain >= rule.gain and delay >= rule.lags * free.lag and left <= rule.left for rule in _DELAYS
     )
-    early = delay <= -_LEAD_MIN and any(gain >= least and total.lag <= most for least, most in _LEADS)
+    early = delay <= -_LEAD_MIN and any(gain >= rule.gain and total.lag <= rule.lag for rule in _LEADS)
     if not (late or early):
         return None
     evidence = {"delay": delay, "lag": total.lag, "gain": gain}
