@@ -27,10 +27,11 @@ from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
 from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead
+from ..online.planner import PublishedWindow
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
-from ..predict.trust.model import TrustedModel
-from ..predict.window import Prediction, PublishedWindow
+from ..predict.trust.state import TrustedModel
+from ..predict.window import Prediction
 from .constraints import DriveBounds
 from .paper_planning import PaperPlanning
 from .plan import PendingPlan, SepState
@@ -72,6 +73,7 @@ class SepCompensator:
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
         predictor.settings.check_planning()
+        predictor.plan_ahead()
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
         assert settings.preview is not None
@@ -81,7 +83,6 @@ class SepCompensator:
         bounds = self._bounds(settings)
         self._planning: Planning
         if isinstance(predictor.residual, TrustedModel):
-            predictor.residual.plan_ahead(self.preview)
             self._planning = TrustedPlanning(self._basis, bounds, settings, Np)
         else:
             self._planning = PaperPlanning(self._basis, bounds, settings, Np)
@@ -200,7 +201,7 @@ class SepCompensator:
         command = as_samples(x_d, "x_d", self.preview)
         predictor, Np = self.predictor, self.predictor.Np
         if predictor.start is None:  # at rest where the first command is
-            predictor.start = float(command[0])
+            predictor.rest_at(float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
         preview = Preview(command, self._x_d_before, self._delta_before, self._rest)

@@ -16,10 +16,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
+from ..predict.residual_window import ResidualWindow
 from ..predict.trust.disturbances import DisturbanceSlopes
-from ..predict.trust.experts import SolvedExpert
-from ..predict.trust.forecast import TrustedForecast
-from ..predict.trust.model import STATIC, TrustedModel
+from ..predict.trust.expert import SolvedExpert
+from ..predict.trust.forecast import TrustedForecast, forecast_by, scales_of, solved
+from ..predict.trust.stack import STATIC
+from ..predict.trust.state import OF_COMMAND, TrustedModel
 
 __all__ = ["PlanModel"]
 
@@ -30,11 +32,12 @@ class PlanModel:
     Parameters
     ----------
     model : TrustedModel
-        Where the measurements end, which is the beginning of the preview unless they are late; not changed.
+        Where the measurements end, which is the beginning of the preview unless they are late.
     state : (n_state,) array
         State of ``G_pb`` there.
     late : (measurement_delay,) array, m
         Commands between there and the preview, relative to the start.
+    start : float, m
     x_d, path : (n,) array, m
         Commands that the scales of the features and the variances of predictions follow from, and unmodified ones,
         relative to the start.
@@ -44,13 +47,19 @@ class PlanModel:
     scales : FeatureScales
     """
 
-    def __init__(self, model: TrustedModel, state: Array, late: Array, x_d: Array, path: Array) -> None:
-        self._model, self._discrete, self._state, self._late = model, model.static.discrete, state, late
-        command = np.concatenate((late, x_d))
-        x_pb, _ = self._discrete.forced_response(state, command)
-        self.scales = model.scales(command, x_pb, path)
-        self._solved = model.solved(self.scales)
-        self._held = model.forecast_by(self._solved, command, x_pb, self.scales).predictions
+    def __init__(self, model: TrustedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
+        self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
+        self._state, self._late, self._start = state, late, start
+        window = self._window(x_d)
+        self.scales = scales_of(model, window, path)
+        self._solved = solved(model, self.scales)
+        self._held = forecast_by(model, self._solved, window, self.scales).predictions
+
+    def _window(self, x_d: Array) -> ResidualWindow:
+        """Return the preview under commands ``x_d``, and what is late before it."""
+        command = np.concatenate((self._late, x_d))
+        x_pb, _ = self._discrete.forced_response(self._state, command)
+        return ResidualWindow(command, x_pb, self._start)
 
     @property
     def has_learned(self) -> bool:
@@ -59,13 +68,11 @@ class PlanModel:
 
     def predict(self, x_d: Array) -> TrustedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
-        command = np.concatenate((self._late, x_d))
-        x_pb, _ = self._discrete.forced_response(self._state, command)
-        return self._model.forecast_by(self._solved, command, x_pb, self.scales, self._held)
+        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self._held)
 
     def position(self, at: TrustedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
-        return (at.x_pb + at.e_h)[len(self._late) :]
+        return (at.window.x_pb + at.e_h)[len(self._late) :]
 
     def slope(self, at: TrustedForecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
@@ -81,25 +88,24 @@ class PlanModel:
         reach : float
             Of the friction's slope, as that of :meth:`StaticFeatures.slopes`.
         """
-        static, n_late = self._model.static, len(self._late)
-        weights = self._model.stack.weights.tolist()
-        over_all = static.slopes(self._model.run.static, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
+        n_late, weights = len(self._late), self._model.learned.stack.weights.tolist()
+        over_all = self._static.slopes(self._model.run.static, at.window, at.x, self.scales.velocity, reach)
         slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
         total: Array = passed.copy()
-        for expert, solved in self._solved.items():
+        for expert, one in self._solved.items():
             if weights[expert] == 0.0:
                 continue
             kept = weights[expert] * at.predictions[expert].shrink[n_late:, None]
-            if self._model.is_of_command(expert):
+            if self._model.kind_of(expert) == OF_COMMAND:
                 acted = self._late_changes(changes)
-                total += kept * self._of_command(solved, acted) + weights[expert] * (acted - passed)
+                total += kept * self._of_command(one, acted) + weights[expert] * (acted - passed)
             else:
-                total += kept * self._of_disturbances(solved, slopes, changes, passed)
+                total += kept * self._of_disturbances(one, slopes, changes, passed)
         return total
 
     def _late_changes(self, changes: Array) -> Array:
         """Return what changes of the commands are after the dead time, ``(n, m)``, m."""
-        d = min(self._model.command.dead_time, len(changes))
+        d = min(self._model.fixed.command.dead_time, len(changes))
         return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
 
     def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
@@ -113,7 +119,7 @@ class PlanModel:
         discrete = self._discrete
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
-        linear, own, differences = self._model.static.split(solved.solution.weights[: solved.n_static])
+        linear, own, differences = self._static.split(solved.solution.weights[: solved.n_static])
         disturbance = slopes.change(own, velocity, passed, moved)
         disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)

@@ -53,7 +53,7 @@ class PaperPlanning(Planning):
         hybrid = (
             most is SepState.HYBRID
             and predictor.k >= predictor.n_init
-            and predictor.regression.n_samples > 0
+            and predictor.regression.n_rows > 0
             and has_stable_poles(predictor.residual_weights)
         )
         candidates = [SepState.HYBRID] if hybrid else []

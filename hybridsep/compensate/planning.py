@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array
-from ..predict.forecast import FeatureScales
 from ..predict.predictor import HybridPredictor
+from ..predict.residual_window import FeatureScales
 from ..predict.window import Prediction
 from .constraints import Bounds, DriveBounds, solve
 from .interior import Tolerance

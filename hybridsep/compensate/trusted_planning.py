@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.signals import Array
 from ..predict.predictor import HybridPredictor
-from ..predict.trust.model import TrustedModel
+from ..predict.trust.state import TrustedModel
 from ..predict.window import Prediction
 from .interior import Tolerance
 from .linearised import PlanModel
@@ -78,7 +78,6 @@ class TrustedPlanning(Planning):
         trusted = predictor.residual
         assert isinstance(trusted, TrustedModel)
         assert predictor.start is not None
-        trusted.static.origin = predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
             x_d = path + self.basis.values @ preview.rest
-            return PlanModel(trusted, predictor.state, predictor.late, x_d, path)
+            return PlanModel(trusted, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)

@@ -208,7 +208,7 @@ def _replayed(predictor: HybridPredictor, chunks: Iterable[Array], on_batch: OnB
     for commands, x in _windows(chunks, predictor.Np):
         window = _predicted(predictor, commands, residual)
         if late is None:
-            late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.late)
+            late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.state.late)
         n = len(x)
         signals = np.concatenate((late, window), axis=1)
         late = signals[:, n:]

@@ -67,7 +67,7 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
             f"{path.name} was not trained for machine {machine.name}{subject}: it has {', '.join(differing)}; "
             "train it with that machine, or correct the machine file"
         )
-    if trained.regression.n_samples == 0:
+    if trained.regression.n_rows == 0:
         raise StateError(f"{path.name} has learned no sample; save the predictor after a run")
     return trained
 

@@ -1,10 +1,11 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factors of a trained predictor.
 
-Layout, little-endian: ``HSEPWG13``; the numbers of settings, of modes, of learned samples and of what has been learned
-besides the factors, as u64; each setting that shapes the features and the factors (with others the weights mean
-something else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be
-trusted and those of the errors' variance; the upper triangle of each factor ``[R z; 0 ρ]`` by rows, of a residual model
-that can be trusted that of the physics model's residual and that of the command's; the CRC-32 of all before as u64.
+Layout, little-endian: ``HSEPWG14``; the numbers of settings, of modes and of what has been learned besides the factors,
+as u64; each setting that shapes the features and the factors (with others the weights mean something else), its name in
+24 bytes and its value as float64; as float64 the numbers of a residual model that can be trusted, in the order of
+:class:`~hybridsep.predict.trust.state.Learned`, and of :class:`~hybridsep.predict.uncertainty.Uncertainty`; for each
+factor ``[R z; 0 ρ]`` its weighted number of rows and its upper triangle by rows, with trust one of the physics model's
+residual and one of the command's; the CRC-32 of all before as u64.
 This module is packed into the pythonfmu FMUs; the C model reads the same file.
 """
 
@@ -12,20 +13,23 @@ from __future__ import annotations
 
 import struct
 import zlib
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import SignalError, StateError
+from ..base.records import numbers_of, unsound, with_numbers
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..predict.predictor import HybridPredictor
+from ..predict.regression import RidgeRegression
 from ..predict.uncertainty import Uncertainty
 
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWG13"
-_HEAD = struct.Struct("<8s4Q")
+_MAGIC = b"HSEPWG14"
+_HEAD = struct.Struct("<8s3Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
 _MODE = ("f_n", "zeta", "alpha", "beta")
@@ -46,14 +50,12 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
     settings = learned_settings(predictor)
-    factors = [regression.factor for regression in predictor.residual.regressions]
-    learned = np.concatenate([part.ravel() for part in _learned(predictor).values()])
-    content = _HEAD.pack(
-        _MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples, len(learned)
-    )
+    learned = numbers_of(_learned(predictor))
+    content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), len(learned))
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
-    triangles = [factor[np.triu_indices(len(factor))] for factor in factors]
-    content += np.concatenate((learned, *triangles)).astype("<f8").tobytes()
+    factors = [(one.n_rows, one.factor[np.triu_indices(len(one.factor))]) for one in predictor.residual.regressions]
+    numbers = [learned, *(np.append(n_rows, triangle) for n_rows, triangle in factors)]
+    content += np.concatenate(numbers).astype("<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
@@ -73,7 +75,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         or _CHECKSUM.pack(zlib.crc32(body)) != content[-_CHECKSUM.size :]
     ):
         raise StateError(_DAMAGED)
-    _, n_settings, n_modes, n_samples, n_learned = _HEAD.unpack_from(body)
+    _, n_settings, n_modes, n_learned = _HEAD.unpack_from(body)
     start = _HEAD.size + n_settings * _SETTING.size
     if start > len(body):
         raise StateError(_DAMAGED)
@@ -88,40 +90,31 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
             problems += _differences(name, then, settings.get(name, 0.0))
     if problems:
         raise StateError("; ".join(problems))
-    parts, regressions = _learned(predictor), predictor.residual.regressions
-    ends = np.cumsum([0, *(part.size for part in parts.values())])
-    corners = np.cumsum([0, *((one.n_features + 1) * (one.n_features + 2) // 2 for one in regressions)])
-    n_numbers = int(ends[-1] + corners[-1])
-    if learned.keys() != settings.keys() or n_learned != ends[-1] or len(body) - start != 8 * n_numbers:
+    like, sizes = _learned(predictor), [one.n_features + 1 for one in predictor.residual.regressions]
+    ends = np.cumsum([len(numbers_of(like)), *(1 + size * (size + 1) // 2 for size in sizes)])
+    if learned.keys() != settings.keys() or n_learned != ends[0] or len(body) - start != 8 * ends[-1]:
         raise StateError(_DAMAGED)
-    numbers = np.frombuffer(body, "<f8", offset=start)
-    found = {
-        name: numbers[first:end].reshape(parts[name].shape).copy()
-        for name, first, end in zip(parts, ends, ends[1:], strict=False)
-    }
-    if not (Uncertainty.is_sound(found["errors"]) and predictor.residual.is_sound(found)):
+    numbers, *factors = np.split(np.frombuffer(body, "<f8", offset=start), ends[:-1])
+    found = with_numbers(like, numbers)
+    regressions = tuple(_regression(one, size) for one, size in zip(factors, sizes, strict=True))
+    if unsound((found, regressions)) is not None:
         raise StateError(_DAMAGED)
     try:
-        for regression, first, end in zip(regressions, corners, corners[1:], strict=False):
-            regression.restore(
-                _triangle(numbers[n_learned + first : n_learned + end], regression.n_features), n_samples
-            )
+        predictor.take_over(*found, regressions)
     except SignalError:
         raise StateError(_DAMAGED) from None
-    predictor.uncertainty.restore(found["errors"])
-    predictor.residual.restore_learned(found)
 
 
-def _triangle(numbers: Array, n_features: int) -> Array:
-    """Return the factor of an upper triangle by rows, ``(n_features + 1, n_features + 1)``."""
-    factor = np.zeros((n_features + 1, n_features + 1))
-    factor[np.triu_indices(n_features + 1)] = numbers
-    return factor
+def _regression(numbers: Array, size: int) -> RidgeRegression:
+    """Return the regression of its number of rows and its upper triangle, by rows, of ``size`` rows."""
+    factor = np.zeros((size, size), order="F")
+    factor[np.triu_indices(size)] = numbers[1:]
+    return RidgeRegression(factor, float(numbers[0]))
 
 
-def _learned(predictor: HybridPredictor) -> dict[str, Array]:
-    """Return what has been learned besides the factors, in the order of the file."""
-    return predictor.residual.learned() | {"errors": predictor.uncertainty.learned()}
+def _learned(predictor: HybridPredictor) -> tuple[Any, Uncertainty]:
+    """Return what has been learned besides the factors."""
+    return predictor.residual.learned, predictor.state.uncertainty
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

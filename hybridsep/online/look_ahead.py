@@ -23,8 +23,7 @@ from ..base.settings import samples_before
 from ..base.signals import Array, as_measured, check_position
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
-from ..predict.window import PublishedWindow
-from .planner import Planner, Unmodified, WindowPlanner
+from .planner import Planner, PublishedWindow, Unmodified, WindowPlanner
 
 __all__ = ["LookAhead"]
 

@@ -1,14 +1,62 @@
-"""Planners of a look-ahead's commands: a compensator, or a predictor, which is the planner that changes nothing."""
+"""Planners of a look-ahead's commands and their windows: a compensator, or a predictor, which changes nothing."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
 
 from ..base.signals import Array
 from ..predict.predictor import HybridPredictor
-from ..predict.window import PublishedWindow
+from ..predict.window import Prediction
 
-__all__ = ["Planner", "Unmodified", "WindowPlanner"]
+__all__ = ["Planner", "PublishedWindow", "Unmodified", "WindowPlanner"]
+
+
+@dataclass(frozen=True)
+class PublishedWindow:
+    """Commands of a window and the position predicted under them.
+
+    Attributes
+    ----------
+    x_d, x_dm : (Np,) arrays, m
+        Commanded position, and the modified command sent to the drive; the same without a planner.
+    x_pb, x_h : (Np,) arrays, m
+        Physics-based prediction under ``x_dm``, and that of the best available model.
+    x_h_std : (Np,) array, m
+        Standard deviation of the error of ``x_h``; 0 where it is not known.
+    state : int
+        Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
+    n_warm_up : int
+        Leading samples where ``x_h = x_pb``.
+    n_followed, state_before : int
+        Leading samples that follow the plan before, in which a real-time implementation makes this one, and the model
+        that planned them.
+    """
+
+    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
+
+    x_d: Array
+    x_dm: Array
+    x_pb: Array
+    x_h: Array
+    x_h_std: Array
+    state: int
+    n_warm_up: int
+    n_followed: int = 0
+    state_before: int = 0
+
+    @classmethod
+    def at_rest(cls, start: float, Np: int) -> PublishedWindow:
+        """Return the window of a drive at rest at ``start``, m, without a prediction."""
+        rest = np.full(Np, start)
+        return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
+
+    @classmethod
+    def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
+        """Return the window of unmodified commands; SignalError if its prediction diverges."""
+        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, prediction.x_h_std, 0, prediction.n_warm_up)
 
 
 class WindowPlanner(Protocol):

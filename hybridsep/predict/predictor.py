@@ -1,33 +1,77 @@
-"""Predictor of a drive's position, with its saved state: parameters, learned factor, and state of the run."""
+"""Predictor of a drive's position over look-ahead windows, learning from their measurement; eqs. (2) to (6).
+
+``x_h(k) = x_pb(k) + e_h(k)``, with ``e_h`` by a model of the residual ``e_pb = x − x_pb``. With the paper's,
+``e_h = wᵀφ``: within a window, residuals not measured yet are replaced by their predictions, a free run of an ARX
+recursion from the last ``p`` measured residuals, affine in the command.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..base.errors import StateError
+from ..base.errors import ParameterError, SignalError, StateError
 from ..base.output import written_whole
+from ..base.records import arrays_of, restored
 from ..base.saved import Saved
-from ..base.settings import PredictorSettings
+from ..base.settings import PredictorSettings, samples_before
+from ..base.signals import Array, as_measured, as_samples
 from ..base.state import pack, unpack
+from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
-from .paper.model import PaperModel
-from .residual_model import WindowInputs
+from . import paper, residual_model
+from .paper import PaperModel
+from .regression import RidgeRegression
+from .residual_model import ResidualModel
+from .residual_window import FeatureScales, Forecast, ResidualWindow
 from .trust.disturbances import Disturbance
-from .trust.saved import SavedTrustedModel
-from .uncertainty import N_LEARNED
-from .window import PredictedWindow
-from .window_predictor import WindowPredictor
+from .trust.forecast import TrustedForecast
+from .trust.learn import begin_in_motion
+from .trust.start import motion_before
+from .trust.state import TrustedModel
+from .uncertainty import Uncertainty, first_variance
+from .window import PredictedWindow, Prediction, WindowOperator
 
-__all__ = ["HybridPredictor"]
+__all__ = ["HybridPredictor", "PredictorState"]
 
 _KIND = "predictor"
 
 
-class HybridPredictor(WindowPredictor):
+@dataclass(frozen=True, eq=False)
+class PredictorState:
+    """What is known between two windows; it is saved as it is.
+
+    Attributes
+    ----------
+    k : int
+        Samples of this run that are measured.
+    n_init : int
+        Samples of its warm-up.
+    start : float, m
+        Initial position; None until it is known. All other positions are relative to it.
+    physics : (n_state,) array, m
+        State of ``G_pb`` behind the measured samples.
+    late : (measurement_delay,) array, m
+        Commands that are predicted and not measured yet.
+    residual : PaperModel or TrustedModel
+    uncertainty : Uncertainty
+    """
+
+    k: int
+    n_init: int
+    start: float | None
+    physics: Array
+    late: Array
+    residual: ResidualModel
+    uncertainty: Uncertainty
+
+
+class HybridPredictor:
     """Predictor of a drive's position by windows, learning from their measurement; eqs. (2) to (6).
 
     For each window, call :meth:`predict` with its commands, then :meth:`update` with the measured positions.
@@ -48,37 +92,291 @@ class HybridPredictor(WindowPredictor):
         ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over the
         motion of a sample. They are not part of a saved state, or of an FMU.
 
+    Attributes
+    ----------
+    planned : bool
+        Whether a compensator decides the commands.
+    state : PredictorState
+    pending : PredictedWindow, optional
+        The predicted window, until it is measured.
+
     Raises
     ------
     ParameterError
         If disturbances are given without trust, or are not functions.
     """
 
+    def __init__(
+        self,
+        model: ModalModel,
+        settings: PredictorSettings | None = None,
+        *,
+        start: float | None = None,
+        disturbances: Sequence[Disturbance] = (),
+    ) -> None:
+        self.settings = settings = PredictorSettings() if settings is None else settings
+        self.Np, self.T_s = settings.Np, settings.T_s
+        self.model, self.disturbances, self.planned = model, tuple(disturbances), False
+        self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
+        if self.disturbances and not settings.trust:
+            raise ParameterError("disturbances are learned with trust = true only")
+        for i, one in enumerate(self.disturbances):
+            if not callable(one):
+                raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
+        residual = residual_model.init(settings, self.discrete, self.disturbances)
+        late, uncertainty = np.zeros(settings.measurement_delay), Uncertainty.init(first_variance(settings))
+        self.state = PredictorState(0, 0, None, self.discrete.rest(), late, residual, uncertainty)
+        self.restart(start, t_init=settings.warm_up)
+
+    def restart(self, start: float | None = None, *, t_init: float = 0.0) -> None:
+        """Begin another run, at rest at ``start``; what was learned is kept (warm start).
+
+        Parameters
+        ----------
+        start : float, optional
+            Initial position, m; the first command if left out.
+        t_init : float
+            Warm-up of the new run, s; none by default. −1: automatic.
+        """
+        rest = None if start is None else float(as_samples([start], "start")[0])
+        n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
+        residual, late = residual_model.restart(self.state.residual), np.zeros(self.settings.measurement_delay)
+        physics = self.discrete.rest()
+        self.state = PredictorState(0, n_init, rest, physics, late, residual, self.state.uncertainty)
+        self.pending: PredictedWindow | None = None
+
+    def plan_ahead(self) -> None:
+        """Adapt to a compensator, which moves the drive as it commands, from rest."""
+        self.planned = True
+        self.state = replace(self.state, residual=residual_model.plan_ahead(self.residual))
+
+    def rest_at(self, start: float) -> None:
+        """Begin the run at ``start``, m, as soon as it is known."""
+        self.state = replace(self.state, start=start)
+
+    def take_over(self, learned: Any, uncertainty: Uncertainty, regressions: tuple[RidgeRegression, ...]) -> None:
+        """Take over what another predictor with the same settings has learned; :meth:`restart` then begins a run.
+
+        Parameters
+        ----------
+        learned, regressions : Learned and tuple of RidgeRegression
+            Those of its residual model.
+        uncertainty : Uncertainty
+
+        Raises
+        ------
+        SignalError
+            If it is inconsistent. Nothing is changed.
+        """
+        residual = residual_model.take_over(self.residual, learned, regressions)
+        if not residual.is_sound:
+            raise SignalError("what was learned must be in range, and its factors triangles")
+        self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
+
+    @one_blas_thread
+    def predict(self, x_d: ArrayLike, *, scales: FeatureScales | None = None) -> Prediction:
+        """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
+
+        May be called again, with other commands or another length, before :meth:`update`; the last call counts.
+
+        Parameters
+        ----------
+        x_d : (n,) array_like, m
+            Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
+        scales : FeatureScales, optional
+            With trust: scales of the features, in a compensator; those of ``x_d`` if left out.
+
+        Returns
+        -------
+        Prediction
+
+        Raises
+        ------
+        SignalError
+            If ``x_d`` is empty, not one-dimensional or not finite.
+        """
+        command, state = as_samples(x_d, "x_d"), self.state
+        n, late = len(command), len(state.late)
+        if n == 0:
+            raise SignalError("x_d must have at least one sample, got none")
+        start = float(command[0]) if state.start is None else state.start
+        command = np.concatenate((state.late, command - start))
+        x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
+        forecast = residual_model.forecast(state.residual, ResidualWindow(command, x_pb, start), scales)
+        self.pending = self._with_error(forecast)
+        return Prediction(x_pb[late:] + start, forecast.e_h[late:], self.pending.error.std[late:], self._warm_up(n))
+
+    def _with_error(self, forecast: Forecast) -> PredictedWindow:
+        """Return the window of a forecast with what is known of its error, pending measurement.
+
+        With a ``measurement_delay`` the window begins so many samples earlier, with those not measured yet.
+        """
+        x_pb, n = forecast.window.x_pb, len(forecast.e_h)
+        active = np.arange(n) >= self._warm_up(n, late=len(self.state.late))
+        e_h, variance = np.where(active, forecast.e_h, 0.0), np.where(active, forecast.variance, 0.0)
+        return PredictedWindow(forecast, self.state.uncertainty.predict(x_pb, e_h, variance, self.Np))
+
+    @one_blas_thread
+    def update(self, x: ArrayLike, *, learn: bool = True) -> None:
+        """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
+
+        Parameters
+        ----------
+        x : (m,) array_like, m
+            Measured positions that arrived, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
+        learn : bool
+            Whether the samples enter the regression; the next window starts from their residuals in any case.
+
+        Raises
+        ------
+        SignalError
+            If nothing was predicted, ``x`` is longer than the window, or a value is not finite. Nothing is changed.
+        """
+        if self.pending is None:
+            raise SignalError("update must follow predict: there is no predicted window to measure")
+        state, (forecast, error) = self.state, self.pending
+        residual, physics = state.residual, state.physics
+        measured = as_measured(x, "x") if residual.may_miss else as_samples(x, "x")
+        if not 1 <= len(measured) <= self.n_pending:
+            raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
+        m, start, late = len(measured), forecast.window.start, len(state.late)
+        e_pb = measured - start - forecast.window.x_pb[:m]
+        if state.k == 0 and isinstance(residual, TrustedModel) and not self.planned:
+            # The run may have begun in motion.
+            x_d, x_pb, _ = forecast.window
+            before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)
+            if before is not None:
+                window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start)
+                physics, e_pb = physics + before.state, e_pb - before.x_pb[:m]
+                forecast, residual = replace(forecast, window=window), begin_in_motion(residual, window)
+        residual, accepted = residual_model.learn(residual, forecast, measured - start, fold=learn)
+        uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
+        x_d = forecast.window.x_d
+        _, physics = self.discrete.forced_response(physics, x_d[:m])
+        self.state = PredictorState(
+            state.k + m, state.n_init, start, physics, x_d[m : m + late].copy(), residual, uncertainty
+        )
+        self.pending = None
+
+    def operator(self, n: int | None = None) -> WindowOperator:
+        """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
+
+        It is the hybrid model, during the warm-up too.
+
+        Raises
+        ------
+        ParameterError
+            With trust: its model is not affine in the commands.
+        SignalError
+            If ``n < 1``, or the initial position is neither given nor known from a predicted window.
+        """
+        residual = self.state.residual
+        if not isinstance(residual, PaperModel):
+            raise ParameterError("the operator is that of the paper's model: it needs trust = false")
+        length = self.Np if n is None else n
+        if length < 1:
+            raise SignalError(f"n must be ≥ 1, got {length}")
+        g_pb, free_pb, start = self._physics_from_rest(length)
+        g_h, free = paper.impulse_response(residual, g_pb), free_pb + paper.free_run(residual, free_pb)
+        late = len(self.state.late)
+        return WindowOperator(
+            g_h=g_h,
+            free=free[late:] + start * (1.0 - np.cumsum(g_h)),
+            g_pb=g_pb,
+            free_pb=free_pb[late:] + start * (1.0 - np.cumsum(g_pb)),
+        )
+
+    def physics_operator(self, n: int) -> tuple[Array, Array]:
+        """Return the first column of ``G_pb``, m/m, and its free response, m, ``(n,)`` each; the start is known."""
+        g_pb, free, start = self._physics_from_rest(n)
+        return g_pb, free[len(self.state.late) :] + start * (1.0 - np.cumsum(g_pb))
+
+    def _physics_from_rest(self, n: int) -> tuple[Array, Array, float]:
+        """Return the first column of ``G_pb``, the free response with what is late, relative to the start, and that."""
+        start = self.start if self.start is not None or self.pending is None else self.pending.forecast.window.start
+        if start is None:
+            raise SignalError("the start is not known yet: give start= or predict the first window before")
+        late = self.state.late
+        free, _ = self.discrete.forced_response(self.state.physics, np.concatenate((late, np.zeros(n))))
+        return self.discrete.impulse_response(n), free, start
+
+    @property
+    def k(self) -> int:
+        """Samples of this run that are measured."""
+        return self.state.k
+
+    @property
+    def n_init(self) -> int:
+        """Samples of the run's warm-up."""
+        return self.state.n_init
+
+    @property
+    def start(self) -> float | None:
+        """Initial position, m; None until it is known."""
+        return self.state.start
+
+    @property
+    def residual(self) -> ResidualModel:
+        """State of the residual model."""
+        return self.state.residual
+
+    @property
+    def regression(self) -> RidgeRegression:
+        """Regression of all learned samples, of the residual model."""
+        return self.residual.regressions[0]
+
+    @property
+    def n_features(self) -> int:
+        """Number of features ``n``."""
+        return self.regression.n_features
+
+    @property
+    def weights(self) -> Array:
+        """``w`` of eq. (6) from all learned samples, ``(n,)``."""
+        return self.regression.weights
+
+    @property
+    def residual_weights(self) -> Array:
+        """Autoregressive weights of the learned recursion, ``(p,)``."""
+        return self.residual.lag_weights
+
+    @property
+    def n_pending(self) -> int:
+        """Samples of the predicted window pending measurement; 0 if there is none."""
+        return 0 if self.pending is None else len(self.pending.forecast.e_h) - len(self.state.late)
+
+    @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible; 0 without trust."""
+        return self.residual.n_rejected
+
+    def last_accepted_residual(self) -> float:
+        """Return the residual ``e_pb``, m, that the next window starts from: with trust the last one accepted."""
+        return self.residual.last
+
+    def _warm_up(self, n: int, *, late: int = 0) -> int:
+        """Return how many of ``n`` samples, the next ones or from ``late`` samples before, are within the warm-up."""
+        return min(max(self.n_init - self.k + late, 0), n)
+
     def to_bytes(self) -> bytes:
         """Return parameters and state, a pending window included, as a versioned blob."""
-        pending, residual = self.pending, self.residual.saved()
         meta = {
             "settings": self.settings.as_table(),
-            **{name: getattr(self, name) for name in ("k", "n_init", "start")},
             "dead_time": self.model.dead_time,
             "n_disturbances": len(self.disturbances),
-            "pending_start": None if pending is None else pending.start,
-            **residual.meta,
+            "planned": self.planned,
+            "pending_start": None,
         }
-        modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes])
-        arrays = {
-            "modes": modes,
-            "state": self.state,
-            "late": self.late,
-            **residual.arrays,
-            "uncertainty": self.uncertainty.learned(),
-        }
-        if pending is not None:
-            arrays |= {"pending_x_d": pending.forecast.x_d, "pending_x_pb": pending.forecast.x_pb}
-            forecast = self.residual.saved_forecast(pending.forecast)
-            arrays |= forecast.arrays
-            meta |= forecast.meta
-        return pack(_KIND, meta, arrays, residual.parts)
+        modes = [[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes]
+        arrays = {"modes": np.array(modes), **arrays_of(self.state)}
+        if self.pending is not None:  # its forecast follows from the state
+            forecast = self.pending.forecast
+            arrays |= {"pending_x_d": forecast.window.x_d, "pending_x_pb": forecast.window.x_pb}
+            meta["pending_start"] = forecast.window.start
+            if isinstance(forecast, TrustedForecast):  # a compensator has its scales from its preview
+                arrays["pending_scales"] = np.array([forecast.scales.velocity, forecast.scales.step])
+                arrays["pending_largest"] = forecast.scales.largest
+        return pack(_KIND, meta, arrays)
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> HybridPredictor:
@@ -97,24 +395,38 @@ class HybridPredictor(WindowPredictor):
             )
         with saved.consistent():
             settings = PredictorSettings.from_table(saved.table("settings"))
-            (SavedTrustedModel if settings.trust else PaperModel).check_sizes(saved, settings)
+            n_features = settings.p + (0 if settings.trust else settings.q)
+            if n_features**2 > sum(array.size for array in saved.arrays.values()):  # before that much is allocated
+                raise saved.error(f"p = {settings.p} and q = {settings.q} must be those of its factors")
             model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
-            predictor = cls(model, settings, start=saved.number_or_none("start"), disturbances=disturbances)
-        predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
-        predictor.state[:] = saved.array("state", predictor.discrete.n_state)
-        predictor.late = saved.array("late", settings.measurement_delay)
-        predictor.residual.restore(saved)
-        learned = saved.array("uncertainty", N_LEARNED, finite=False)
-        if not predictor.uncertainty.is_sound(learned):
-            raise saved.error("the variances of the errors must be finite and ≥ 0")
-        predictor.uncertainty.restore(learned)
+            predictor = cls(model, settings, disturbances=disturbances)
+            if saved.flag("planned"):
+                predictor.plan_ahead()
+            predictor.state = restored(predictor.state, saved)
+            if not predictor.residual.is_sound:
+                raise saved.error("factors must be triangles, and what was learned from them in range")
+            if predictor.start is not None:
+                as_samples([predictor.start], "start")
         if saved.field("pending_start") is not None:
-            predictor.pending = _pending(predictor, saved)
+            predictor.pending = predictor._pending(saved)
         return predictor
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        # By the saved state: the lags are views, which a plain copy would detach.
-        return HybridPredictor.from_bytes, (self.to_bytes(), self.disturbances)
+    def _pending(self, saved: Saved) -> PredictedWindow:
+        """Return the predicted window; StateError if it is inconsistent."""
+        x_d, scales, residual = saved.array("pending_x_d", None), None, self.residual
+        if not len(self.state.late) < len(x_d):
+            raise saved.error("the pending window must have samples")
+        if isinstance(residual, TrustedModel):
+            velocity, step = saved.array("pending_scales", 2).tolist()
+            scales = FeatureScales(velocity, saved.array("pending_largest", residual.fixed.static.n), step)
+            if min(velocity, step, *scales.largest) < 0.0:
+                raise saved.error("the scales of the pending window must be ≥ 0")
+        window = ResidualWindow(x_d, saved.array("pending_x_pb", len(x_d)), saved.real("pending_start"))
+        with np.errstate(all="ignore"):
+            forecast = residual_model.forecast(residual, window, scales)
+            if residual.may_miss and not np.isfinite(forecast.e_h).all():
+                raise saved.error("the prediction of the pending window must be finite")
+            return self._with_error(forecast)
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""
@@ -132,15 +444,3 @@ class HybridPredictor(WindowPredictor):
             If the file is not a saved predictor, or was learned with another number of disturbances.
         """
         return cls.from_bytes(Path(path).read_bytes(), disturbances)
-
-
-def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
-    """Return the predicted window; StateError if it is inconsistent."""
-    start = saved.real("pending_start")
-    x_d = saved.array("pending_x_d", None)
-    if not len(predictor.late) < len(x_d):
-        raise saved.error("the pending window must have samples")
-    x_pb = saved.array("pending_x_pb", len(x_d))
-    with np.errstate(all="ignore"):
-        forecast = predictor.residual.restored_forecast(saved, WindowInputs(x_d, x_pb, start))  # follows from the state
-        return predictor.predicted(forecast, start)

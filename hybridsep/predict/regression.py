@@ -11,6 +11,8 @@ ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of const
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,35 +20,39 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ..base.errors import ParameterError, SignalError
+from ..base.records import within
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
-__all__ = ["PenalisedSolution", "RidgeRegression", "fold"]
+__all__ = ["PenalisedSolution", "RidgeRegression", "lags"]
 
 _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
-
 
 _LEAST_DIAGONAL = 1e-150
 """Bound on the factor's diagonal: its square is a normal number."""
 
 
-def fold(factor: Array, rows: Array, *, n_triangular: int = 0) -> None:
-    """Fold rows into an upper triangle in place: ``Q R = [R; rows]``.
+def lags(series: Array, n: int) -> Array:
+    """Return ``n`` values up to each sample, newest first, ``(len(series) − n + 1, n)``."""
+    return np.lib.stride_tricks.sliding_window_view(series, n)[:, ::-1]
+
+
+def _folded(factor: Array, rows: Array, n_triangular: int = 0) -> Array:
+    """Return the upper triangle ``R'`` of ``Q R' = [R; rows]``.
 
     Parameters
     ----------
     factor : (n, n) array, column-major
-        ``R``, below whose diagonal nothing is read or written.
-    rows : (m, n) array, column-major
-        Used as work space.
+        ``R``.
+    rows : (m, n) array
     n_triangular : int
         Number of last rows that are upper trapezoidal themselves, which saves the work on their zeros.
     """
-    block = min(_COLUMNS_AT_ONCE, factor.shape[1])
-    _, _, _, info = lapack.dtpqrt(n_triangular, block, factor, rows, overwrite_a=1, overwrite_b=1)
+    found, _, _, info = lapack.dtpqrt(n_triangular, min(_COLUMNS_AT_ONCE, rows.shape[1]), factor, rows)
     if info != 0:  # an illegal argument, a fault of this module
         raise AssertionError(f"dtpqrt returned info = {info}")
+    return np.asarray(found)
 
 
 class PenalisedSolution(NamedTuple):
@@ -71,60 +77,74 @@ class PenalisedSolution(NamedTuple):
         return np.asarray(np.einsum("ij,ij->j", solved, solved))
 
 
+@dataclass(frozen=True, eq=False)
 class RidgeRegression:
     """Recursive ridge regression; eq. (6).
 
-    Parameters
+    Attributes
     ----------
-    n_features : int
-        Length ``n`` of a row φ.
-    lam : float
-        Ridge penalty λ > 0 on ‖w‖², in the unit of a row's entry squared (m² here).
-
-    Raises
-    ------
-    ParameterError
-        If ``n_features < 1`` or ``lam ≤ 0``.
+    factor : (n + 1, n + 1) array, column-major
+        Upper triangle ``[R z; 0 ρ]`` of the rows ``[Φ | target]``, with ``√λ·I`` as its first value.
+    n_rows : float
+        Rows so far, weighted.
     """
 
-    def __init__(self, n_features: int, lam: float) -> None:
+    factor: Array
+    n_rows: float = field(metadata=within())
+
+    @classmethod
+    def init(cls, n_features: int, lam: float) -> RidgeRegression:
+        """Return the regression without rows.
+
+        Parameters
+        ----------
+        n_features : int
+            Length ``n`` of a row φ.
+        lam : float
+            Ridge penalty λ > 0 on ‖w‖², in the unit of a row's entry squared (m² here).
+
+        Raises
+        ------
+        ParameterError
+            If ``n_features < 1`` or ``lam ≤ 0``.
+        """
         if n_features < 1:
             raise ParameterError(f"n_features must be ≥ 1, got {n_features}")
-        self.n_features = n_features
-        self.lam = check("lambda", lam)
-        self.n_samples = 0
-        # [R z; 0 ρ]: the factor of the rows [Φ | e_pb], with √λ·I as its first value.
-        self._factor = np.zeros((n_features + 1, n_features + 1), order="F")
-        np.fill_diagonal(self._factor[:-1, :-1], math.sqrt(self.lam))
-        self._weights: Array | None = None
+        factor = np.zeros((n_features + 1, n_features + 1), order="F")
+        np.fill_diagonal(factor[:-1, :-1], math.sqrt(check("lambda", lam)))
+        return cls(factor, 0.0)
 
     @property
-    def factor(self) -> Array:
-        """A copy of the triangular factor ``[R z; 0 ρ]`` of the rows ``[Φ | target]``, ``(n+1, n+1)``."""
-        return np.triu(self._factor)
+    def n_features(self) -> int:
+        """Length of a row φ."""
+        return len(self.factor) - 1
 
-    @property
+    @cached_property
     def weights(self) -> Array:
-        """``w = R⁻¹ z``, ``(n,)``, read-only; solved on first access after an update."""
-        if self._weights is None:
-            n = self.n_features
-            self._weights, _ = lapack.dtrtrs(self._factor[:n, :n], self._factor[:n, n])
-            self._weights.flags.writeable = False
-        return self._weights
+        """``w = R⁻¹ z``, ``(n,)``, read-only."""
+        weights, _ = lapack.dtrtrs(self.factor[:-1, :-1], self.factor[:-1, -1])
+        weights.flags.writeable = False
+        return np.asarray(weights)
 
     @property
     def residual_sum(self) -> float:
         """``Σ (target − wᵀφ)² + λ‖w‖²`` at the optimum, m²."""
-        return float(self._factor[-1, -1] ** 2)
+        return float(self.factor[-1, -1] ** 2)
 
     @property
     def target_square(self) -> float:
         """Sum of the squares of the targets, m²."""
-        column = self._factor[:, -1]
+        column = self.factor[:, -1]
         return float(column @ column)
 
-    def update(self, rows: ArrayLike, target: ArrayLike) -> None:
-        """Update with a block of rows.
+    @property
+    def is_sound(self) -> bool:
+        """Whether the factor is a finite triangle without a 0 on the diagonal of ``R``."""
+        finite = bool(np.isfinite(self.factor).all())
+        return finite and bool(np.diag(self.factor)[:-1].all()) and not np.tril(self.factor, -1).any()
+
+    def update(self, rows: ArrayLike, target: ArrayLike) -> RidgeRegression:
+        """Return the regression with a block of rows more.
 
         Parameters
         ----------
@@ -136,7 +156,7 @@ class RidgeRegression:
         Raises
         ------
         SignalError
-            If the shapes do not fit or a value is not finite; the regression is unchanged then.
+            If the shapes do not fit or a value is not finite.
         """
         phi = np.asarray(rows, dtype=np.float64)
         if phi.ndim != 2 or phi.shape[1] != self.n_features:
@@ -144,39 +164,28 @@ class RidgeRegression:
         values = as_samples(target, "target", len(phi))
         if not np.isfinite(phi).all():
             raise SignalError("rows must be finite")
-        stacked = np.empty((len(phi), self.n_features + 1), order="F")
-        stacked[:, :-1] = phi
-        stacked[:, -1] = values
-        self.update_stacked(stacked)
+        return self.update_stacked(np.column_stack((phi, values)))
 
-    def update_stacked(self, stacked: Array) -> None:
-        """Update with rows ``[Φ | target]`` that are known to be finite; they are overwritten.
+    def update_stacked(self, stacked: Array) -> RidgeRegression:
+        """Return the regression with rows ``[Φ | target]`` more, ``(m, n + 1)``, which are known to be finite."""
+        return RidgeRegression(_folded(self.factor, stacked), self.n_rows + len(stacked))
 
-        Parameters
-        ----------
-        stacked : (m, n + 1) array, column-major
-            Used as work space.
-        """
-        fold(self._factor, stacked)
-        self.n_samples += len(stacked)
-        self._weights = None
+    def add(self, other: RidgeRegression) -> RidgeRegression:
+        """Return the regression with all rows of another one of the same features, its penalty with them."""
+        factor = _folded(self.factor, other.factor, len(other.factor))
+        return RidgeRegression(factor, self.n_rows + other.n_rows)
 
-    def update_from(self, other: RidgeRegression) -> None:
-        """Update with all rows of another regression of the same features, its penalty with them."""
-        rows = np.asfortranarray(other.factor)
-        fold(self._factor, rows, n_triangular=len(rows))
-        self.n_samples += other.n_samples
-        self._weights = None
-
-    def discount(self, weight: float) -> None:
-        """Weigh all rows so far by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ with them.
+    def discount(self, weight: float) -> RidgeRegression:
+        """Return the regression with all rows weighed by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ, too.
 
         The factor stays regular, however long a feature is 0.
         """
-        self._factor *= math.sqrt(weight)
-        diagonal = np.einsum("ii->i", self._factor)[:-1]
+        if weight == 1.0:
+            return self
+        factor = math.sqrt(weight) * self.factor
+        diagonal = np.einsum("ii->i", factor)[:-1]
         diagonal[np.abs(diagonal) < _LEAST_DIAGONAL] = _LEAST_DIAGONAL
-        self._weights = None
+        return RidgeRegression(factor, weight * self.n_rows)
 
     def penalised(self, penalties: Array) -> PenalisedSolution:
         """Solve for the weights of the first ``m`` features, each with a penalty of its own.
@@ -189,30 +198,13 @@ class RidgeRegression:
         penalties : (m,) array
             Positive, ``1 ≤ m ≤ n_features``; they add to λ.
         """
-        n, m = self.n_features, len(penalties)
-        factor = np.zeros((m + 1, m + 1), order="F")
-        factor[:m, :m], factor[:m, m] = self._factor[:m, :m], self._factor[:m, n]
-        rows = np.zeros((m, m + 1), order="F")
+        m, target = len(penalties), self.factor[:, -1]
+        factor, rows = np.zeros((m + 1, m + 1), order="F"), np.zeros((m, m + 1), order="F")
+        factor[:m, :m], factor[:m, m] = self.factor[:m, :m], target[:m]
         np.fill_diagonal(rows, np.sqrt(penalties))
-        fold(factor, rows)
-        triangle = factor[:m, :m]
-        weights, _ = lapack.dtrtrs(triangle, factor[:m, m])
-        residuals = self._factor[:, n].copy()
-        residuals[:m] -= self._factor[:m, :m] @ weights
+        solved = _folded(factor, rows)
+        triangle = solved[:m, :m]
+        weights, _ = lapack.dtrtrs(triangle, solved[:m, m])
+        residuals = target.copy()
+        residuals[:m] -= self.factor[:m, :m] @ weights
         return PenalisedSolution(weights, triangle, float(residuals @ residuals))
-
-    def restore(self, factor: Array, n_samples: int) -> None:
-        """Restore a :attr:`factor` and its number of rows.
-
-        Raises
-        ------
-        SignalError
-            If the factor has another size, is not finite or singular; nothing is changed then.
-        """
-        if factor.shape != self._factor.shape:
-            raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")
-        if not (np.isfinite(factor).all() and np.diag(factor)[:-1].all()):
-            raise SignalError("the factor must be finite, with no 0 on its diagonal")
-        self._factor = np.array(np.triu(factor), dtype=np.float64, order="F")
-        self.n_samples = int(n_samples)
-        self._weights = None

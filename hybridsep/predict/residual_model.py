@@ -1,150 +1,89 @@
-"""Interface of a model of the residual ``e_pb = x − x_pb``, which the predictor adds to the physics model."""
+"""Model of the residual ``e_pb = x − x_pb``: the paper's, or with trust the one that can be trusted.
+
+What differs between the two is decided here, and nowhere else in a predictor. A state is a record; each function
+returns another one.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.saved import Saved
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
-from .forecast import FeatureScales, Forecast
+from ..model.discrete import DiscreteModel
+from . import paper
+from .paper import PaperModel
 from .regression import RidgeRegression
+from .residual_window import FeatureScales, Forecast, ResidualWindow
+from .trust import forecast as trust_forecast
+from .trust import learn as trust_learn
+from .trust import state as trust_state
+from .trust.disturbances import Disturbance
+from .trust.state import TrustedModel
 
-__all__ = ["ResidualModel", "SavedFields", "WindowInputs"]
+__all__ = ["ResidualModel", "forecast", "init", "learn", "plan_ahead", "restart", "take_over"]
 
-AnyForecast = TypeVar("AnyForecast", bound=Forecast)
+ResidualModel: TypeAlias = PaperModel | TrustedModel
+"""State of either model."""
 
 
-class WindowInputs(NamedTuple):
-    """What is known of a window before its residual is predicted.
+def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...]) -> ResidualModel:
+    """Return the model at rest, with nothing learned: of ``G_pb``, with trust with disturbances of the user's own."""
+    return trust_state.init(settings, discrete, own) if settings.trust else paper.init(settings)
 
-    Attributes
+
+def plan_ahead(state: ResidualModel) -> ResidualModel:
+    """Return the model where a compensator decides the commands."""
+    return trust_state.plan_ahead(state) if isinstance(state, TrustedModel) else state
+
+
+def take_over(state: ResidualModel, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
+    """Return the model with what another one of its kind has learned."""
+    if isinstance(state, TrustedModel):
+        return trust_state.take_over(state, learned, regressions)
+    return replace(state, regression=regressions[0])
+
+
+def restart(state: ResidualModel) -> ResidualModel:
+    """Return the model at the beginning of another run, at rest; what was learned is kept."""
+    return trust_state.restart(state) if isinstance(state, TrustedModel) else paper.restart(state)
+
+
+def forecast(state: ResidualModel, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
+    """Predict the residual over the next window.
+
+    Parameters
     ----------
-    x_d, x_pb : (n,) array, m
-        Commands and physics-based prediction, relative to ``start``.
-    start : float, m
-        Initial position.
+    state : PaperModel or TrustedModel
+    window : ResidualWindow
+    scales : FeatureScales, optional
+        With trust: scales of the features over a preview; those of the window if left out.
     """
-
-    x_d: Array
-    x_pb: Array
-    start: float
-
-
-@dataclass(frozen=True)
-class SavedFields:
-    """Fields of a saved state: scalars, arrays and nested blobs, by their names."""
-
-    meta: Mapping[str, Any]
-    arrays: Mapping[str, Array]
-    parts: Mapping[str, bytes]
+    if isinstance(state, TrustedModel):
+        return trust_forecast.forecast(state, window, scales)
+    return paper.forecast(state, window)
 
 
-class ResidualModel(ABC, Generic[AnyForecast]):
-    """Model of the residual, learned window by window from its own forecasts and their measurement.
+def learn(
+    state: ResidualModel, forecast: Forecast, x: Array, *, fold: bool = True
+) -> tuple[ResidualModel, NDArray[np.bool_]]:
+    """Return the model that has learned from the measurement of a window, and which samples it accepted, ``(m,)`` bool.
 
-    Attributes
+    Parameters
     ----------
-    may_miss : bool
-        Whether measurements may be NaN, which is missing.
-    regression : RidgeRegression
-        Of all learned samples.
-    n_rejected : int
-        Measurements of this run that were missing or not plausible.
+    state : PaperModel or TrustedModel
+    forecast : Forecast
+        Of that state.
+    x : (m,) array, m
+        Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
+    fold : bool
+        Whether they are learned; the next window starts from them in any case.
     """
-
-    may_miss: ClassVar[bool]
-    regression: RidgeRegression
-    n_rejected: int
-
-    @property
-    def regressions(self) -> tuple[RidgeRegression, ...]:
-        """All regressions that another run begins with, in the order of a weights file."""
-        return (self.regression,)
-
-    @property
-    @abstractmethod
-    def lag_weights(self) -> Array:
-        """Weights of the lags of ``e_pb`` from all learned samples, ``(p,)``."""
-
-    @property
-    @abstractmethod
-    def last(self) -> float:
-        """Last residual that was accepted, m: that which the next window starts from."""
-
-    @property
-    def may_begin_in_motion(self) -> bool:
-        """Whether the state of ``G_pb`` that a run begins with follows from its first residuals; else it is rest."""
-        return False
-
-    @abstractmethod
-    def restart(self) -> None:
-        """Begin another run, at rest; what was learned is kept."""
-
-    @abstractmethod
-    def forecast(self, window: WindowInputs, scales: FeatureScales | None = None) -> AnyForecast:
-        """Predict the residual over the next window; nothing that is learned is changed.
-
-        Parameters
-        ----------
-        window : WindowInputs
-        scales : FeatureScales, optional
-            Scales of the features over a preview; those of the window if left out. For a model that has some.
-        """
-
-    @abstractmethod
-    def learn(self, forecast: AnyForecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
-        """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
-
-        Parameters
-        ----------
-        forecast : Forecast
-            The last one.
-        x : (m,) array, m
-            Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
-        fold : bool
-            Whether they are learned; the next window starts from them in any case.
-        """
-
-    def begin_in_motion(self, forecast: AnyForecast, x_d: Array, x_pb: Array) -> AnyForecast:
-        """Return the forecast of a run that began in motion, with the commands and ``x_pb`` of that motion."""
-        return replace(forecast, x_d=x_d, x_pb=x_pb)
-
-    @staticmethod
-    @abstractmethod
-    def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
-        """Raise StateError if arrays do not have the sizes of the settings, before any is allocated from these."""
-
-    @abstractmethod
-    def saved(self) -> SavedFields:
-        """Return the complete state."""
-
-    @abstractmethod
-    def restore(self, saved: Saved) -> None:
-        """Restore the state of :meth:`saved`; StateError if it is inconsistent: the model must not be used then."""
-
-    def saved_forecast(self, forecast: AnyForecast) -> SavedFields:
-        """Return what a forecast does not have from the state and its window."""
-        return SavedFields({}, {}, {})
-
-    def restored_forecast(self, saved: Saved, window: WindowInputs) -> AnyForecast:
-        """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
-        return self.forecast(window)
-
-    def learned(self) -> dict[str, Array]:
-        """Return what has been learned besides the regression, in the order of a weights file."""
-        return {}
-
-    def is_sound(self, learned: Mapping[str, Array]) -> bool:
-        """Return whether the numbers of :meth:`learned` are finite and in range."""
-        return True
-
-    @abstractmethod
-    def restore_learned(self, learned: Mapping[str, Array]) -> None:
-        """Restore the numbers of :meth:`learned`, which are sound."""
+    if isinstance(state, TrustedModel):
+        assert isinstance(forecast, trust_forecast.TrustedForecast)
+        return trust_learn.learn(state, forecast, x, fold=fold)
+    return paper.learn(state, forecast, x, fold=fold)

@@ -17,24 +17,23 @@ tails are heavier than normal, so that 50 % cover a little more and 95 % a littl
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from ..base.records import within
 from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
 
-__all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty", "first_variance"]
+__all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
 
 _SHARES = (4.0, 2.0)
 """First variance of the error relative to that of its causes: timing, variance of the experts."""
 
 N_COMPONENTS = 1 + len(_SHARES)
-
-N_LEARNED = 2 * N_COMPONENTS + 3
-"""Numbers that :meth:`Uncertainty.learned` returns."""
 
 _UNKNOWN_NOISE = 25.0
 """First variance of a noise that is not known, relative to λ."""
@@ -45,7 +44,8 @@ _FELT_FOR = 0.2
 _LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4
 """Bounds on the variance relative to its cause, relative to the first one."""
 
-_SHARE_LEAST, _SHARE_MOST = _LEAST_SHARE * np.array(_SHARES), _MOST_SHARE * np.array(_SHARES)
+_THETA_LEAST = np.array([0.0, *(_LEAST_SHARE * share for share in _SHARES)])
+_THETA_MOST = np.array([PREDICTION_MAX, *(_MOST_SHARE * share for share in _SHARES)])
 
 _FLOOR = 1e-6
 """Least variance relative to the recent mean square of the residual."""
@@ -92,15 +92,9 @@ class PredictedError(NamedTuple):
     std: Array
 
 
+@dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Standard deviation of prediction errors, calibrated online.
-
-    Parameters
-    ----------
-    variance : float, m²
-        That of the measurement noise, assumed before the first window is measured.
-    Np : int
-        Samples of a usual window.
 
     Attributes
     ----------
@@ -116,14 +110,19 @@ class Uncertainty:
         Recent mean square of the residual; 0 before the first window.
     """
 
-    def __init__(self, variance: float, Np: int) -> None:
-        self.Np = Np
-        self.theta = np.array([variance, *_SHARES])
-        self.evidence = np.zeros(N_COMPONENTS)
-        self.factor, self.ratio, self.recent = 1.0, 1.0, 0.0
+    theta: Array = field(metadata=within(_THETA_LEAST, _THETA_MOST))
+    evidence: Array = field(metadata=within())
+    factor: float = field(metadata=within(1.0 / _FACTOR_MAX, _FACTOR_MAX))
+    ratio: float = field(metadata=within(1.0 / _RATIO_MAX, _RATIO_MAX))
+    recent: float = field(metadata=within())
 
-    def predict(self, x_pb: Array, e_h: Array, variance: Array | float) -> PredictedError:
-        """Return what is known of the error of the next window; nothing is changed.
+    @classmethod
+    def init(cls, variance: float) -> Uncertainty:
+        """Return what is assumed before the first window is measured, with the ``variance``, m², of the noise."""
+        return cls(np.array([variance, *_SHARES]), np.zeros(N_COMPONENTS), 1.0, 1.0, 0.0)
+
+    def predict(self, x_pb: Array, e_h: Array, variance: Array | float, Np: int) -> PredictedError:
+        """Return what is known of the error of the next window.
 
         Parameters
         ----------
@@ -131,6 +130,8 @@ class Uncertainty:
             Physics-based prediction and published residual, relative to the start.
         variance : (n,) array or float, m²
             What the residual model knows of its error.
+        Np : int
+            Samples of a usual window.
         """
         n = len(x_pb)
         bounded = e_h
@@ -141,14 +142,14 @@ class Uncertainty:
         _set_differences(components[:, 1], x_pb)
         components[:, 1] = np.minimum(np.abs(components[:, 1]), PREDICTION_MAX) ** 2
         components[:, 2] = variance
-        gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
+        gain = 1.0 / (1.0 + _FELT_FOR * Np)
         components[:, 1:] = lfilter([gain], [1.0, gain - 1.0], components[:, 1:], axis=0)
-        c = self.factor * self.ratio ** self._from_middle(n)
-        std = np.minimum(c * np.sqrt(self._variance(components)), PREDICTION_MAX)
+        c = self.factor * self.ratio ** _from_middle(n, Np)
+        std = np.minimum(c * np.sqrt(_variance(components, self.theta, self.recent)), PREDICTION_MAX)
         return PredictedError(bounded, components, std)
 
-    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
-        """Learn from the measurement of a window.
+    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_], Np: int) -> Uncertainty:
+        """Return the uncertainty with the measurement of a window.
 
         Parameters
         ----------
@@ -157,69 +158,46 @@ class Uncertainty:
             Measured residuals ``e_pb`` of its first ``m`` samples.
         accepted : (m,) array of bool
             Whether they count.
+        Np : int
+            Samples of a usual window.
         """
         m = len(residuals)
-        measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
-        place = self._from_middle(m)
-        if not accepted.all():
-            measured, e_h, components, std, place = (
-                signal[accepted] for signal in (measured, e_h, components, std, place)
-            )
+        signals = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m], _from_middle(m, Np)
+        measured, e_h, components, std, place = (one[accepted] for one in signals)
         if not measured.any():  # nothing to learn a scale from
-            return
-        error = measured - e_h
-        mean_square = _mean_square(measured)
+            return self
+        error, mean_square = measured - e_h, _mean_square(measured)
+        theta, factor, ratio, recent = self.theta.copy(), self.factor, self.ratio, mean_square
         if self.recent > 0.0:
-            self._calibrate(np.abs(error) / std, place)
-            self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
+            # Follow how many errors, relative to their deviations, are beyond the intervals, and where.
+            missed = sum((np.abs(error) / std > z) - beyond for z, beyond in _LEVELS)
+            factor *= math.exp(_FACTOR_RATE * float(np.mean(missed)))
+            ratio *= math.exp(_RATIO_RATE * float(np.mean(missed * place)))
+            factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
+            ratio = min(max(ratio, 1.0 / _RATIO_MAX), _RATIO_MAX)
+            recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
         else:
-            self.recent, self.ratio = mean_square, _RATIO
-            self.theta[0] = _mean_square(error)
-        variance = self._variance(components)
-        share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
+            ratio, theta[0] = _RATIO, _mean_square(error)
+        variance = _variance(components, theta, recent)
+        share = components * theta / variance[:, None]  # of the variance, that is due to each component
         total = share.sum(axis=0)
-        self.evidence = _MEMORY * self.evidence + total / self.Np
+        evidence = _MEMORY * self.evidence + total / Np
         seen = share.T @ np.minimum(error**2 / variance, _OUTLYING)
         change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
-        step = np.minimum(_STEP * total / self.Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
-        theta = self.theta * change**step
-        self.theta[0] = min(max(float(theta[0]), _FLOOR * self.recent), PREDICTION_MAX)
-        self.theta[1:] = np.minimum(np.maximum(theta[1:], _SHARE_LEAST), _SHARE_MOST)
+        step = np.minimum(_STEP * total / Np / (evidence + _FIRST_EVIDENCE), 1.0)
+        least = np.array([_FLOOR * recent, *_THETA_LEAST[1:]])
+        theta = np.minimum(np.maximum(theta * change**step, least), _THETA_MOST)
+        return Uncertainty(theta, evidence, factor, ratio, recent)
 
-    def learned(self) -> Array:
-        """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
-        return np.concatenate((self.theta, self.evidence, [self.factor, self.ratio, self.recent]))
 
-    def restore(self, learned: Array) -> None:
-        """Restore what :meth:`learned` returned and :meth:`is_sound` accepts."""
-        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-3].copy()
-        self.factor, self.ratio, self.recent = learned[-3:].tolist()
+def _from_middle(n: int, Np: int) -> Array:
+    """Return the places of samples in a usual window, ``(n,)``, from −½ at its beginning to ½ at its end."""
+    return np.minimum((np.arange(n) + 0.5) / Np, 1.0) - 0.5
 
-    @staticmethod
-    def is_sound(learned: Array) -> bool:
-        """Return whether the numbers of :meth:`learned` are in range."""
-        shares, others = learned[1:N_COMPONENTS], np.delete(learned, range(1, N_COMPONENTS))
-        return bool(
-            ((shares >= _SHARE_LEAST) & (shares <= _SHARE_MOST)).all()
-            and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
-            and 1.0 / _FACTOR_MAX <= learned[-3] <= _FACTOR_MAX
-            and 1.0 / _RATIO_MAX <= learned[-2] <= _RATIO_MAX
-        )
 
-    def _calibrate(self, relative: Array, place: Array) -> None:
-        """Follow how many errors, relative to their deviations, are beyond the intervals, and where."""
-        missed = sum((relative > z) - beyond for z, beyond in _LEVELS)
-        factor = self.factor * math.exp(_FACTOR_RATE * float(np.mean(missed)))
-        ratio = self.ratio * math.exp(_RATIO_RATE * float(np.mean(missed * place)))
-        self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
-        self.ratio = min(max(ratio, 1.0 / _RATIO_MAX), _RATIO_MAX)
-
-    def _from_middle(self, n: int) -> Array:
-        """Return the places of samples in a usual window, ``(n,)``, from −½ at its beginning to ½ at its end."""
-        return np.minimum((np.arange(n) + 0.5) / self.Np, 1.0) - 0.5
-
-    def _variance(self, components: Array) -> Array:
-        return np.asarray(components @ self.theta + (_FLOOR * self.recent + _LEAST_VARIANCE))
+def _variance(components: Array, theta: Array, recent: float) -> Array:
+    """Return the variance of the error, ``(n,)``, m²."""
+    return np.asarray(components @ theta + (_FLOOR * recent + _LEAST_VARIANCE))
 
 
 def first_variance(settings: PredictorSettings) -> float:

@@ -1,9 +1,9 @@
-"""Look-ahead window: prediction, pending and published data, and its lifted affine operator."""
+"""Look-ahead window: its prediction, pending and published, and its lifted affine operator."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +11,10 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
-from .forecast import Forecast
+from .residual_window import Forecast
 from .uncertainty import PredictedError
 
-__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
+__all__ = ["PredictedWindow", "Prediction", "WindowOperator"]
 
 
 @dataclass(frozen=True)
@@ -52,68 +52,19 @@ class Prediction:
         return np.asarray(np.arange(len(self.x_pb)) >= self.n_warm_up)
 
 
-@dataclass(frozen=True)
-class PredictedWindow:
+class PredictedWindow(NamedTuple):
     """Predicted window pending measurement.
 
     Attributes
     ----------
-    start : float
-        Initial position, m.
+    forecast : Forecast
+        Prediction of the residual by its model.
     error : PredictedError
         Published residual, and what is known of its error.
-    forecast : Forecast
-        Commands, response of the physics model, and prediction of the residual by its model, relative to ``start``.
     """
 
-    start: float
-    error: PredictedError
     forecast: Forecast
-
-
-@dataclass(frozen=True)
-class PublishedWindow:
-    """Commands of a window and the position predicted under them.
-
-    Attributes
-    ----------
-    x_d, x_dm : (Np,) arrays, m
-        Commanded position, and the modified command sent to the drive; the same without a planner.
-    x_pb, x_h : (Np,) arrays, m
-        Physics-based prediction under ``x_dm``, and that of the best available model.
-    x_h_std : (Np,) array, m
-        Standard deviation of the error of ``x_h``; 0 where it is not known.
-    state : int
-        Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
-    n_warm_up : int
-        Leading samples where ``x_h = x_pb``.
-    n_followed, state_before : int
-        Leading samples that follow the plan before, in which a real-time implementation makes this one, and the model
-        that planned them.
-    """
-
-    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
-
-    x_d: Array
-    x_dm: Array
-    x_pb: Array
-    x_h: Array
-    x_h_std: Array
-    state: int
-    n_warm_up: int
-    n_followed: int = 0
-    state_before: int = 0
-
-    @classmethod
-    def at_rest(cls, start: float, Np: int) -> PublishedWindow:
-        """Return the window of a drive at rest at ``start``, m, without a prediction."""
-        rest = np.full(Np, start)
-        return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
-
-    @classmethod
-    def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
-        """Return the window of unmodified commands; SignalError if its prediction diverges."""
-        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, prediction.x_h_std, 0, prediction.n_warm_up)
+    error: PredictedError
 
 
 @dataclass(frozen=True)

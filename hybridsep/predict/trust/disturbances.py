@@ -9,7 +9,8 @@ nothing here depends on the learned weights, no recursion can become unstable.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from ...base.errors import SignalError
 from ...base.signals import Array
 from ...model.discrete import DiscreteModel
+from ..residual_window import ResidualWindow
 from .constants import CONSTANTS, TrustConstants
 
 __all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
@@ -42,7 +44,8 @@ _DIFFERENCES = 3
 """Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
 
 
-class StaticState(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StaticState:
     """State of the features between two windows; positions relative to the start.
 
     Attributes
@@ -106,10 +109,11 @@ class DisturbanceSlopes(NamedTuple):
         )
 
 
+@dataclass(frozen=True)
 class StaticFeatures:
     """Features without lags, over consecutive windows.
 
-    Parameters
+    Attributes
     ----------
     discrete : DiscreteModel
         ``G_pb``.
@@ -117,41 +121,42 @@ class StaticFeatures:
         Largest lag of ``x_pb``, as that many differences, at most three.
     period : float, m
         Of a disturbance that repeats with the position; 0: none.
-    own : sequence of Disturbance
+    own : tuple of Disturbance
         Those of the user's own.
-    constants : TrustConstants
-
-    Attributes
-    ----------
-    n, n_disturbances : int
-        Number of features, and of disturbances.
-    origin : float, m
-        The start, which positions are relative to: a disturbance that repeats does not know of it.
-    shares : (n,) array
-        Effect that a feature may have, relative to the largest.
-    spread : (6,) array
-        Velocities of the friction's change of sign, relative to the velocity scale.
     damping_of_motion : bool
         Whether the damping is that of the position's own velocity; else that of ``x_pb``. Behind a compensator ``x_pb``
         turns with every change of the command, and is far from the motion.
+    constants : TrustConstants
     """
 
-    def __init__(
-        self,
-        discrete: DiscreteModel,
-        q: int,
-        period: float = 0.0,
-        own: Sequence[Disturbance] = (),
-        constants: TrustConstants = CONSTANTS,
-    ) -> None:
-        self.discrete, self.period, self.own, self.origin = discrete, period, tuple(own), 0.0
-        self.spread = constants.friction_least * constants.friction_ratio ** np.arange(_N_FRICTION)
-        self.damping_of_motion = False
-        self.n_differences = min(q, _DIFFERENCES)
-        self.n_disturbances = _N_LASTING + (_N_PERIODIC if period > 0.0 else 0) + len(self.own)
-        self.n = 2 + self.n_differences + 2 * self.n_disturbances
-        self.shares = np.ones(self.n)
-        self.shares[-self.n_disturbances :] = constants.difference_share
+    discrete: DiscreteModel
+    q: int
+    period: float = 0.0
+    own: tuple[Disturbance, ...] = ()
+    damping_of_motion: bool = False
+    constants: TrustConstants = CONSTANTS
+
+    @property
+    def n_differences(self) -> int:
+        """Differences of ``x_pb`` among the features."""
+        return min(self.q, _DIFFERENCES)
+
+    @property
+    def n_disturbances(self) -> int:
+        """Number of disturbances."""
+        return _N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
+
+    @property
+    def n(self) -> int:
+        """Number of features."""
+        return 2 + self.n_differences + 2 * self.n_disturbances
+
+    @property
+    def shares(self) -> Array:
+        """Effects that features may have, ``(n,)``, relative to the largest."""
+        shares = np.ones(self.n)
+        shares[-self.n_disturbances :] = self.constants.difference_share
+        return shares
 
     def rest(self) -> StaticState:
         """Return the state at rest."""
@@ -163,7 +168,7 @@ class StaticFeatures:
         return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
 
     def rows(
-        self, state: StaticState, x_d: Array, x_pb: Array, x: Array, velocity_scale: float
+        self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float
     ) -> tuple[Array, StaticState]:
         """Return the features of a window, ``(n, self.n)``, and the state after it.
 
@@ -172,10 +177,9 @@ class StaticFeatures:
         Parameters
         ----------
         state : StaticState
-            Not changed.
-        x_d, x_pb, x : (n,) array, m
-            Commands, physics-based prediction, and the position that the stiffness acts at, and the damping where it is
-            that of the motion.
+        window : ResidualWindow
+        x : (n,) array, m
+            Position that the stiffness acts at, and the damping where it is that of the motion.
         velocity_scale : float
             Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
 
@@ -184,21 +188,20 @@ class StaticFeatures:
         SignalError
             If a disturbance of the user's own does not return a finite number for each sample.
         """
-        T_s, first = self.discrete.T_s, 2 + self.n_differences
-        v_d = np.diff(x_d, prepend=state.x_d) / T_s
+        x_d, x_pb, start = window
+        first, v_d, v = 2 + self.n_differences, self._velocity(state, x_d), self._damped_velocity(state, x_pb, x)
         past = np.concatenate((state.x_pb, x_pb))
-        v = self._damped_velocity(state, x_pb, x)
         disturbances = np.empty((len(x_d), self.n_disturbances))
         disturbances[:, :_N_FRICTION] = np.tanh(v_d[:, None] / self._spread(velocity_scale))
         disturbances[:, _N_FRICTION] = x * np.abs(x)
         disturbances[:, _N_FRICTION + 1] = v * np.abs(v)
         if self.period > 0.0:
-            angle, at_start = self._angle(x), self._angle(0.0)
+            angle, at_start = self._angle(start + x), self._angle(start + 0.0)
             disturbances[:, _N_LASTING] = np.sin(angle) - np.sin(at_start)
             disturbances[:, _N_LASTING + 1] = np.cos(angle) - np.cos(at_start)
         if self.own:
-            at_rest = self._own(np.zeros(1), np.zeros(1))
-            disturbances[:, -len(self.own) :] = self._own(x, v_d) - at_rest
+            at_rest = self._own(np.full(1, start), np.zeros(1))
+            disturbances[:, -len(self.own) :] = self._own(start + x, v_d) - at_rest
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
         rows = np.empty((len(x_d), self.n))
         rows[:, 0] = 1.0
@@ -209,7 +212,7 @@ class StaticFeatures:
         return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())
 
     def slopes(
-        self, state: StaticState, x_d: Array, x_pb: Array, x: Array, velocity_scale: float, reach: float
+        self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float, reach: float
     ) -> DisturbanceSlopes:
         """Return the slopes of the disturbances of a window; other parameters as those of :meth:`rows`.
 
@@ -219,8 +222,8 @@ class StaticFeatures:
             Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
             0: the tangent.
         """
-        v_d = np.diff(x_d, prepend=state.x_d) / self.discrete.T_s
-        spread = self._spread(velocity_scale)
+        x_d, x_pb, start = window
+        v_d, spread = self._velocity(state, x_d), self._spread(velocity_scale)
         v, half = v_d[:, None], reach * velocity_scale
         if half > 0.0:
             friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
@@ -228,25 +231,25 @@ class StaticFeatures:
             friction = (1.0 - np.tanh(v / spread) ** 2) / spread
         of_position = []
         if self.period > 0.0:
-            angle, turns = self._angle(x), 2.0 * np.pi / self.period
+            angle, turns = self._angle(start + x), 2.0 * np.pi / self.period
             of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
         of_velocity = np.empty((len(x), 0))
         if self.own:
             step, half = velocity_scale * self.discrete.T_s, half or _OWN_REACH * velocity_scale
-            of_position.append((self._own(x + step, v_d) - self._own(x - step, v_d)) / (2.0 * step))
-            of_velocity = (self._own(x, v_d + half) - self._own(x, v_d - half)) / (2.0 * half)
+            of_position.append((self._own(start + (x + step), v_d) - self._own(start + (x - step), v_d)) / (2.0 * step))
+            of_velocity = (self._own(start + x, v_d + half) - self._own(start + x, v_d - half)) / (2.0 * half)
         damping = 2.0 * np.abs(self._damped_velocity(state, x_pb, x))
         return DisturbanceSlopes(
             friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
         )
 
     def _own(self, x: Array, v: Array) -> Array:
-        """Return the disturbances of the user's own at positions relative to the start, ``(n, n_own)``."""
+        """Return the disturbances of the user's own at positions, m, and velocities, m/s, ``(n, n_own)``."""
         found = np.empty((len(x), len(self.own)))
         for i, disturbance in enumerate(self.own):
             name = f"disturbances[{i}]"
             try:
-                values = np.asarray(disturbance(self.origin + x, v.copy()), dtype=np.float64)
+                values = np.asarray(disturbance(x.copy(), v.copy()), dtype=np.float64)
             except (TypeError, ValueError) as error:
                 raise SignalError(f"{name} must return numbers for arrays x, m, and v, m/s: {error}") from error
             if values.shape not in ((), x.shape):
@@ -257,8 +260,12 @@ class StaticFeatures:
         return found
 
     def _angle(self, x: Array | float) -> Array:
-        """Return the angle within the period, rad."""
-        return np.asarray(2.0 * np.pi / self.period * (self.origin + x))
+        """Return the angle within the period at a position, rad."""
+        return np.asarray(2.0 * np.pi / self.period * x)
+
+    def _velocity(self, state: StaticState, x_d: Array) -> Array:
+        """Return the commanded velocity over a window, ``(n,)``, m/s."""
+        return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
 
     def _damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
@@ -275,5 +282,6 @@ class StaticFeatures:
         return weights[1:first], weights[first:second], weights[second:]
 
     def _spread(self, velocity_scale: float) -> Array:
-        """Return the velocities of the friction's change of sign, m/s."""
-        return np.asarray((velocity_scale or 1.0) * self.spread)
+        """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
+        c = self.constants
+        return np.asarray((velocity_scale or 1.0) * (c.friction_least * c.friction_ratio ** np.arange(_N_FRICTION)))

@@ -1,15 +1,25 @@
-"""Forecast of the trusted model over a window, kept until the window is measured."""
+"""Prediction by the residual model that can be trusted."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...base.signals import Array
-from ..forecast import FeatureScales, Forecast
-from .experts import ExpertPrediction
+import numpy as np
 
-__all__ = ["TrustedForecast"]
+from ...base.signals import Array
+from ..regression import RidgeRegression
+from ..residual_window import FeatureScales, Forecast, ResidualWindow
+from .disturbances import LEAST_VELOCITY
+from .expert import ExpertPrediction, SolvedExpert, solve
+from .stack import COMMAND, DOUBTING, HOLD, LAGGED, N_EXPERTS, STATIC
+from .state import OF_COMMAND, OF_PHYSICS, TrustedModel
+
+__all__ = ["TrustedForecast", "forecast", "forecast_by", "scales_of", "solved"]
+
+_LEAST = 1e-150
+"""Magnitude of a feature that counts as 0."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +30,7 @@ class TrustedForecast(Forecast):
     ----------
     x : (n,) array, m
         Position that the stiffness acts at.
-    stacked : (n_experts, n) array, m
+    stacked : (N_EXPERTS, n) array, m
         Predictions that are stacked; 0 where an expert knows nothing.
     predictions : mapping
         Of the experts that know something, by their places in the stack.
@@ -31,3 +41,127 @@ class TrustedForecast(Forecast):
     stacked: Array
     predictions: Mapping[int, ExpertPrediction]
     scales: FeatureScales
+
+
+def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
+    """Return the scales of the features, those of the next window included.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+    path : (m,) array, m, optional
+        Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
+    """
+    c, static, learned = state.fixed.constants, state.fixed.static, state.learned
+    T_s, before = state.fixed.settings.T_s, learned.velocity_scale
+    peak = static.peak_velocity(state.run.static, window.x_d)
+    outgrown = peak > max(c.outgrown * before, LEAST_VELOCITY)
+    step = max(learned.largest_step, peak * T_s)
+    if path is not None and state.evidence[OF_PHYSICS].n_rows == 0.0:
+        peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
+        outgrown = peak > max(before, LEAST_VELOCITY)
+    velocity = peak if outgrown else before
+    rows, _ = static.rows(state.run.static, window, window.x_pb, velocity)
+    largest = np.zeros(static.n) if outgrown else learned.largest
+    return FeatureScales(velocity, np.maximum(largest, np.abs(rows).max(axis=0)), step)
+
+
+def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
+    """Return the experts that know something, with their weights."""
+    found: dict[int, SolvedExpert] = {}
+    for kind, experts in ((OF_PHYSICS, (LAGGED, STATIC)), (OF_COMMAND, (COMMAND,))):
+        evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
+        if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
+            continue
+        if kind == OF_COMMAND or not outgrown:
+            rows = evidence.all()
+            found |= {expert: _solved(state, expert, rows, scales) for expert in experts}
+            if state.doubts and state.leading == experts[0]:
+                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(state.fixed.constants.less), scales)
+    return found
+
+
+def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
+    """Return an expert with the weights that follow from rows."""
+    settings, c, kind = state.fixed.settings, state.fixed.constants, state.kind_of(expert)
+    square = state.learned.scales[kind].largest_square
+    effect = settings.effect or math.sqrt(square)
+    if kind == OF_COMMAND:
+        command = state.fixed.command
+        p, shares, largest = command.p, command.shares, command.largest(scales.step)
+    else:
+        p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
+    priors = effect * shares / np.maximum(largest, _LEAST)
+    first = settings.noise_std**2 or c.first_noise * square
+    return solve(rows, state.learned.errors_of(expert), priors, p, first, min(settings.lam, c.least_noise * square), c)
+
+
+def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
+    """Predict the residual over the next window.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+    scales : FeatureScales, optional
+        Those of :func:`scales_of` its commands if left out; a compensator's follow from its preview.
+    """
+    scales = scales_of(state, window) if scales is None else scales
+    return forecast_by(state, solved(state, scales), window, scales)
+
+
+def forecast_by(
+    state: TrustedModel,
+    experts: Mapping[int, SolvedExpert],
+    window: ResidualWindow,
+    scales: FeatureScales,
+    held: Mapping[int, ExpertPrediction] | None = None,
+) -> TrustedForecast:
+    """Predict as :func:`forecast` by the experts of :func:`solved`, with the shrinking of ``held`` if there is."""
+    x_d, x_pb, _ = window
+    learned, command, c, run = state.learned, state.fixed.command, state.fixed.constants, state.run
+    bound, growth = c.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
+
+    def predicted(expert: int, features: Array) -> ExpertPrediction:
+        kind = state.kind_of(expert)
+        scale = learned.scales[OF_COMMAND].grown(growth) if kind == OF_COMMAND else learned.scales[OF_PHYSICS]
+        most = c.bound_of_command * scale.largest if kind == OF_COMMAND else bound
+        shrunk = None if held is None else held.get(expert)
+        return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk)
+
+    x, rows = x_pb, np.empty((len(x_d), 0))
+    if STATIC in experts:
+        # The stiffness acts at the position, which the physics model alone does not give well enough.
+        rows, _ = state.fixed.static.rows(run.static, window, x_pb, scales.velocity)
+        x = x_pb + predicted(STATIC, rows).e_h
+        rows, _ = state.fixed.static.rows(run.static, window, x, scales.velocity)
+    found: dict[int, ExpertPrediction] = {}
+    stacked = np.zeros((N_EXPERTS, len(x_d)))
+    stacked[HOLD] = min(max(state.last, -bound), bound)
+    for expert in experts:
+        if state.kind_of(expert) == OF_COMMAND:
+            found[expert] = predicted(expert, command.rows(run.commands, x_d))
+            follows = command.late(run.commands, x_d) - x_pb
+            stacked[expert] = np.clip(found[expert].e_h + follows, -growth * bound, growth * bound)
+        else:
+            found[expert] = predicted(expert, rows)
+            stacked[expert] = found[expert].e_h
+    weights = learned.stack.weights
+    e_h = weights @ stacked
+    second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
+    for expert, prediction in found.items():
+        second[expert] += prediction.variance
+    variance = np.maximum(weights @ second - e_h**2, 0.0)
+    return TrustedForecast(window, e_h, variance, x, stacked, found, scales)
+
+
+def _growth(state: TrustedModel, scales: FeatureScales) -> float:
+    """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
+
+    What follows the command alone is linear in it: it may be larger than anything so far by as much.
+    """
+    before = state.learned.largest_step
+    if not (before > 0.0 and state.learned.stack.leader == COMMAND):
+        return 1.0
+    return min(scales.step / before, state.fixed.constants.growth)

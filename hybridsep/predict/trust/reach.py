@@ -9,7 +9,7 @@ reads. After a second the axis has been moved, or its sensor set, and the value 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +20,24 @@ from .constants import TrustConstants
 __all__ = ["Reach", "reached"]
 
 
-class Reach(NamedTuple):
-    """What is known of the motion.
+@dataclass(frozen=True)
+class Reach:
+    """What is known of the samples before a window.
 
     Attributes
     ----------
-    fastest : float, m
-        Largest change of ``x_pb`` from sample to sample so far.
     n_missing : int
         Samples since the last one that was believed.
     n_beyond : int
         Of these, values out of reach, less those within it that followed.
     """
 
-    fastest: float = 0.0
     n_missing: int = 0
     n_beyond: int = 0
 
 
 def reached(
-    reach: Reach, x: Array, x_pb: Array, before: float, largest: float, T_s: float, constants: TrustConstants
+    reach: Reach, e: Array, largest: float, fastest: float, T_s: float, constants: TrustConstants
 ) -> tuple[NDArray[np.bool_], Reach]:
     """Return whether each sample of a window is believed, ``(n,)`` bool, and the reach after it.
 
@@ -48,29 +46,26 @@ def reached(
     Parameters
     ----------
     reach : Reach
-    x : (n,) array, m
-        Measured positions, NaN where missing.
-    x_pb : (n,) array, m
-        Their physics-based prediction.
-    before : float, m
-        The last prediction before them.
+    e : (n,) array, m
+        Measured residuals, NaN where missing.
     largest : float, m
         Largest residual believed before them.
+    fastest : float, m
+        Largest change of ``x_pb`` from sample to sample so far, of the window, too.
     T_s : float, s
     constants : TrustConstants
     """
-    fastest = max(reach.fastest, float(np.abs(np.diff(x_pb, prepend=before)).max()))
     known = largest > 0.0 and fastest > 0.0
-    believed, n_missing, n_beyond = np.isfinite(x), reach.n_missing, reach.n_beyond
-    residuals, patience = np.abs(x - x_pb), math.ceil(constants.patience / T_s)
-    for k, e in enumerate(residuals.tolist()):
+    believed, n_missing, n_beyond = np.isfinite(e), reach.n_missing, reach.n_beyond
+    patience = math.ceil(constants.patience / T_s)
+    for k, size in enumerate(np.abs(e).tolist()):
         n_missing += 1
         if not believed[k]:
             continue
-        beyond = e > constants.reach_residuals * largest + constants.reach_steps * fastest
+        beyond = size > constants.reach_residuals * largest + constants.reach_steps * fastest
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
             believed[k] = False
         else:
-            n_missing, n_beyond, largest = 0, 0, max(largest, e)
-    return believed, Reach(fastest, n_missing, n_beyond)
+            n_missing, n_beyond, largest = 0, 0, max(largest, size)
+    return believed, Reach(n_missing, n_beyond)

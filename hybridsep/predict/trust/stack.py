@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
 
+from ...base.records import within
 from ...base.signals import Array
-from .constants import TrustConstants
+from .constants import CONSTANTS, TrustConstants
 
-__all__ = ["Stack", "simplex_minimum"]
+__all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "N_EXPERTS", "STATIC", "Stack", "simplex_minimum"]
+
+HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
+"""Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
+the one of these with lags that led, with little weight of earlier runs."""
+
+N_EXPERTS = 5
+"""All of them."""
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
 
 
+@dataclass(frozen=True, eq=False)
 class Stack:
     """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of experts; the remainder is the prediction 0, the physics model's.
 
     ``π = argmin ‖e − F π‖² + κ s² n ‖π − π₀‖²`` over the windows so far, their evidence fading by ``γ`` a window, with
     the mean square ``s²`` of the best expert and ``n`` samples of a window: without evidence ``π = π₀``.
-
-    Parameters
-    ----------
-    first : sequence of float
-        ``π₀``.
-    constants : TrustConstants
 
     Attributes
     ----------
@@ -37,18 +41,26 @@ class Stack:
         ``eᵀe`` so far, m², and samples.
     """
 
-    def __init__(self, first: tuple[float, ...], constants: TrustConstants) -> None:
-        self.first, self.constants = np.array(first), constants
-        self.restart()
+    weights: Array = field(metadata=within(0.0, 1.0))
+    gram: Array
+    cross: Array
+    evidence: Array = field(metadata=within())
 
-    def restart(self) -> None:
-        """Begin without evidence."""
-        n = len(self.first)
-        self.weights, self.gram, self.cross = self.first.copy(), np.zeros((n, n)), np.zeros(n)
-        self.evidence = np.zeros(2)
+    @classmethod
+    def init(cls, first: Array) -> Stack:
+        """Return the stack without evidence, with the weights ``π₀``."""
+        n = len(first)
+        return cls(first, np.zeros((n, n)), np.zeros(n), np.zeros(2))
 
-    def update(self, predicted: Array, measured: Array, least: float) -> None:
-        """Update the weights with a measured window.
+    @property
+    def leader(self) -> int:
+        """COMMAND, if it has more of the weights than LAGGED and STATIC together, else LAGGED."""
+        return COMMAND if self.weights[COMMAND] > self.weights[LAGGED] + self.weights[STATIC] else LAGGED
+
+    def update(
+        self, predicted: Array, measured: Array, least: float, first: Array, constants: TrustConstants = CONSTANTS
+    ) -> Stack:
+        """Return the stack with a measured window more.
 
         Parameters
         ----------
@@ -57,26 +69,32 @@ class Stack:
         measured : (n,) array, m
         least : float, m²
             Least mean square that errors are judged by.
+        first : (n_experts,) array
+            ``π₀``.
+        constants : TrustConstants
         """
-        gamma, n = self.constants.gamma, len(measured)
-        self.gram = gamma * self.gram + predicted @ predicted.T
-        self.cross = gamma * self.cross + predicted @ measured
-        self.evidence = gamma * self.evidence + np.array([measured @ measured, n])
-        total, rows = self.evidence.tolist()
-        errors = total - 2.0 * self.cross + np.diag(self.gram)
+        gamma, n = constants.gamma, len(measured)
+        gram = gamma * self.gram + predicted @ predicted.T
+        cross = gamma * self.cross + predicted @ measured
+        evidence = gamma * self.evidence + np.array([measured @ measured, n])
+        total, rows = evidence.tolist()
+        errors = total - 2.0 * cross + np.diag(gram)
         best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
-        ridge = self.constants.kappa * best * n
-        self.weights = simplex_minimum(self.gram + ridge * np.eye(len(self.first)), self.cross + ridge * self.first)
+        ridge = constants.kappa * best * n
+        weights = simplex_minimum(gram + ridge * np.eye(len(first)), cross + ridge * first)
+        return Stack(weights, gram, cross, evidence)
 
-    def copy(self, expert: int, to: int) -> None:
-        """Give an expert the evidence of another, as if it had predicted the same so far."""
-        order = np.arange(len(self.first))
+    def copy(self, expert: int, to: int) -> Stack:
+        """Return the stack with the evidence of an expert given to another, as if it had predicted the same so far."""
+        order = np.arange(len(self.weights))
         order[to] = expert
-        self.gram, self.cross = self.gram[np.ix_(order, order)], self.cross[order]
+        return replace(self, gram=self.gram[np.ix_(order, order)], cross=self.cross[order])
 
-    def forget(self, expert: int) -> None:
-        """Forget an expert that predicts no more."""
-        self.gram[expert], self.gram[:, expert], self.cross[expert], self.weights[expert] = 0.0, 0.0, 0.0, 0.0
+    def forget(self, expert: int) -> Stack:
+        """Return the stack without an expert that predicts no more."""
+        others = np.arange(len(self.weights)) != expert
+        gram = np.where(others[:, None] & others, self.gram, 0.0)
+        return Stack(np.where(others, self.weights, 0.0), gram, np.where(others, self.cross, 0.0), self.evidence)
 
 
 def simplex_minimum(hessian: Array, linear: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Forecast of a residual model over a window, kept until the window is measured."""
+"""Window whose residual a model predicts, and its forecast, kept until the window is measured."""
 
 from __future__ import annotations
 
@@ -7,11 +7,27 @@ from typing import NamedTuple
 
 from ..base.signals import Array
 
-__all__ = ["FeatureScales", "Forecast"]
+__all__ = ["FeatureScales", "Forecast", "ResidualWindow"]
+
+
+class ResidualWindow(NamedTuple):
+    """What is known of a window before its residual is predicted.
+
+    Attributes
+    ----------
+    x_d, x_pb : (n,) array, m
+        Commands and physics-based prediction, relative to ``start``.
+    start : float, m
+        Initial position.
+    """
+
+    x_d: Array
+    x_pb: Array
+    start: float
 
 
 class FeatureScales(NamedTuple):
-    """Scales that the features and their priors are relative to, from the commands ahead.
+    """Scales that the features with trust and their priors are relative to, from the commands ahead.
 
     Attributes
     ----------
@@ -34,15 +50,13 @@ class Forecast:
 
     Attributes
     ----------
-    x_d, x_pb : (n,) array, m
-        Commands and physics-based prediction, relative to the start.
+    window : ResidualWindow
     e_h : (n,) array, m
         Predicted residual.
     variance : (n,) array, m²
         What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 without experts.
     """
 
-    x_d: Array
-    x_pb: Array
+    window: ResidualWindow
     e_h: Array
     variance: Array

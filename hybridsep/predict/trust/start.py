@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.signals import Array
-from ..model.discrete import DiscreteModel
-from ..model.physics import ModalModel
-from .regression import RidgeRegression
+from ...base.signals import Array
+from ...model.discrete import DiscreteModel
+from ...model.physics import ModalModel
+from ..regression import RidgeRegression
 
 __all__ = ["MotionBefore", "motion_before"]
 
@@ -81,9 +81,8 @@ def motion_before(
     seen, left = residuals[known], (residuals - of_motion[: len(residuals)])[known]
     if not left @ left < seen @ seen:
         return None
-    regression = RidgeRegression(n, _DAMPING)
-    regression.update(of_modes[: len(residuals)][known], left)
-    return MotionBefore(moving + modes @ regression.weights, commands, of_motion + of_modes @ regression.weights)
+    change = RidgeRegression.init(n, _DAMPING).update(of_modes[: len(residuals)][known], left).weights
+    return MotionBefore(moving + modes @ change, commands, of_motion + of_modes @ change)
 
 
 def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float, late: int) -> Array:

@@ -1,0 +1,135 @@
+"""The paper's model of the residual: ``e_h = wᵀφ`` with the features of eq. (5) and the weights of eq. (6).
+
+``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]``; every weight has the penalty λ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from ..base.records import FIXED
+from ..base.settings import PredictorSettings
+from ..base.signals import Array
+from .regression import RidgeRegression, lags
+from .residual_window import Forecast, ResidualWindow
+
+__all__ = ["PaperModel", "forecast", "free_run", "impulse_response", "init", "learn", "restart"]
+
+
+@dataclass(frozen=True, eq=False)
+class PaperModel:
+    """State of the paper's model.
+
+    Attributes
+    ----------
+    x_pb, e_pb : (q,) and (p,) array, m
+        Past samples, oldest first, zero before the first one.
+    regression : RidgeRegression
+    """
+
+    may_miss: ClassVar[bool] = False
+    n_rejected: ClassVar[int] = 0
+    learned: ClassVar[tuple[()]] = ()
+
+    settings: PredictorSettings = field(metadata=FIXED)
+    x_pb: Array
+    e_pb: Array
+    regression: RidgeRegression
+
+    @property
+    def regressions(self) -> tuple[RidgeRegression, ...]:
+        """All regressions that another run begins with."""
+        return (self.regression,)
+
+    @property
+    def lag_weights(self) -> Array:
+        """Autoregressive weights, ``(p,)``."""
+        return self.regression.weights[2 + self.settings.q :]
+
+    @property
+    def last(self) -> float:
+        """Last measured residual, m."""
+        return float(self.e_pb[-1])
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the numbers, which are in range, fit each other."""
+        return self.regression.is_sound
+
+
+def init(settings: PredictorSettings) -> PaperModel:
+    """Return the model at rest, with nothing learned."""
+    p, q = settings.p, settings.q
+    return PaperModel(settings, np.zeros(q), np.zeros(p), RidgeRegression.init(2 + q + p, settings.lam))
+
+
+def restart(state: PaperModel) -> PaperModel:
+    """Return the model at the beginning of another run, at rest; what was learned is kept."""
+    return replace(state, x_pb=np.zeros_like(state.x_pb), e_pb=np.zeros_like(state.e_pb))
+
+
+def forecast(state: PaperModel, window: ResidualWindow) -> Forecast:
+    """Predict the residual over the next window."""
+    return Forecast(window, free_run(state, window.x_pb), np.zeros(len(window.x_pb)))
+
+
+def free_run(state: PaperModel, x_pb: Array) -> Array:
+    """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
+
+    Parameters
+    ----------
+    state : PaperModel
+    x_pb : (n,) array, m
+        Physics-based prediction, relative to the start.
+    """
+    w, w_e = state.regression.weights, state.lag_weights
+    # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
+    drive = w[0] + np.convolve(np.concatenate((state.x_pb, x_pb)), w[1 : -len(w_e)], "valid")
+    # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
+    # its state is z_j = Σ_m w_e,j+m e(−m)
+    before = np.correlate(w_e, state.e_pb[::-1], "full")[len(w_e) - 1 :]
+    e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=before)
+    return np.asarray(e_h)
+
+
+def impulse_response(state: PaperModel, g_pb: Array) -> Array:
+    """Return that of the hybrid model, ``(n,)``, from that of ``G_pb``: the first column of ``G_h`` of eq. (3)."""
+    # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
+    w, w_e = state.regression.weights, state.lag_weights
+    return np.asarray(g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb))
+
+
+def learn(
+    state: PaperModel, forecast: Forecast, x: Array, *, fold: bool = True
+) -> tuple[PaperModel, NDArray[np.bool_]]:
+    """Learn from the measurement of a window; every sample is accepted.
+
+    Parameters
+    ----------
+    state : PaperModel
+    forecast : Forecast
+    x : (m,) array, m
+        Measured positions of its first ``m`` samples, relative to the start.
+    fold : bool
+        Whether they are learned; the next window starts from them in any case.
+
+    Returns
+    -------
+    PaperModel, (m,) array of bool
+    """
+    m, Np = len(x), state.settings.Np
+    measured, regression = forecast.window.x_pb[:m], state.regression
+    x_pb, e_pb = np.concatenate((state.x_pb, measured)), np.concatenate((state.e_pb, x - measured))
+    p, q = len(state.e_pb), len(state.x_pb)
+    for k in range(0, m, Np) if fold else ():
+        n = min(Np, m - k)
+        rows = np.column_stack(  # [φ(k) | e_pb(k)], eq. (5)
+            (np.ones(n), lags(x_pb[k : k + q + n], q + 1), lags(e_pb[k : k + p + n - 1], p), e_pb[k + p : k + p + n])
+        )
+        regression = regression.update_stacked(rows)
+    return replace(state, x_pb=x_pb[m:], e_pb=e_pb[m:], regression=regression), np.ones(m, dtype=np.bool_)

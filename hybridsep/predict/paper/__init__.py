@@ -1,1 +1,0 @@
-"""The paper's model of the residual, eqs. (4) to (6)."""

@@ -1,0 +1,73 @@
+"""Rows that experts have learned: of this run and, as long as they are doubted, of earlier ones apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.signals import Array
+from ..regression import RidgeRegression
+
+__all__ = ["Evidence"]
+
+_NO_PENALTY = 1e-40
+"""λ of the factor itself, m²: penalties come with each solution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Rows of this run and of earlier ones, by their factors.
+
+    Attributes
+    ----------
+    this : RidgeRegression
+    earlier : RidgeRegression
+        Without rows unless earlier runs are doubted.
+    """
+
+    this: RidgeRegression
+    earlier: RidgeRegression
+
+    @classmethod
+    def init(cls, n_features: int) -> Evidence:
+        """Return no evidence on the weights of ``n_features`` features."""
+        nothing = RidgeRegression.init(n_features, _NO_PENALTY)
+        return cls(nothing, nothing)
+
+    @property
+    def n_rows(self) -> float:
+        """Number of all rows, weighted."""
+        return self.this.n_rows + self.earlier.n_rows
+
+    def forget(self) -> Evidence:
+        """Forget all rows."""
+        return Evidence.init(self.this.n_features)
+
+    def believe_earlier(self) -> Evidence:
+        """Go on with all rows as with those of this run."""
+        return replace(self.forget(), this=self.all())
+
+    def forget_earlier(self) -> Evidence:
+        """Go on with the rows of this run alone."""
+        return replace(self.forget(), this=self.this)
+
+    def discount(self, kept: float) -> Evidence:
+        """Weigh all rows so far by ``kept``."""
+        return Evidence(self.this.discount(kept), self.earlier.discount(kept))
+
+    def begin_run(self, most: float) -> Evidence:
+        """Begin another run: all rows so far are of earlier ones, and weigh at most as ``most`` of this one."""
+        everything = self.all()
+        return replace(self.forget(), earlier=everything.discount(most / max(everything.n_rows, most)))
+
+    def all(self, kept: float = 1.0) -> RidgeRegression:
+        """Return all rows, those of earlier runs weighed by ``kept``."""
+        if self.earlier.n_rows == 0.0:
+            return self.this
+        earlier = self.earlier.discount(kept)
+        return earlier if self.this.n_rows == 0.0 else self.this.add(earlier)
+
+    def learn(self, rows: Array, lagged: Array, target: Array) -> Evidence:
+        """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
+        return replace(self, this=self.this.update_stacked(np.column_stack((rows, lagged, target))))

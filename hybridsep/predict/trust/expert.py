@@ -1,0 +1,235 @@
+"""Expert of the residual: a regression with normal priors, trusted as far as its own variance allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from ...base.records import within
+from ...base.signals import Array
+from ..regression import PenalisedSolution, RidgeRegression, lags
+from .constants import TrustConstants
+
+__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "solve"]
+
+_DIVERGED = 1e6
+"""Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
+and on the correlation that a window shows."""
+
+_LAG_BOUND = 10.0
+"""Largest lag within a window, relative to the bound on a prediction: what is beyond has diverged."""
+
+_RESOLUTION = 1e-13
+"""Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
+squares of the targets: the C core has it from a Gram matrix, which does not resolve less, and no less matters before
+10⁷ rows without noise."""
+
+
+@dataclass(frozen=True)
+class ResidualScale:
+    """Size of the residuals so far.
+
+    Attributes
+    ----------
+    largest_square : float, m²
+        Largest mean square of a window.
+    largest : float, m
+        Largest magnitude.
+    """
+
+    largest_square: float = field(default=0.0, metadata=within())
+    largest: float = field(default=0.0, metadata=within())
+
+    def grown(self, growth: float) -> ResidualScale:
+        """Return the scale of residuals that are larger by a factor."""
+        return ResidualScale(growth**2 * self.largest_square, growth * self.largest)
+
+    def follow(self, residuals: Array) -> ResidualScale:
+        """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1."""
+        mean_square, largest = float(np.mean(residuals**2)), float(np.abs(residuals).max())
+        return ResidualScale(max(self.largest_square, mean_square), max(self.largest, largest))
+
+
+class ExpertPrediction(NamedTuple):
+    """Residual predicted over a window by one expert.
+
+    Attributes
+    ----------
+    e_h : (n,) array, m
+        Shrunk by its variance, and bounded.
+    unshrunk : (n,) array, m
+    kept : (n,) array
+        What the variance leaves of it.
+    variance : (n,) array, m²
+        What is left of the variance of the residual, ``v·τ²/(v + τ²)``.
+    noise_variance : float, m²
+        Mean square of the rows so far about this expert.
+    """
+
+    e_h: Array
+    unshrunk: Array
+    kept: Array
+    variance: Array
+    noise_variance: float
+
+    @property
+    def shrink(self) -> Array:
+        """What shrinking and bounds leave of ``unshrunk``, ``(n,)``."""
+        return np.asarray(np.divide(self.e_h, self.unshrunk, out=self.kept.copy(), where=self.unshrunk != 0.0))
+
+
+@dataclass(frozen=True)
+class ExpertErrors:
+    """What is known of the errors of an expert.
+
+    Attributes
+    ----------
+    noise_variance : float, m²
+        Of a row about the model; 0 until it is known.
+    correlation : float
+        Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
+    """
+
+    noise_variance: float = field(default=0.0, metadata=within())
+    correlation: float = field(default=1.0, metadata=within(1.0))
+
+    def judge(
+        self,
+        prediction: ExpertPrediction,
+        measured: Array,
+        accepted: NDArray[np.bool_],
+        given: float,
+        constants: TrustConstants,
+    ) -> ExpertErrors:
+        """Return noise and correlation with the errors of a window.
+
+        Parameters
+        ----------
+        prediction : ExpertPrediction
+        measured, accepted : (m,) array, m and bool
+            Residuals of its first samples, and which count.
+        given : float, m²
+            Variance of the noise, if it is known; else 0.
+        constants : TrustConstants
+        """
+        noise_variance, correlation = given or prediction.noise_variance, self.correlation
+        if noise_variance > 0.0:
+            error = (measured - prediction.unshrunk[: len(measured)])[accepted]
+            seen = min(len(error) * float(np.mean(error)) ** 2 / noise_variance, _DIVERGED)
+            correlation += constants.correlation_rate * (seen - correlation)
+            correlation = min(max(correlation, 1.0), constants.correlation_max)
+        return ExpertErrors(noise_variance, correlation)
+
+
+class SolvedExpert(NamedTuple):
+    """Expert with weights.
+
+    Attributes
+    ----------
+    n_static : int
+        Features without lags, the first ones of a row.
+    solution : PenalisedSolution
+        Weights of these and of the lags.
+    variance, noise_variance : float, m²
+        Of the noise that the penalties come from, and mean square of the rows about the weights.
+    """
+
+    n_static: int
+    solution: PenalisedSolution
+    variance: float
+    noise_variance: float
+
+    @property
+    def lag_weights(self) -> Array:
+        """Weights of the last ``p`` residuals, newest first, ``(p,)``."""
+        return self.solution.weights[self.n_static :]
+
+    def predict(
+        self, rows: Array, past: Array, largest_square: float, bound: float, held: ExpertPrediction | None = None
+    ) -> ExpertPrediction:
+        """Predict the residual over a window in free run.
+
+        Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
+        response. A prediction of variance ``τ²`` is shrunk by ``v/(v + τ²)``, ``v`` being the largest mean square of a
+        window: at a first motion, a first reversal or in a region not seen yet the physics model remains.
+
+        Parameters
+        ----------
+        rows : (n, n_static) array
+            Features of the window without lags.
+        past : (≥ p,) array, m
+            Last residuals, newest first.
+        largest_square : float, m²
+            Largest mean square of a window.
+        bound : float, m
+            On the prediction.
+        held : ExpertPrediction, optional
+            Prediction whose shrinking is held; else it is computed.
+        """
+        w_e = self.lag_weights
+        p = len(w_e)
+        drive, response = rows @ self.solution.weights[: self.n_static], np.zeros(0)
+        if p:
+            drive, response = _recursion(w_e, drive, past[:p])
+        finite = np.isfinite(drive)
+        e = np.clip(np.where(finite, drive, 0.0), -_LAG_BOUND * bound, _LAG_BOUND * bound)
+        if held is not None:
+            kept = held.kept
+        else:
+            lagged = lags(np.concatenate((past[:p][::-1], e[:-1])), p) if p else np.empty((len(e), 0))
+            variance = self.variance * self.solution.leverage(np.hstack((rows, lagged)))
+            if p:
+                variance = np.asarray(lfilter(response**2, [1.0], variance))
+            most = _DIVERGED * bound**2
+            variance = np.where(finite, np.minimum(variance, most), most)
+            kept = largest_square / (largest_square + variance)
+        return ExpertPrediction(
+            np.clip(e, -bound, bound) * kept, e, kept, largest_square * (1.0 - kept), self.noise_variance
+        )
+
+
+def solve(
+    evidence: RidgeRegression,
+    errors: ExpertErrors,
+    scales: Array,
+    p: int,
+    first: float,
+    least: float,
+    constants: TrustConstants,
+) -> SolvedExpert:
+    """Return an expert with the weights that follow from all rows so far.
+
+    Parameters
+    ----------
+    evidence : RidgeRegression
+        Rows whose first features are those of the expert.
+    errors : ExpertErrors
+    scales : (n_static,) array
+        Prior standard deviations of the weights of the features without lags, the first ones of a row.
+    p : int
+        Lags of the residual.
+    first, least : float, m²
+        Variance of the noise while it is not known, and the least one.
+    constants : TrustConstants
+    """
+    resolved = _RESOLUTION * evidence.target_square
+    variance = max(errors.noise_variance or first, least, resolved) * errors.correlation
+    priors = np.concatenate((scales, np.sqrt(constants.last_lag ** (np.arange(p) / max(p, 1)))))
+    solution = evidence.penalised(variance / priors**2)
+    return SolvedExpert(len(scales), solution, variance, max(solution.residual_sum, resolved) / evidence.n_rows)
+
+
+def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
+    """Return the free run ``e(k) = drive(k) + Σ_i w_e,i e(k−i)``, and the recursion's impulse response; eq. (4)."""
+    denominator = np.concatenate(([1.0], -w_e))
+    state = np.correlate(w_e, past, "full")[len(past) - 1 :]
+    impulse = np.zeros(len(drive))
+    impulse[0] = 1.0
+    with np.errstate(all="ignore"):  # an unstable recursion is recognised by what it gives
+        e, _ = lfilter([1.0], denominator, drive, zi=state)
+        response = lfilter([1.0], denominator, impulse)
+    return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)

@@ -1,0 +1,145 @@
+"""Learning of the residual model that can be trusted, from the measurement of the windows that it predicted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.signals import Array
+from ..regression import lags
+from ..residual_window import ResidualWindow
+from .evidence import Evidence
+from .expert import ExpertErrors
+from .forecast import TrustedForecast
+from .reach import reached
+from .stack import DOUBTING, LAGGED, STATIC, Stack
+from .state import OF_COMMAND, OF_PHYSICS, Learned, RunState, TrustedModel
+
+__all__ = ["begin_in_motion", "learn"]
+
+_BRIDGED = 3
+"""Lags of a row that may stand for samples without a measurement."""
+
+
+def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel:
+    """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+        The first one, with the motion before it.
+    """
+    (x_d, x_pb, _), command, static = window, state.fixed.command, state.run.static
+    commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
+    positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
+    late = commands[-1 - command.dead_time :: -1][: command.p]
+    past = state.run.past[OF_PHYSICS], positions[: -command.p - 1 : -1] - late
+    static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
+    return replace(state, run=replace(state.run, static=static, commands=commands, past=past))
+
+
+def learn(
+    state: TrustedModel, forecast: TrustedForecast, x: Array, *, fold: bool = True
+) -> tuple[TrustedModel, NDArray[np.bool_]]:
+    """Learn from the measurement of a window.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    forecast : TrustedForecast
+        Of that state.
+    x : (m,) array, m
+        Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
+    fold : bool
+        Whether they are learned; the next window starts from them in any case.
+
+    Returns
+    -------
+    TrustedModel, (m,) array of bool
+        Which samples are accepted.
+    """
+    m, fixed, run = len(x), state.fixed, state.run
+    window = ResidualWindow(forecast.window.x_d[:m], forecast.window.x_pb[:m], forecast.window.start)
+    fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
+    state = _with_scales(state, forecast, max(state.learned.fastest, fastest))
+    learned, measured = state.learned, x - window.x_pb
+    largest, T_s = learned.scales[OF_PHYSICS].largest, fixed.settings.T_s
+    accepted, reach = reached(run.reach, measured, largest, learned.fastest, T_s, fixed.constants)
+    e = _bridged(state.last, measured, accepted)
+    e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
+    rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
+    bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
+    if fold and accepted.any():
+        of_command = fixed.command.rows(run.commands, window.x_d)
+        state = _folded(state, (rows, of_command), (e, e_0), bridged)
+        state = _judged(state, forecast, (e, e_0), accepted)
+    past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
+    n_rejected = run.n_rejected + m - int(accepted.sum())
+    commands = np.concatenate((run.commands, window.x_d))[m:]
+    return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], reach, n_rejected)), accepted
+
+
+def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
+    """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
+    learned, (velocity, largest, step) = state.learned, forecast.scales
+    of_physics, of_command = state.evidence
+    stack = learned.stack
+    if velocity != learned.velocity_scale:
+        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
+    learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
+    return replace(state, learned=learned, evidence=(of_physics, of_command))
+
+
+def _folded(
+    state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
+) -> TrustedModel:
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
+    settings, n = state.fixed.settings, len(e[OF_PHYSICS])
+    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+
+    def learned(kind: int) -> Evidence:
+        past = state.run.past[kind]
+        p = len(past)
+        # Measured samples, as were all but a few of their lags
+        n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
+        counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
+        return state.evidence[kind].discount(kept).learn(rows[kind][counts], lagged[counts], e[kind][counts])
+
+    return replace(state, evidence=(learned(OF_PHYSICS), learned(OF_COMMAND)))
+
+
+def _judged(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> TrustedModel:
+    """Judge the experts and their stack by the measurement of their window."""
+    settings, c, learned = state.fixed.settings, state.fixed.constants, state.learned
+    errors = {
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2, c)
+        for expert, one in forecast.predictions.items()
+    }
+    scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    n, late = len(accepted), settings.measurement_delay
+    published = accepted & (np.arange(n) >= late) if late < n else accepted
+    stack, first = learned.stack, state.fixed.first_weights
+    if published.any():
+        predicted = forecast.stacked[:, :n][:, published]
+        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam, first, c)
+    evidence = state.evidence
+    if state.doubts and stack.weights[DOUBTING] > c.doubt:
+        # All experts go on with this run alone, and are judged anew.
+        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init(first)
+        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
+    learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
+    return replace(state, learned=learned, evidence=evidence)
+
+
+def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
+    """Return residuals with those not accepted interpolated between accepted ones; ``last`` is before the first."""
+    known = np.flatnonzero(accepted)
+    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
+    return np.asarray(np.interp(np.arange(len(measured)), places, values))
