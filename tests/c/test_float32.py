@@ -29,7 +29,13 @@ def played(case: Case, *, single: bool) -> Replay:
     folder.mkdir()
     (folder / "case.h").write_text(header(case), encoding="utf-8")
     sources = [HERE / "replay.c", HERE / "board_host.c", *core_sources()]
-    options = ["-O2", *(["-DHSEP_FLOAT32", "-Wno-conversion"] if single else []), f"-I{HERE}", f"-I{folder}", *include_flags()]
+    options = [
+        "-O2",
+        *(["-DHSEP_FLOAT32", "-Wno-conversion"] if single else []),
+        f"-I{HERE}",
+        f"-I{folder}",
+        *include_flags(),
+    ]
     run_compiler([*options, *sources, "-lm", "-o", folder / "program"])
     return replay(HERE_UNCOUNTED, folder / "program", count=False)
 
@@ -90,8 +96,8 @@ def test_no_operation_of_a_sample_is_a_call(tmp_path: Path) -> None:
     calls = set()
     for source in core_sources():
         object_file = tmp_path / f"{source.stem}.o"
-        command = [*machine.compiler, "-O2", "-std=c99", "-ffp-contract=off", *include_flags(), "-c", source]
-        subprocess.run([*command, "-o", object_file], check=True)
+        flags = ["-O2", "-std=c99", "-ffp-contract=off", *include_flags()]
+        subprocess.run([*machine.compiler, *flags, "-c", str(source), "-o", str(object_file)], check=True)
         names = subprocess.run([machine.nm, object_file], capture_output=True, text=True, check=True).stdout
         if re.search(r"__aeabi_d\w+", names):
             calls.add(source.stem)
