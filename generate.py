@@ -66,11 +66,11 @@ def settings_header() -> str:
     """Return the C header of the settings of predictor and compensator."""
     lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("TRUST", TRUST_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
     return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are uint64_t. */
+ * Whole numbers, truth values and choices are hsep_word. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* clang-format off */
 {"".join(_list(name, settings) for name, settings in lists)}/* clang-format on */
@@ -129,7 +129,7 @@ def constants_header() -> str:
     for names, description in groups:
         text = " ".join(description.replace("`", "").split())
         lines = textwrap.wrap(f"{text} */", 114)
-        defines = [f"#define HSEP_TRUST_{name.upper()} {values[name]!r}" for name in names.split(", ")]
+        defines = [f"#define HSEP_TRUST_{name.upper()} {_number(values[name])}" for name in names.split(", ")]
         parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
     body = "\n\n".join(parts)
     return f"""/* Constants of the residual model with trust, generated from hybridsep/predict/trust/constants.py. */
@@ -144,7 +144,10 @@ def constants_header() -> str:
 
 def learned_header() -> str:
     """Return the C header of the ranges of what the residual model with trust has learned."""
-    ranges = "\n".join(f"#define HSEP_LEARNED_{name.upper()} {one.least}, {one.most}" for name, one in LEARNED.items())
+    ranges = "\n".join(
+        f"#define HSEP_LEARNED_{name.upper()} {_number(one.least)}, {_number(one.most)}"
+        for name, one in LEARNED.items()
+    )
     return f"""/* Least and most of what the residual model with trust has learned, generated from
  * hybridsep/predict/trust/learned.py. */
 #ifndef HSEP_TRUST_LEARNED_H
@@ -189,14 +192,21 @@ def declared_header() -> str:
 def _initialiser(value: Any) -> str:
     """Return a number, or what stands between the braces of an array's initialiser."""
     if not isinstance(value, tuple):
-        return repr(value)
+        return _number(value)
     return ", ".join(f"{{{_initialiser(one)}}}" if isinstance(one, tuple) else _initialiser(one) for one in value)
+
+
+def _number(value: Any) -> str:
+    """Return a number as C has it: what single precision cannot hold in a macro that replaces it there."""
+    if not isinstance(value, float) or 1e-36 <= abs(value) <= 1e30 or value == 0.0:
+        return repr(value)
+    return f"{'-' * (value < 0.0)}HSEP_{'TINY' if abs(value) < 1.0 else 'HUGE'}({abs(value)!r})"
 
 
 def _list(name: str, settings: Mapping[str, Parameter]) -> str:
     rows: list[str] = []
     for setting, parameter in settings.items():
-        kind = "double" if parameter.kind is float else "uint64_t"
+        kind = "hsep_real" if parameter.kind is float else "hsep_word"
         unit = "" if parameter.unit == "1" else f", {parameter.unit}"
         items = ", ".join(f"{number} {item}" for number, item in enumerate(parameter.choices))
         meaning = parameter.description.replace("·", " ") + (f": {items}" if items else unit)
@@ -207,7 +217,7 @@ def _list(name: str, settings: Mapping[str, Parameter]) -> str:
 def _ranges(name: str, settings: Mapping[str, Parameter]) -> str:
     rows = []
     for setting, parameter in settings.items():
-        kind = "double" if parameter.kind is float else "uint64_t"
+        kind = "hsep_real" if parameter.kind is float else "hsep_word"
         usual = 0.0 if parameter.default is None else parameter.to_fmi(parameter.default)
         automatic = parameter.minimum if parameter.automatic is None else parameter.automatic
         numbers = (usual, parameter.minimum, parameter.maximum, parameter.nonzero, automatic)

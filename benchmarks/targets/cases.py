@@ -147,6 +147,6 @@ static const unsigned char case_learned[{max(1, len(weights))}] = {{{content}}};
 static const void *const case_weights = {"case_learned" if weights else "NULL"};
 static const size_t case_weights_size = {len(weights)};
 
-static const double case_samples[{len(samples)}][2] = {{
+static const hsep_real case_samples[{len(samples)}][2] = {{
     {rows}}};
 """

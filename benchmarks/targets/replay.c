@@ -2,7 +2,7 @@
  *
  * case.h has what is replayed: the kind, parameters, samples and weights. The first line is
  *     size began
- * then a line for each sample: what it took in units of the board, and the bits of two outputs,
+ * then a line for each sample: what it took in units of the board, and the bits of two outputs, as doubles,
  *     count x_h x_h_std     of a predictor
  *     count x_dm x_h        of a compensator
  * and at the end the stack that the library needed.
@@ -14,7 +14,7 @@
 #define STACK_PAINTED 24000 /* bytes below the caller; more than the library needs */
 #define PAINT 0x5Au
 
-static double block[CASE_BLOCK_SIZE / sizeof(double)];
+static hsep_real block[CASE_BLOCK_SIZE / sizeof(hsep_real)];
 
 /* Where the stack was painted. */
 static uintptr_t painted;
@@ -40,9 +40,9 @@ __attribute__((noinline)) static uint32_t depth(void)
 }
 
 /* Process a sample; callgrind counts what is inside. */
-__attribute__((noinline)) void replay_sample(const double sample[2], CASE_OUTPUTS *outputs);
+__attribute__((noinline)) void replay_sample(const hsep_real sample[2], CASE_OUTPUTS *outputs);
 
-void replay_sample(const double sample[2], CASE_OUTPUTS *outputs)
+void replay_sample(const hsep_real sample[2], CASE_OUTPUTS *outputs)
 {
     (void)CASE_FUNCTION(sample)((CASE_TYPE *)block, sample[0], sample[1]);
     CASE_FUNCTION(read)((const CASE_TYPE *)block, outputs);

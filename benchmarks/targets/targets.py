@@ -15,7 +15,20 @@ from numpy.typing import NDArray
 from benchmarks.targets.cases import Case, header
 from hybridsep.base.signals import Array
 
-__all__ = ["TARGETS", "Replay", "Sizes", "Target", "build", "program", "replay", "run", "sizes"]
+__all__ = [
+    "FLOAT32",
+    "HERE",
+    "TARGETS",
+    "Replay",
+    "Sizes",
+    "Target",
+    "build",
+    "core_sources",
+    "program",
+    "replay",
+    "run",
+    "sizes",
+]
 
 HERE = Path(__file__).parent
 C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
@@ -96,6 +109,9 @@ def _cortex_m(name: str, board: str, *options: str, slow: bool = False) -> Targe
 
 _PICOLIBC = "--specs=/usr/lib/picolibc/{}/picolibc.specs"
 _M7 = ("-mcpu=cortex-m7", "-mfpu=fpv5-d16")
+_M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16")
+FLOAT32 = ("-DHSEP_FLOAT32", "-fsingle-precision-constant")
+"""Options of single precision; constants too, as each operation of a double would be a call."""
 _AARCH64 = "aarch64-linux-gnu"
 TARGETS = {
     "x86-64": Target("x86-64", ("gcc",), "board_host.c", packages="gcc valgrind"),
@@ -112,7 +128,8 @@ TARGETS = {
     ),
     "m7": _cortex_m("Cortex-M7", "mps2-an500", *_M7),
     "m7-picolibc": _cortex_m("Cortex-M7, picolibc", "mps2-an500", *_M7, _PICOLIBC.format("arm-none-eabi")),
-    "m4f": _cortex_m("Cortex-M4F", "mps2-an386", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", slow=True),
+    "m4f": _cortex_m("Cortex-M4F", "mps2-an386", *_M4F, slow=True),
+    "m4f-float32": _cortex_m("Cortex-M4F, float32", "mps2-an386", *_M4F, *FLOAT32),
 }
 
 

@@ -1,6 +1,6 @@
 /* hsep: prediction and pre-compensation of a feed drive's servo error, for C99 and C++11. README.md says how to use it.
  *
- * A predictor, or a compensator, is a block of memory that the caller provides: aligned for double, of the size that
+ * A predictor, or a compensator, is a block of memory that the caller provides: aligned for hsep_real, of the size that
  * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state, and hsep_*_valid judges
  * bytes from elsewhere.
  *
@@ -32,7 +32,7 @@
 #define HSEP_H
 
 #include <stddef.h>
-#include <stdint.h>
+#include "hsep_real.h"
 
 #include "hsep_api.h"
 #include "hsep_settings.h"
@@ -44,10 +44,10 @@ extern "C" {
 /* One mode of the drive's linear model, eq. (15):
  * (alpha + beta s) / (s^2 + 2 zeta omega s + omega^2) with omega = 2 pi f_n, from command to position. */
 typedef struct {
-    double f_n;   /* natural frequency, Hz, > 0 */
-    double zeta;  /* damping ratio, 1, > 0; 1 is critical, more is over-damped */
-    double alpha; /* numerator, 1/s^2 */
-    double beta;  /* numerator, 1/s */
+    hsep_real f_n;   /* natural frequency, Hz, > 0 */
+    hsep_real zeta;  /* damping ratio, 1, > 0; 1 is critical, more is over-damped */
+    hsep_real alpha; /* numerator, 1/s^2 */
+    hsep_real beta;  /* numerator, 1/s */
 } hsep_mode;
 
 /* How the command runs between samples, of the setting input_hold. */
@@ -58,7 +58,7 @@ typedef struct {
     hsep_predictor_settings predictor;
     hsep_trust_settings trust;
     hsep_compensator_settings compensator; /* of no meaning for a predictor */
-    uint64_t n_modes;                      /* >= 1 */
+    hsep_word n_modes;                     /* >= 1 */
     const hsep_mode *modes;                /* (n_modes,), read while a function runs, not kept */
 } hsep_parameters;
 
@@ -85,13 +85,13 @@ typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_D
 typedef struct hsep_predictor hsep_predictor;
 
 typedef struct {
-    double x_d, x_pb, x_h;                 /* m, now: command, predictions by the physics model and by the hybrid one */
-    double x_h_std;                        /* m, standard deviation of the error of x_h; 0 where it is not known */
-    double rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init: of the servo error and of predictions' errors */
-    uint64_t batch;                        /* floor(k / Np) */
-    uint64_t n_rejected;                   /* measurements that were missing or not plausible, with trust */
-    int hybrid_active;                     /* whether x_h is the hybrid prediction now */
-    hsep_divergence divergence;            /* HSEP_CONVERGES, or the outputs are invalid until hsep_*_init */
+    hsep_real x_d, x_pb, x_h; /* m, now: command, predictions by the physics model and by the hybrid one */
+    hsep_real x_h_std;        /* m, standard deviation of the error of x_h; 0 where it is not known */
+    hsep_real rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init: of the servo error and of predictions' errors */
+    hsep_word batch;                          /* floor(k / Np) */
+    hsep_word n_rejected;                     /* measurements that were missing or not plausible, with trust */
+    int hybrid_active;                        /* whether x_h is the hybrid prediction now */
+    hsep_divergence divergence;               /* HSEP_CONVERGES, or the outputs are invalid until hsep_*_init */
 } hsep_predictor_outputs;
 
 /* Bytes of the block; 0 if a parameter is out of its range, p > Np, q >= Np, there are no modes, or the block would not
@@ -102,20 +102,20 @@ HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
  * `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing: the
  * block has begun cold. */
 HSEP_API hsep_began hsep_predictor_init(
-    hsep_predictor *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size);
+    hsep_predictor *self, const hsep_parameters *parameters, hsep_real start, const void *weights, size_t weights_size);
 
 /* Whether bytes in any alignment are a block for these parameters that has processed k samples: size is its, and every
  * index lies within it. Bytes that were changed on purpose may be valid and mean nothing. */
-HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k);
+HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
 
 /* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
-HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
 /* Read the outputs of the next sample. */
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
 
 /* Standard deviation of the error of x_h at sample i of the window, i < Np, m; 0 where it is not known. */
-HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
+HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i);
 
 /* ---------------------------------------------------------------------------------------------- The compensator --
  *
@@ -129,7 +129,7 @@ typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hse
 
 typedef struct {
     hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
-    double x_dm;                      /* m, now */
+    hsep_real x_dm;                   /* m, now */
     hsep_sep_state state;             /* of the plan that x_dm follows now */
 } hsep_compensator_outputs;
 
@@ -139,18 +139,19 @@ HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters);
 
 /* Begin, and plan the first window; as hsep_predictor_init. */
 HSEP_API hsep_began hsep_compensator_init(
-    hsep_compensator *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size);
+    hsep_compensator *self, const hsep_parameters *parameters, hsep_real start, const void *weights,
+    size_t weights_size);
 
 /* As hsep_predictor_valid. */
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k);
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
  * Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at x_d: with compensate off
  * that rest is followed, and where it is larger than change_max it is the bound. */
-HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max);
+HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
 
 /* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
-HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
+HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas);
 
 /* Read the outputs of the next sample. */
 HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);

@@ -18,6 +18,7 @@ from c_core import SPRING_MASS_DAMPER, STAGE_MODES, CModel
 from c_library import STRICT, Library, cmake, configured, installed
 from library_models import trained_predictor
 from places import ROOT
+from spoiled_weights import spoiled
 
 from hybridsep import backtest
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
@@ -173,13 +174,16 @@ def test_weights_from_memory(kind: str) -> None:
     cold = bytes(given.block)
     assert warm != cold
     assert given.is_valid(warm, 0)
-    for damaged in (b"", content[:-1], content[:200] + bytes([content[200] ^ 1]) + content[201:]):
-        assert given.begin(0.0, damaged) == 1
-        assert bytes(given.block) == cold
+    damaged, other = spoiled(content)
+    for what, refused in ((1, damaged), (2, other)):
+        for name, changed in refused.items():
+            assert given.begin(0.0, changed) == what, name
+            assert bytes(given.block) == cold, name
+    assert given.begin(0.0, content) == 0
     given.parameters["q"] = int(settings["q"]) + 1
-    other = given.begin(0.0, content), bytes(given.block)
+    elsewhere = given.begin(0.0, content), bytes(given.block)
     assert given.begin(0.0) == 0
-    assert other == (2, bytes(given.block))
+    assert elsewhere == (2, bytes(given.block))
 
 
 def test_saved_blocks_are_judged() -> None:

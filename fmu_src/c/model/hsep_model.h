@@ -16,6 +16,10 @@
 
 #include <stddef.h>
 
+#ifdef HSEP_FLOAT32
+#error "FMUs compute in double precision: HSEP_FLOAT32 is for the library alone"
+#endif
+
 #define HSEP_MESSAGE_SIZE 512 /* bytes of a message buffer, the final 0 included */
 
 typedef enum {

@@ -2,7 +2,7 @@
 
 #include "hsep_range.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -24,23 +24,23 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
-    const uint64_t preview = predictor->preview, Np = predictor->Np;
-    const double *x_d = hsep_at(predictor, predictor->x_d);
-    double *target = hsep_at(self, self->target);
-    double *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
+    const hsep_word preview = predictor->preview, Np = predictor->Np;
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    hsep_real *target = hsep_at(self, self->target);
+    hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(double));
-    for (uint64_t k = 0; k < preview; k++) {
-        const double command = x_d[k] - predictor->start + hsep_planner_decided(planner, k);
+    memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
+    for (hsep_word k = 0; k < preview; k++) {
+        const hsep_real command = x_d[k] - predictor->start + hsep_planner_decided(planner, k);
         hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
         const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 1);
-        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(double));
-        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(double));
+        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
+        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
         hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-        for (uint64_t k = 0; k < preview; k++) {
+        for (hsep_word k = 0; k < preview; k++) {
             target[k] -= e[preview - 1 - k];
         }
     }
@@ -48,20 +48,20 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 
 /* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a
  * trial. */
-static const double *compensator_filter_spline(hsep_compensator *self)
+static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    const uint64_t preview = predictor->preview;
-    const double *spline_pb = hsep_at(self, self->spline_pb);
-    double *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    for (uint64_t k = 0; k < preview; k++) {
+    const hsep_word preview = predictor->preview;
+    const hsep_real *spline_pb = hsep_at(self, self->spline_pb);
+    hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
+    for (hsep_word k = 0; k < preview; k++) {
         x[preview - 1 - k] = spline_pb[k];
     }
-    memset(x + preview, 0, (size_t)recursion.q * sizeof(double));
-    memset(e + preview, 0, (size_t)recursion.p * sizeof(double));
+    memset(x + preview, 0, (size_t)recursion.q * sizeof(hsep_real));
+    memset(e + preview, 0, (size_t)recursion.p * sizeof(hsep_real));
     hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-    for (uint64_t k = 0; k < preview; k++) {
+    for (hsep_word k = 0; k < preview; k++) {
         x[k] = spline_pb[k] + e[preview - 1 - k];
     }
     return x;
@@ -72,28 +72,28 @@ static int compensator_trusts(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
+    return self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
            hsep_paper_regression(hsep_residual_paper(hsep_predictor_model(predictor)))->n_samples > 0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
 /* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from
  * differences. */
-static uint64_t compensator_pinned(hsep_compensator *self)
+static hsep_word compensator_pinned(hsep_compensator *self)
 {
-    const uint64_t pinned = hsep_planner_pinned(hsep_compensator_planner(self));
+    const hsep_word pinned = hsep_planner_pinned(hsep_compensator_planner(self));
     return pinned > 1 ? pinned : 0;
 }
 
 /* Set the commands of the window up to last - 1 and predict its position; eqs. (2) and (4). */
-static void compensator_publish(hsep_compensator *self, uint64_t last)
+static void compensator_publish(hsep_compensator *self, hsep_word last)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const uint64_t Np = predictor->Np, first = predictor->n_published;
-    const double *x_d = hsep_at(predictor, predictor->x_d);
-    double *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
-    double *command = hsep_at(predictor, predictor->command);
-    for (uint64_t k = first; k < last; k++) {
+    const hsep_word Np = predictor->Np, first = predictor->n_published;
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    hsep_real *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
+    hsep_real *command = hsep_at(predictor, predictor->command);
+    for (hsep_word k = first; k < last; k++) {
         x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
         command[Np - 1 - k] = x_dm[k] - predictor->start;
         hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
@@ -105,7 +105,7 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
         const hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
         memcpy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
-            (size_t)predictor->n * sizeof(double));
+            (size_t)predictor->n * sizeof(hsep_real));
     } else {
         const hsep_residual_window window = hsep_predictor_window(predictor);
         hsep_residual_predict(hsep_predictor_model(predictor), &window, first, last);
@@ -115,11 +115,11 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
 }
 
 /* Do parts of a plan with trust, as much work as is due; return whether it is made. */
-static int compensator_advance(hsep_compensator *self, uint64_t due)
+static int compensator_advance(hsep_compensator *self, hsep_word due)
 {
     hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
     const hsep_trusted_task task = compensator_task(self);
-    uint64_t next = hsep_trusted_planner_next(trusted), done = 0;
+    hsep_word next = hsep_trusted_planner_next(trusted), done = 0;
     while (next > 0 && next <= due - done) {
         hsep_trusted_planner_advance(trusted, &task);
         done += next;
@@ -129,10 +129,10 @@ static int compensator_advance(hsep_compensator *self, uint64_t due)
 }
 
 /* Solver steps of a bounded plan; return whether it is solved. */
-static int compensator_step(hsep_compensator *self, uint64_t due)
+static int compensator_step(hsep_compensator *self, hsep_word due)
 {
     int done = 0;
-    for (uint64_t step = 0; !done && step < due; step++) {
+    for (hsep_word step = 0; !done && step < due; step++) {
         done = hsep_planner_step(hsep_compensator_planner(self));
     }
     return done;
@@ -142,9 +142,9 @@ static int compensator_step(hsep_compensator *self, uint64_t due)
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const uint64_t pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
-    const uint64_t work = self->trusted ? HSEP_TRUSTED_WORK : HSEP_INTERIOR_STEPS;
-    const uint64_t due = i < pinned ? (work + pinned - 1) / pinned : UINT64_MAX;
+    const hsep_word pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
+    const hsep_word work = self->trusted ? HSEP_TRUSTED_WORK : HSEP_INTERIOR_STEPS;
+    const hsep_word due = i < pinned ? (work + pinned - 1) / pinned : (hsep_word)-1;
     if (self->trusted ? compensator_advance(self, due) : compensator_step(self, due)) {
         self->solving = 0;
         self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
@@ -157,11 +157,12 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     compensator_target(self, state);
-    const double *spline = state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
+    const hsep_real *spline =
+        state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
     const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance);
-    self->state = (uint64_t)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
+    self->state = (hsep_word)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
 
@@ -186,8 +187,8 @@ static void compensator_plan_trusted(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_trusted_task task = compensator_task(self);
-    const int warm = (double)predictor->k >= predictor->n_init;
-    const uint64_t best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
+    const int warm = (hsep_real)predictor->k >= predictor->n_init;
+    const hsep_word best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
     const hsep_trusted_before before = {
@@ -199,9 +200,9 @@ static void compensator_plan_trusted(hsep_compensator *self)
     self->solving = 1;
 }
 
-HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max)
+HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max)
 {
-    self->compensate_next = (uint64_t)compensate;
+    self->compensate_next = (hsep_word)compensate;
     self->change_max_next = change_max;
 }
 
@@ -234,7 +235,7 @@ static void compensator_next_window(hsep_compensator *self)
     hsep_compensator_begin(self);
 }
 
-HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas)
+HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     if (hsep_predictor_take_in(hsep_compensator_predictor(self), x_d_ahead, x_meas)) {
         compensator_next_window(self);
@@ -250,7 +251,7 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
 {
     const hsep_predictor *predictor = (const hsep_predictor *)hsep_at_const(self, self->predictor);
     const hsep_planner *planner = (const hsep_planner *)hsep_at_const(self, self->planner);
-    const uint64_t i = predictor->k % predictor->Np;
+    const hsep_word i = predictor->k % predictor->Np;
     const int follows = self->trusted && i < hsep_planner_pinned(planner);
     hsep_predictor_read(predictor, &outputs->predicted);
     if (self->trusted ? self->compensate != HSEP_SEP_HYBRID : self->state != HSEP_SEP_HYBRID) {

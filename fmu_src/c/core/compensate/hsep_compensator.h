@@ -29,7 +29,7 @@
 #include "hsep_predictor.h"
 #include "hsep_trusted_planner.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
@@ -38,31 +38,31 @@ typedef struct {
 } hsep_compensator_parameters;
 
 struct hsep_compensator {
-    uint64_t compensate;      /* hsep_sep_state, the best model allowed in the window, */
-    uint64_t compensate_next; /* and from the next one on */
-    double change_max_next;   /* m, of the command, likewise */
-    uint64_t state;           /* hsep_sep_state of the window, */
-    uint64_t before;          /* and of the window before, whose plan the first samples follow with trust */
-    uint64_t solving;         /* whether its plan is being solved */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t x_dm;      /* (Np,) m, the window: modified commands */
-    uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
-    uint64_t trial_e;   /* (preview + p,) m, its residuals */
-    uint64_t target;    /* (preview,) m */
-    uint64_t spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
-    uint64_t trial;     /* the physics model of a trial */
-    uint64_t planner, predictor;
-    uint64_t trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
+    hsep_word compensate;      /* hsep_sep_state, the best model allowed in the window, */
+    hsep_word compensate_next; /* and from the next one on */
+    hsep_real change_max_next; /* m, of the command, likewise */
+    hsep_word state;           /* hsep_sep_state of the window, */
+    hsep_word before;          /* and of the window before, whose plan the first samples follow with trust */
+    hsep_word solving;         /* whether its plan is being solved */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word x_dm;      /* (Np,) m, the window: modified commands */
+    hsep_word trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
+    hsep_word trial_e;   /* (preview + p,) m, its residuals */
+    hsep_word target;    /* (preview,) m */
+    hsep_word spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
+    hsep_word trial;     /* the physics model of a trial */
+    hsep_word planner, predictor;
+    hsep_word trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
 };
 
 HSEP_ASSERT_WORDS(hsep_compensator, 15);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
 HSEP_API void hsep_compensator_block_init(
-    hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
+    hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start);
 
 /* The predictor, for a warm start between hsep_compensator_block_init and hsep_compensator_begin. */
 HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
@@ -77,6 +77,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
 /* Whether a block, in any alignment and of hsep_compensator_block_size(parameters) bytes, is a valid state for these
  * parameters at sample k: its layout is that of hsep_compensator_block_init, and every index lies within it. */
-HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
+HSEP_API int hsep_compensator_block_valid(
+    const void *block, const hsep_compensator_parameters *parameters, hsep_word k);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "hsep_range.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -23,16 +23,16 @@ HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self)
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
+static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double preview = (double)predictor->preview;
+    const hsep_real preview = (hsep_real)predictor->preview;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
-    double end = HSEP_WORDS(hsep_compensator);
-    self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
-    self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
-    self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
+    hsep_real end = HSEP_WORDS(hsep_compensator);
+    self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
+    self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
+    self->trial_e = hsep_take(&end, preview + (hsep_real)predictor->settings.p);
     self->target = hsep_take(&end, preview);
     self->spline_pb = hsep_take(&end, preview);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
@@ -40,16 +40,16 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
     self->trusted =
         predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&trusted, &parameters->planner)) : 0;
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_compensator_block_size(const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters)
 {
     return compensator_lay_out(&(hsep_compensator){0}, parameters);
 }
 
 HSEP_API void hsep_compensator_block_init(
-    hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
+    hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     memset(self, 0, (size_t)hsep_compensator_block_size(parameters));
@@ -61,22 +61,22 @@ HSEP_API void hsep_compensator_block_init(
         const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
         hsep_trusted_planner_init(hsep_compensator_trusted(self), &trusted, &parameters->planner, start);
     }
-    self->compensate = self->compensate_next = (uint64_t)parameters->compensate;
+    self->compensate = self->compensate_next = (hsep_word)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    double *spline = hsep_at(self, self->spline_pb);
+    hsep_real *spline = hsep_at(self, self->spline_pb);
     hsep_physics_init(
         trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
         (hsep_hold)predictor->settings.input_hold);
     memcpy(
         spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
-        (size_t)(4 * parameters->planner.spacing) * sizeof(double));
+        (size_t)(4 * parameters->planner.spacing) * sizeof(hsep_real));
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
 }
 
-HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
+HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_word k)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);

@@ -6,19 +6,19 @@
 #include "hsep_api.h"
 #include "hsep_plan.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
-HSEP_API void hsep_constraints_total(hsep_planner *self, const double x_d[]);
+HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[]);
 
 /* Bounds of a row, in shares. The remainder of the last plan is always feasible, with a small margin: an
  * interior-point method needs an interior. */
-HSEP_API void hsep_constraints_range(const hsep_planner *self, uint64_t r, double *least, double *most);
+HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep_real *least, hsep_real *most);
 
 /* Largest feasible step length, 0 ... 1, from the remainder, whose rows are in total, by a step with rows way. */
-HSEP_API double hsep_constraints_share(const hsep_planner *self, const double way[]);
+HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real way[]);
 
 /* Whether the remainder and a step with rows way are feasible. */
-HSEP_API int hsep_constraints_allow(const hsep_planner *self, const double way[]);
+HSEP_API int hsep_constraints_allow(const hsep_planner *self, const hsep_real way[]);
 
 #endif

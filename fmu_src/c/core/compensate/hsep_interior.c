@@ -4,33 +4,33 @@
 #include "hsep_slacks.h"
 #include "hsep_vector.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
-static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
+static const hsep_real interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
 
 /* The arrays behind the struct. */
 typedef struct {
-    uint64_t n;       /* entries of x */
-    double *x, *v;    /* (n,) iterate and linear term */
-    double *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
-    double *factor;   /* triangle of n rows */
+    hsep_word n;         /* entries of x */
+    hsep_real *x, *v;    /* (n,) iterate and linear term */
+    hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
+    hsep_real *factor;   /* triangle of n rows */
     hsep_slacks slacks;
 } interior_arrays;
 
-/* Take count doubles of a block; NULL if there is no block but only its size is asked for. */
-static double *interior_take(double *block, double *end, double count)
+/* Take count numbers of a block; NULL if there is no block but only its size is asked for. */
+static hsep_real *interior_take(hsep_real *block, hsep_real *end, hsep_real count)
 {
-    const uint64_t offset = hsep_take(end, count);
+    const hsep_word offset = hsep_take(end, count);
     return block != NULL ? block + offset : NULL;
 }
 
 /* Walk the arrays of n splines; return the bytes of the block. */
-static double interior_lay_out(double *block, uint64_t preview, uint64_t n, interior_arrays *a)
+static hsep_real interior_lay_out(hsep_real *block, hsep_word preview, hsep_word n, interior_arrays *a)
 {
-    const double columns = (double)n, rows = HSEP_ORDERS * (double)preview;
-    double end = HSEP_WORDS(hsep_interior);
+    const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview;
+    hsep_real end = HSEP_WORDS(hsep_interior);
     a->x = interior_take(block, &end, columns);
     a->v = interior_take(block, &end, columns);
     a->r_d = interior_take(block, &end, columns);
@@ -48,16 +48,16 @@ static double interior_lay_out(double *block, uint64_t preview, uint64_t n, inte
         side->r_p = interior_take(block, &end, rows);
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n)
+HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n)
 {
     interior_arrays arrays;
     return interior_lay_out(NULL, preview, n, &arrays);
 }
 
-HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max)
+HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max)
 {
     hsep_interior got;
     memcpy(&got, block, sizeof got);
@@ -67,12 +67,12 @@ HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max)
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
 {
     interior_arrays a;
-    (void)interior_lay_out((double *)self, splines->preview, splines->n, &a);
+    (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
     a.n = splines->n - self->first;
     a.slacks.rho = self->rho;
     a.slacks.sides = self->sides;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        uint64_t begin, end;
+        hsep_word begin, end;
         hsep_splines_touched(splines, self->first, order, &begin, &end);
         a.slacks.range[order].begin = begin + order * splines->preview;
         a.slacks.range[order].end = end + order * splines->preview;
@@ -87,25 +87,25 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
 }
 
 /* The rows of P, a triangle, from the first free spline. */
-static const double *interior_free_rows(const hsep_interior *self, const hsep_splines *splines, const double P[])
+static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
 
 /* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, its rounding
  * would outgrow P. */
-static double interior_proximal(const hsep_splines *splines, const double *P, uint64_t n)
+static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_word n)
 {
-    double largest = 0.0;
-    for (uint64_t i = 0; i < n; i++) {
-        largest = fmax(largest, P[0]);
+    hsep_real largest = 0.0;
+    for (hsep_word i = 0; i < n; i++) {
+        largest = hsep_fmax(largest, P[0]);
         P += n - i;
     }
     return interior_regularisation * hsep_splines_energy(splines) / largest;
 }
 
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
     const hsep_tolerance *tolerance)
 {
     self->tolerance = *tolerance;
@@ -116,18 +116,18 @@ HSEP_API void hsep_interior_begin(
     a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
     hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        self->sides += 2.0 * (double)(a.slacks.range[order].end - a.slacks.range[order].begin);
+        self->sides += 2.0 * (hsep_real)(a.slacks.range[order].end - a.slacks.range[order].begin);
     }
     self->cost = cost / self->sides;
     hsep_slacks_begin(&a.slacks, self->cost);
 }
 
 /* r_d := v - P x, P being the triangle of the splines first ... n - 1. */
-static void interior_gradient(const interior_arrays *a, const double *P)
+static void interior_gradient(const interior_arrays *a, const hsep_real *P)
 {
-    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(double));
-    for (uint64_t i = 0; i < a->n; i++) {
-        const uint64_t left = a->n - i - 1;
+    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
+    for (hsep_word i = 0; i < a->n; i++) {
+        const hsep_word left = a->n - i - 1;
         a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
         hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
         P += a->n - i;
@@ -136,56 +136,57 @@ static void interior_gradient(const interior_arrays *a, const double *P)
 
 /* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its
  * terms. */
-static double interior_dual_residual(
-    const interior_arrays *a, const hsep_splines *splines, uint64_t first, const double *P)
+static hsep_real interior_dual_residual(
+    const interior_arrays *a, const hsep_splines *splines, hsep_word first, const hsep_real *P)
 {
-    double residual = 0.0, largest = 0.0;
+    hsep_real residual = 0.0, largest = 0.0;
     interior_gradient(a, P);
-    memset(a->dx, 0, (size_t)a->n * sizeof(double));
+    memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
     hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
-    for (uint64_t j = 0; j < a->n; j++) {
-        largest = fmax(fmax(largest, fabs(a->v[j])), fmax(fabs(a->v[j] - a->r_d[j]), fabs(a->dx[j])));
+    for (hsep_word j = 0; j < a->n; j++) {
+        largest = hsep_fmax(
+            hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
         a->r_d[j] += a->dx[j];
-        residual = fmax(residual, fabs(a->r_d[j]));
+        residual = hsep_fmax(residual, hsep_fabs(a->r_d[j]));
     }
     return residual / largest;
 }
 
 /* dx := (P + A' W A)^-1 (r_d + A' push), and what it does to the rows. */
-static void interior_direction(const interior_arrays *a, const hsep_splines *splines, uint64_t first)
+static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_word first)
 {
     hsep_slacks_push(&a->slacks);
-    memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(double));
+    memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
     hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
     hsep_splines_rows(splines, a->dx, first, a->slacks.Adx);
 }
 
-HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    double r_p;
+    hsep_real r_p;
     P = interior_free_rows(self, splines, P);
     hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
-    const double mu = hsep_slacks_residuals(&a.slacks, &r_p);
-    const double r_d = interior_dual_residual(&a, splines, self->first, P);
+    const hsep_real mu = hsep_slacks_residuals(&a.slacks, &r_p);
+    const hsep_real r_d = interior_dual_residual(&a, splines, self->first, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
         (mu < self->tolerance.mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < self->tolerance.dual_residual)) {
         return 1;
     }
     self->steps++;
-    memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(double));
+    memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(hsep_real));
     hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor, a.slacks.work);
     if (!hsep_cholesky_factor(a.factor, a.n, NULL)) {
         return 1;
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    const double ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
-    hsep_slacks_correct(&a.slacks, fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
+    const hsep_real ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
+    hsep_slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
     interior_direction(&a, splines, self->first);
-    const double alpha = hsep_slacks_move(&a.slacks);
-    for (uint64_t j = 0; j < a.n; j++) {
+    const hsep_real alpha = hsep_slacks_move(&a.slacks);
+    for (hsep_word j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];
     }
     return 0;

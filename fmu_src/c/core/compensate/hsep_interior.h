@@ -2,7 +2,7 @@
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
  * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
- * them. Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ * them. Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H
@@ -10,55 +10,55 @@
 #include "hsep_api.h"
 #include "hsep_splines.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 
 /* Where the solver ends. */
 typedef struct {
-    double mu;            /* complementarity mu at the end, as a share of the cost per bound */
-    double dual_residual; /* dual residual at the end, as a share of its largest term */
-    uint64_t steps;       /* at most */
+    hsep_real mu;            /* complementarity mu at the end, as a share of the cost per bound */
+    hsep_real dual_residual; /* dual residual at the end, as a share of its largest term */
+    hsep_word steps;         /* at most */
 } hsep_tolerance;
 
 #define HSEP_INTERIOR_STEPS 24 /* the most of any tolerance */
 
 typedef struct {
     hsep_tolerance tolerance;
-    uint64_t first; /* the splines before it are fixed; x is (n - first,) */
-    uint64_t steps; /* done for this plan */
-    double cost;    /* m2, scale of the cost per bound */
-    double sides;   /* number of bounds, low and high ones */
-    double rho;     /* 1/m2, proximal regularisation of the multipliers */
+    hsep_word first; /* the splines before it are fixed; x is (n - first,) */
+    hsep_word steps; /* done for this plan */
+    hsep_real cost;  /* m2, scale of the cost per bound */
+    hsep_real sides; /* number of bounds, low and high ones */
+    hsep_real rho;   /* 1/m2, proximal regularisation of the multipliers */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
 HSEP_ASSERT_WORDS(hsep_interior, 8);
 
-HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
+HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n); /* bytes of the block, counted as a number */
 
 /* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
 typedef struct {
-    double *v;          /* (n,) m */
-    double *x;          /* (n,) m, start and result */
-    double *low, *high; /* (4 preview,), in shares */
+    hsep_real *v;          /* (n,) m */
+    hsep_real *x;          /* (n,) m, start and result */
+    hsep_real *low, *high; /* (4 preview,), in shares */
 } hsep_problem;
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
 /* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of fixed
  * splines. */
-HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max);
+HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max);
 
 /* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
  * tolerance. */
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
 /* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
  * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
  * plan beside it. */
-HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif

@@ -3,25 +3,25 @@
 #include "hsep_cholesky.h"
 #include "hsep_constraints.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
-static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
+static const hsep_real planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
+static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
 {
-    const double preview = (double)parameters->preview;
-    const uint64_t n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
-    double end = HSEP_WORDS(hsep_planner);
+    const hsep_real preview = (hsep_real)parameters->preview;
+    const hsep_word n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
+    hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
     self->n_pinned = (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
-    self->c = hsep_take(&end, HSEP_DECIDED + (double)n);
+    self->c = hsep_take(&end, HSEP_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
     self->moves = hsep_take(&end, preview);
     self->third = hsep_take(&end, preview);
@@ -29,15 +29,15 @@ static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters 
     self->factor = hsep_take(&end, hsep_triangle(n));
     self->splines = hsep_take_block(&end, hsep_splines_size(parameters->preview, parameters->spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
+HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters)
 {
     return planner_lay_out(&(hsep_planner){0}, parameters);
 }
 
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start)
 {
     memset(self, 0, (size_t)hsep_planner_size(parameters));
     (void)planner_lay_out(self, parameters);
@@ -58,17 +58,17 @@ HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters
            hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
 }
 
-HSEP_API void hsep_planner_limit_change(hsep_planner *self, double change_max)
+HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max)
 {
     hsep_splines_limit((hsep_splines *)hsep_at(self, self->splines), 0, change_max);
 }
 
-HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
+HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self)
 {
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
+HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k)
 {
     return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
 }
@@ -76,28 +76,28 @@ HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 /* The third differences of what is decided of delta. */
 static void planner_third(hsep_planner *self)
 {
-    double *third = hsep_at(self, self->third);
-    const uint64_t preview = hsep_planner_splines(self)->preview;
-    double d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
-    for (uint64_t k = 0; k < preview; k++) {
+    hsep_real *third = hsep_at(self, self->third);
+    const hsep_word preview = hsep_planner_splines(self)->preview;
+    hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
+    for (hsep_word k = 0; k < preview; k++) {
         d[3] = hsep_planner_decided(self, k);
         third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
         d[0] = d[1], d[1] = d[2], d[2] = d[3];
     }
 }
 
-HSEP_API double *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
+HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
 
-HSEP_API const double *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
+HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
 
-HSEP_API double *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
 
-HSEP_API double *hsep_planner_linear(hsep_planner *self)
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 {
     return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self)).v;
 }
 
-HSEP_API void hsep_planner_open(hsep_planner *self, const double x_d[])
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     planner_third(self);
     hsep_constraints_total(self, x_d);
@@ -105,30 +105,30 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const double x_d[])
 
 HSEP_API void hsep_planner_let_turn(hsep_planner *self)
 {
-    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(double));
+    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_planner_regularise(hsep_planner *self)
 {
-    const uint64_t n = hsep_planner_splines(self)->n;
-    double *P = hsep_at(self, self->P);
-    double largest = 0.0;
-    uint64_t place = 0;
-    for (uint64_t i = 0; i < n; i++) {
-        largest = fmax(largest, P[place]);
+    const hsep_word n = hsep_planner_splines(self)->n;
+    hsep_real *P = hsep_at(self, self->P);
+    hsep_real largest = 0.0;
+    hsep_word place = 0;
+    for (hsep_word i = 0; i < n; i++) {
+        largest = hsep_fmax(largest, P[place]);
         place += n - i;
     }
     place = 0;
-    for (uint64_t i = 0; i < n; i++) {
+    for (hsep_word i = 0; i < n; i++) {
         P[place] += planner_ridge * largest;
         place += n - i;
     }
 }
 
-HSEP_API void hsep_planner_aim(hsep_planner *self, const double filtered[], const double target[])
+HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    double *P = hsep_at(self, self->P);
+    hsep_real *P = hsep_at(self, self->P);
     hsep_splines_filtered_gram(splines, filtered, P);
     hsep_splines_difference_gram(splines, 3, self->jerk_weight, P);
     hsep_planner_regularise(self);
@@ -137,7 +137,7 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const double filtered[], cons
 }
 
 /* The rows of P from a spline on. */
-static double *planner_rows(hsep_planner *self, uint64_t first)
+static hsep_real *planner_rows(hsep_planner *self, hsep_word first)
 {
     return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
 }
@@ -145,63 +145,63 @@ static double *planner_rows(hsep_planner *self, uint64_t first)
 /* v := v_2 - P_21 pinned: the linear term of the splines that are not pinned. */
 static void planner_pin(hsep_planner *self)
 {
-    const uint64_t n = hsep_planner_splines(self)->n, first = self->n_pinned;
-    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
-    double *v = hsep_planner_linear(self);
-    for (uint64_t i = 0; i < first; i++) {
-        for (uint64_t j = first; j < n; j++) {
+    const hsep_word n = hsep_planner_splines(self)->n, first = self->n_pinned;
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
+    hsep_real *v = hsep_planner_linear(self);
+    for (hsep_word i = 0; i < first; i++) {
+        for (hsep_word j = first; j < n; j++) {
             v[j] -= P[j - i] * rest[i];
         }
         P += n - i;
     }
-    for (uint64_t j = first; j < n; j++) {
+    for (hsep_word j = first; j < n; j++) {
         v[j - first] = v[j];
     }
 }
 
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
-static void planner_bound(hsep_planner *self, double cost, const hsep_tolerance *tolerance)
+static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
-    const uint64_t first = self->n_pinned, preview = splines->preview;
-    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *total = hsep_at(self, self->total);
+    const hsep_word first = self->n_pinned, preview = splines->preview;
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *total = hsep_at(self, self->total);
     const hsep_problem problem = hsep_interior_problem(interior, splines);
-    double *low = problem.low, *high = problem.high;
+    hsep_real *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
-    for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
-        const double other = total[r] - low[r];
-        double least, most;
+    for (hsep_word r = 0; r < HSEP_ORDERS * preview; r++) {
+        const hsep_real other = total[r] - low[r];
+        hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);
         low[r] = least - other + HSEP_INTERIOR_PRIMAL;
         high[r] = most - other - HSEP_INTERIOR_PRIMAL;
     }
-    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(double));
+    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(hsep_real));
     hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost, tolerance);
 }
 
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const uint64_t first = pinned ? self->n_pinned : 0, n = splines->n - first;
-    double *rest = hsep_at(self, self->c) + HSEP_DECIDED + first, *factor = hsep_at(self, self->factor);
-    const double *row = planner_rows(self, first);
+    const hsep_word first = pinned ? self->n_pinned : 0, n = splines->n - first;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + first, *factor = hsep_at(self, self->factor);
+    const hsep_real *row = planner_rows(self, first);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
-    double *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
+    hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
 
     if (pinned) {
         planner_pin(self);
     }
-    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(double));
+    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
     if (!hsep_cholesky_factor(factor, n, NULL)) {
         return HSEP_PLAN_FAILED;
     }
-    memcpy(free_minimum, v, (size_t)n * sizeof(double));
+    memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
-    double cost = 0.0, finite = 0.0;
-    for (uint64_t j = 0; j < n; j++) {
+    hsep_real cost = 0.0, finite = 0.0;
+    for (hsep_word j = 0; j < n; j++) {
         cost += v[j] * free_minimum[j];
-        finite += fabs(free_minimum[j]);
+        finite += hsep_fabs(free_minimum[j]);
         free_minimum[j] -= rest[j]; /* the way there */
     }
     if (!isfinite(finite)) {
@@ -209,14 +209,14 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     }
     hsep_splines_rows(splines, free_minimum, first, rows);
     if (hsep_constraints_allow(self, rows)) {
-        for (uint64_t j = 0; j < n; j++) {
+        for (hsep_word j = 0; j < n; j++) {
             rest[j] += free_minimum[j];
         }
         return HSEP_PLAN_DONE;
     }
-    for (uint64_t i = 0; i < n; i++) { /* cost += rest' P rest */
-        double sum = 0.5 * row[0] * rest[i];
-        for (uint64_t j = 1; j < n - i; j++) {
+    for (hsep_word i = 0; i < n; i++) { /* cost += rest' P rest */
+        hsep_real sum = 0.5 * row[0] * rest[i];
+        for (hsep_word j = 1; j < n - i; j++) {
             sum += row[j] * rest[i + j];
         }
         cost += 2.0 * rest[i] * sum;
@@ -229,7 +229,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     return HSEP_PLAN_BOUNDED;
 }
 
-HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self)
+HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self)
 {
     return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
 }
@@ -242,29 +242,29 @@ HSEP_API int hsep_planner_step(hsep_planner *self)
         return 0;
     }
     const hsep_problem problem = hsep_interior_problem(interior, splines);
-    double *way = problem.x, *rows = problem.low;
-    double *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
-    const uint64_t n = splines->n - self->n_pinned;
-    double finite = 0.0;
-    for (uint64_t j = 0; j < n; j++) {
+    hsep_real *way = problem.x, *rows = problem.low;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
+    const hsep_word n = splines->n - self->n_pinned;
+    hsep_real finite = 0.0;
+    for (hsep_word j = 0; j < n; j++) {
         way[j] -= rest[j];
-        finite += fabs(way[j]);
+        finite += hsep_fabs(way[j]);
     }
     if (isfinite(finite)) {
         hsep_splines_rows(splines, way, self->n_pinned, rows);
-        const double share = hsep_constraints_share(self, rows);
-        for (uint64_t j = 0; j < n; j++) {
+        const hsep_real share = hsep_constraints_share(self, rows);
+        for (hsep_word j = 0; j < n; j++) {
             rest[j] += share * way[j];
         }
     }
     return 1;
 }
 
-HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
+HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    double *c = hsep_at(self, self->c);
-    for (uint64_t k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
+    hsep_real *c = hsep_at(self, self->c);
+    for (hsep_word k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
         for (int i = 0; i < 2; i++) {
             self->delta_before[i] = self->delta_before[i + 1];
             self->x_d_before[i] = self->x_d_before[i + 1];
@@ -272,8 +272,8 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
         self->delta_before[2] = hsep_planner_delta(self, k);
         self->x_d_before[2] = x_d[k];
     }
-    const uint64_t kept = self->Np / splines->spacing, n = HSEP_DECIDED + splines->n;
-    for (uint64_t i = 0; i < n; i++) {
+    const hsep_word kept = self->Np / splines->spacing, n = HSEP_DECIDED + splines->n;
+    for (hsep_word i = 0; i < n; i++) {
         c[i] = i + kept < n ? c[i + kept] : 0.0;
     }
 }

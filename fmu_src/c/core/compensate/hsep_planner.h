@@ -6,7 +6,7 @@
  * the next plan starts from the remainder, which returns to x_d within the limits. A plan whose unconstrained minimum
  * is feasible is found at once; another one is solved in steps of equal cost.
  *
- * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
@@ -16,7 +16,7 @@
 #include "hsep_plan.h"
 #include "hsep_splines.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
  * takes more work. */
@@ -24,13 +24,13 @@
 #define HSEP_PINNED_WITH_TRUST 20
 
 typedef struct {
-    uint64_t Np;               /* samples of a window */
-    uint64_t preview;          /* samples of a plan, at least Np + 4 spacing + 3 */
-    uint64_t spacing;          /* samples between knots, a divisor of Np */
-    double jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
-    double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
-    int no_reversal;           /* whether x_dm keeps the direction of x_d */
-    uint64_t pinned;           /* samples that follow the last plan: one of those above, or less if half of Np is */
+    hsep_word Np;                 /* samples of a window */
+    hsep_word preview;            /* samples of a plan, at least Np + 4 spacing + 3 */
+    hsep_word spacing;            /* samples between knots, a divisor of Np */
+    hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
+    hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
+    int no_reversal;              /* whether x_dm keeps the direction of x_d */
+    hsep_word pinned;             /* samples that follow the last plan: one of those above, or less if half of Np is */
 } hsep_planner_parameters;
 
 typedef enum {
@@ -39,26 +39,26 @@ typedef enum {
     HSEP_PLAN_BOUNDED /* hsep_planner_step is to be called until it returns 1 */
 } hsep_plan_status;
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start);
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
 /* Another largest |delta| from the next plan on, m; where the rest of the last plan is larger, that bounds it. */
-HSEP_API void hsep_planner_limit_change(hsep_planner *self, double change_max);
+HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);
 
 /* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
-HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
+HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self);
 
 /* The part of delta at sample k that is decided before a plan is made, m. */
-HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k);
+HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k);
 
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
-HSEP_API void hsep_planner_open(hsep_planner *self, const double x_d[]);
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 
 /* Let plans of this window turn where no_reversal forbids it: their model follows the friction. */
 HSEP_API void hsep_planner_let_turn(hsep_planner *self);
@@ -66,17 +66,17 @@ HSEP_API void hsep_planner_let_turn(hsep_planner *self);
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
  * (preview,); target: x_d minus the model's response to x_d with what is decided of delta, m, (preview,). Cost:
  * n preview multiply-adds. */
-HSEP_API void hsep_planner_aim(hsep_planner *self, const double filtered[], const double target[]);
+HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* The cost 1/2 c' P c - v' c to be set otherwise: the triangle P of n rows, and v, (n,), m; hsep_planner_regularise
  * makes P definite. The third differences of what is decided, (preview,), m. */
-HSEP_API double *hsep_planner_quadratic(hsep_planner *self);
-HSEP_API double *hsep_planner_linear(hsep_planner *self);
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self);
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_regularise(hsep_planner *self);
-HSEP_API const double *hsep_planner_third(const hsep_planner *self);
+HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 
 /* Coefficients of the plan, (3 + n,), m; before one is made those of the rest of the last one. */
-HSEP_API double *hsep_planner_coefficients(hsep_planner *self);
+HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
 
 /* Plan at this cost, which is used up. pinned: whether the first samples, hsep_planner_pinned, stay as they are in any
  * case; else in a bounded plan only, which is solved within the tolerance. Cost: n^3 / 6 multiply-adds. */
@@ -86,9 +86,9 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
 HSEP_API int hsep_planner_step(hsep_planner *self);
 
 /* Steps that the last bounded plan took. */
-HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self);
+HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
-HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[]);
+HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
 
 #endif

@@ -2,26 +2,26 @@
 
 #include "hsep_vector.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <string.h>
 
-static const double slacks_least = 0.3;     /* smallest initial slack, in shares */
-static const double slacks_first_mu = 10.0; /* initial mu, as a share of the cost per bound */
-static const double slacks_tau = 0.995;     /* fraction of the step to the nearest bound */
+static const hsep_real slacks_least = 0.3;     /* smallest initial slack, in shares */
+static const hsep_real slacks_first_mu = 10.0; /* initial mu, as a share of the cost per bound */
+static const hsep_real slacks_tau = 0.995;     /* fraction of the step to the nearest bound */
 
 /* Of the sides: B = A, B = -A. */
-static const double slacks_sign[2] = {1.0, -1.0};
+static const hsep_real slacks_sign[2] = {1.0, -1.0};
 
 /* B x - b of a row: A x - low, or high - A x. */
-static inline double slacks_distance(int i, double Ax, double b) { return i == 0 ? Ax - b : b - Ax; }
+static inline hsep_real slacks_distance(int i, hsep_real Ax, hsep_real b) { return i == 0 ? Ax - b : b - Ax; }
 
-HSEP_API void hsep_slacks_begin(const hsep_slacks *self, double cost)
+HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost)
 {
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = self->range[order].begin; r < self->range[order].end; r++) {
+        for (hsep_word r = self->range[order].begin; r < self->range[order].end; r++) {
             for (int i = 0; i < 2; i++) {
                 const hsep_side *side = &self->side[i];
-                side->s[r] = fmax(slacks_distance(i, self->Ax[r], side->b[r]), slacks_least);
+                side->s[r] = hsep_fmax(slacks_distance(i, self->Ax[r], side->b[r]), slacks_least);
                 side->z[r] = slacks_first_mu * cost / side->s[r];
                 side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
             }
@@ -32,19 +32,19 @@ HSEP_API void hsep_slacks_begin(const hsep_slacks *self, double cost)
 /* Values of four rows, which are added to and compared with those of the next four, and one of the rows left over. */
 typedef struct {
     hsep_lanes of_four[HSEP_OF_FOUR];
-    double left;
+    hsep_real left;
 } slacks_values;
 
-static double slacks_sum(const slacks_values *values)
+static hsep_real slacks_sum(const slacks_values *values)
 {
-    double s[4];
+    hsep_real s[4];
     memcpy(s, values->of_four, sizeof s);
     return ((s[0] + s[1]) + (s[2] + s[3])) + values->left;
 }
 
-static double slacks_largest(const slacks_values *values)
+static hsep_real slacks_largest(const slacks_values *values)
 {
-    double s[4], largest = values->left;
+    hsep_real s[4], largest = values->left;
     memcpy(s, values->of_four, sizeof s);
     for (int i = 0; i < 4; i++) {
         largest = s[i] > largest ? s[i] : largest;
@@ -54,7 +54,7 @@ static double slacks_largest(const slacks_values *values)
 
 /* ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z), of the rows of a vector and of one. */
 static inline void slacks_steps(
-    const hsep_slacks *self, int i, uint64_t r, hsep_lanes *restrict ds, hsep_lanes *restrict dz)
+    const hsep_slacks *self, int i, hsep_word r, hsep_lanes *restrict ds, hsep_lanes *restrict dz)
 {
     const hsep_side *side = &self->side[i];
     const hsep_lanes to = slacks_sign[i] * *hsep_lanes_const(self->Adx + r) + *hsep_lanes_const(side->r_p + r);
@@ -62,10 +62,10 @@ static inline void slacks_steps(
     *ds = to + self->rho * *dz;
 }
 
-static inline void slacks_step(const hsep_slacks *self, int i, uint64_t r, double *ds, double *dz)
+static inline void slacks_step(const hsep_slacks *self, int i, hsep_word r, hsep_real *ds, hsep_real *dz)
 {
     const hsep_side *side = &self->side[i];
-    const double to = slacks_sign[i] * self->Adx[r] + side->r_p[r];
+    const hsep_real to = slacks_sign[i] * self->Adx[r] + side->r_p[r];
     *dz = side->r_c[r] - side->z[r] * side->inverse[r] * to;
     *ds = to + self->rho * *dz;
 }
@@ -74,7 +74,7 @@ HSEP_API void hsep_slacks_push(const hsep_slacks *self)
 {
     const hsep_side *low = &self->side[0], *high = &self->side[1];
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        uint64_t r = self->range[order].begin;
+        hsep_word r = self->range[order].begin;
         for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
             *hsep_lanes_at(self->work + r) =
                 (*hsep_lanes_const(low->r_c + r) - *hsep_lanes_const(low->z + r) * *hsep_lanes_const(low->inverse + r) *
@@ -99,10 +99,10 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            uint64_t r = self->range[order].begin;
+            hsep_word r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
                     hsep_lanes ds, dz;
                     slacks_steps(self, i, at, &ds, &dz);
                     primal.of_four[l] = hsep_lanes_larger(-ds / *hsep_lanes_const(side->s + at), primal.of_four[l]);
@@ -110,18 +110,18 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
                 }
             }
             for (; r < self->range[order].end; r++) {
-                double ds, dz;
+                hsep_real ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 primal.left = -ds / side->s[r] > primal.left ? -ds / side->s[r] : primal.left;
                 dual.left = -dz / side->z[r] > dual.left ? -dz / side->z[r] : dual.left;
             }
         }
     }
-    const double of_s = slacks_largest(&primal), of_z = slacks_largest(&dual);
+    const hsep_real of_s = slacks_largest(&primal), of_z = slacks_largest(&dual);
     return (hsep_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
-HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal)
+HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal)
 {
     slacks_values sum, largest;
     memset(&sum, 0, sizeof sum);
@@ -129,10 +129,10 @@ HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            uint64_t r = self->range[order].begin;
+            hsep_word r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
                     const hsep_lanes s = *hsep_lanes_const(side->s + at), z = *hsep_lanes_const(side->z + at);
                     const hsep_lanes inverse = *hsep_lanes_const(side->inverse + at), product = s * z;
                     const hsep_lanes distance =
@@ -152,10 +152,10 @@ HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal)
                 }
             }
             for (; r < self->range[order].end; r++) {
-                const double s = side->s[r], z = side->z[r], weight = z * side->inverse[r];
-                const double r_p = slacks_sign[i] * (self->Ax[r] - side->b[r]) - s;
+                const hsep_real s = side->s[r], z = side->z[r], weight = z * side->inverse[r];
+                const hsep_real r_p = slacks_sign[i] * (self->Ax[r] - side->b[r]) - s;
                 sum.left += s * z;
-                largest.left = fabs(r_p) > largest.left ? fabs(r_p) : largest.left;
+                largest.left = hsep_fabs(r_p) > largest.left ? hsep_fabs(r_p) : largest.left;
                 side->r_p[r] = r_p;
                 side->r_c[r] = -(s * z) * side->inverse[r];
                 self->Adx[r] = i == 0 ? weight : self->Adx[r] + weight;
@@ -167,7 +167,7 @@ HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal)
     return slacks_sum(&sum) / self->sides;
 }
 
-HSEP_API double hsep_slacks_predicted(const hsep_slacks *self)
+HSEP_API hsep_real hsep_slacks_predicted(const hsep_slacks *self)
 {
     const hsep_lengths alpha = slacks_lengths(self);
     slacks_values sum;
@@ -175,10 +175,10 @@ HSEP_API double hsep_slacks_predicted(const hsep_slacks *self)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            uint64_t r = self->range[order].begin;
+            hsep_word r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const uint64_t at = r + (uint64_t)(HSEP_LANES * l);
+                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
                     hsep_lanes ds, dz;
                     slacks_steps(self, i, at, &ds, &dz);
                     sum.of_four[l] += (*hsep_lanes_const(side->s + at) + alpha.primal * ds) *
@@ -186,7 +186,7 @@ HSEP_API double hsep_slacks_predicted(const hsep_slacks *self)
                 }
             }
             for (; r < self->range[order].end; r++) {
-                double ds, dz;
+                hsep_real ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 sum.left += (side->s[r] + alpha.primal * ds) * (side->z[r] + alpha.dual * dz);
             }
@@ -195,12 +195,12 @@ HSEP_API double hsep_slacks_predicted(const hsep_slacks *self)
     return slacks_sum(&sum) / self->sides;
 }
 
-HSEP_API void hsep_slacks_correct(const hsep_slacks *self, double sigma_mu)
+HSEP_API void hsep_slacks_correct(const hsep_slacks *self, hsep_real sigma_mu)
 {
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            uint64_t r = self->range[order].begin;
+            hsep_word r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
                 hsep_lanes ds, dz;
                 slacks_steps(self, i, r, &ds, &dz);
@@ -209,7 +209,7 @@ HSEP_API void hsep_slacks_correct(const hsep_slacks *self, double sigma_mu)
                     *hsep_lanes_const(side->inverse + r);
             }
             for (; r < self->range[order].end; r++) {
-                double ds, dz;
+                hsep_real ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 side->r_c[r] = (sigma_mu - side->s[r] * side->z[r] - ds * dz) * side->inverse[r];
             }
@@ -217,15 +217,15 @@ HSEP_API void hsep_slacks_correct(const hsep_slacks *self, double sigma_mu)
     }
 }
 
-HSEP_API double hsep_slacks_move(const hsep_slacks *self)
+HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self)
 {
     const hsep_lengths alpha = slacks_lengths(self);
-    const double primal = alpha.primal >= 1.0 ? 1.0 : slacks_tau * alpha.primal;
-    const double dual = alpha.dual >= 1.0 ? 1.0 : slacks_tau * alpha.dual;
+    const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : slacks_tau * alpha.primal;
+    const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : slacks_tau * alpha.dual;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            uint64_t r = self->range[order].begin;
+            hsep_word r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
                 hsep_lanes ds, dz;
                 slacks_steps(self, i, r, &ds, &dz);
@@ -236,7 +236,7 @@ HSEP_API double hsep_slacks_move(const hsep_slacks *self)
                 *hsep_lanes_at(side->inverse + r) = 1.0 / (s + self->rho * z);
             }
             for (; r < self->range[order].end; r++) {
-                double ds, dz;
+                hsep_real ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
                 side->s[r] += primal * ds;
                 side->z[r] += dual * dz;

@@ -10,50 +10,50 @@
 #include "hsep_api.h"
 #include "hsep_splines.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* One side of the bounds, all (4 preview,): slack s = B x - b and multiplier z, both > 0. */
 typedef struct {
-    double *b;       /* low or high */
-    double *s, *z;   /* shares; m2 */
-    double *inverse; /* 1 / (s + rho z) */
-    double *r_c;     /* complementarity that a step aims at, times inverse */
-    double *r_p;     /* primal residual B x - b - s */
+    hsep_real *b;       /* low or high */
+    hsep_real *s, *z;   /* shares; m2 */
+    hsep_real *inverse; /* 1 / (s + rho z) */
+    hsep_real *r_c;     /* complementarity that a step aims at, times inverse */
+    hsep_real *r_p;     /* primal residual B x - b - s */
 } hsep_side;
 
 typedef struct {
-    double rho;        /* 1/m2, proximal regularisation of the multipliers */
-    double sides;      /* number of bounds, low and high ones */
-    double *Ax, *Adx;  /* rows of the iterate and of its step */
-    double *work;      /* a row's value of both sides together */
-    hsep_side side[2]; /* low and high */
+    hsep_real rho;       /* 1/m2, proximal regularisation of the multipliers */
+    hsep_real sides;     /* number of bounds, low and high ones */
+    hsep_real *Ax, *Adx; /* rows of the iterate and of its step */
+    hsep_real *work;     /* a row's value of both sides together */
+    hsep_side side[2];   /* low and high */
     struct {
-        uint64_t begin, end;
+        hsep_word begin, end;
     } range[HSEP_ORDERS]; /* the rows of an order that x touches, begin ... end - 1 */
 } hsep_slacks;
 
 /* Lengths of a step, 0 ... 1. */
 typedef struct {
-    double primal, dual;
+    hsep_real primal, dual;
 } hsep_lengths;
 
 /* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. */
-HSEP_API void hsep_slacks_begin(const hsep_slacks *self, double cost);
+HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost);
 
 /* Return mu, the mean of s z; *primal: the largest primal residual. The weights of A' W A go to Adx, z's difference of
  * the sides to work, and the predictor's r_c is set, as if s z = 0 could be reached at once. */
-HSEP_API double hsep_slacks_residuals(const hsep_slacks *self, double *primal);
+HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal);
 
 /* work := B' sides of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
 HSEP_API void hsep_slacks_push(const hsep_slacks *self);
 
 /* mu after the predictor's step, as far as s and z stay >= 0. */
-HSEP_API double hsep_slacks_predicted(const hsep_slacks *self);
+HSEP_API hsep_real hsep_slacks_predicted(const hsep_slacks *self);
 
 /* The corrector's r_c: the centre sigma mu, with the curvature ds dz that the predictor shows. */
-HSEP_API void hsep_slacks_correct(const hsep_slacks *self, double sigma_mu);
+HSEP_API void hsep_slacks_correct(const hsep_slacks *self, hsep_real sigma_mu);
 
 /* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */
-HSEP_API double hsep_slacks_move(const hsep_slacks *self);
+HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self);
 
 #endif

@@ -3,49 +3,49 @@
 #include "hsep_cholesky.h"
 #include "hsep_vector.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
 /* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
  * that changes nearby. */
-static const double trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.01, 0.0};
+static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.01, 0.0};
 
 /* Penalty on the change of velocity: its first value, and how it follows success. */
-static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
+static const hsep_real trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
 
 /* Tolerance of a programme, which is judged by the model itself. */
 static const hsep_tolerance trusted_planner_tolerance = {1e-4, 1e-2, HSEP_TRUSTED_SOLVED};
 
 /* Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
  * rounding tells apart are equal. */
-static const double trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
+static const hsep_real trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
 
 /* Change of a plan, relative to the largest one, that is at its bound; share of a window in which a plan may be there
  * longer than the physics model's; and RMS error that it may leave then, relative to the largest change. */
-static const double trusted_planner_at_bound = 0.97, trusted_planner_bound_share = 0.2, trusted_planner_left = 0.3;
+static const hsep_real trusted_planner_at_bound = 0.97, trusted_planner_bound_share = 0.2, trusted_planner_left = 0.3;
 
 /* Whether a plan costs less than another; not if it is NaN. */
-static int trusted_planner_better(double cost, double other)
+static int trusted_planner_better(hsep_real cost, hsep_real other)
 {
     return cost < (1.0 - trusted_planner_least_gain) * other;
 }
 
-static void trusted_planner_copy(hsep_trusted_planner *self, double to[], const double from[])
+static void trusted_planner_copy(hsep_trusted_planner *self, hsep_real to[], const hsep_real from[])
 {
-    memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(double));
+    memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(hsep_real));
 }
 
 /* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
 static void trusted_planner_command(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t count)
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word count)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    double *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(double));
-    for (uint64_t k = 0; k < self->preview; k++) {
-        const uint64_t j = self->preview - 1 - k;
+    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    for (hsep_word k = 0; k < self->preview; k++) {
+        const hsep_word j = self->preview - 1 - k;
         command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
         hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
@@ -53,19 +53,19 @@ static void trusted_planner_command(
 
 /* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. varied: samples
  * whose variance is computed; 0: it is that under the rest of the last plan. */
-static double trusted_planner_predict(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t varied)
+static hsep_real trusted_planner_predict(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const uint64_t count = HSEP_DECIDED + self->n;
-    const double *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
-    double *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
+    const hsep_word count = HSEP_DECIDED + self->n;
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
+    hsep_real *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
     hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, varied);
-    for (uint64_t k = 0; k < self->preview; k++) {
-        const uint64_t j = self->preview - 1 - k;
-        const double e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    for (hsep_word k = 0; k < self->preview; k++) {
+        const hsep_word j = self->preview - 1 - k;
+        const hsep_real e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
         d[3] = hsep_splines_sum(splines, c, count, k);
-        const double third = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        const hsep_real third = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
         error += e * e;
         jerk += third * third;
         d[0] = d[1], d[1] = d[2], d[2] = d[3];
@@ -74,8 +74,8 @@ static double trusted_planner_predict(
 }
 
 /* The same of the commands of a plan. */
-static double trusted_planner_at(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t varied)
+static hsep_real trusted_planner_at(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
 {
     trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
     return trusted_planner_predict(self, task, c, varied);
@@ -84,7 +84,7 @@ static double trusted_planner_at(
 /* The physics model's plan is made: try a better one, if there may be one. */
 static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    double *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
+    hsep_real *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
     self->planned = 1;
     self->stage = self->follows ? HSEP_TRUSTED_REST : HSEP_TRUSTED_PREDICT;
     if (self->follows) {
@@ -98,10 +98,10 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
 /* Begin the physics model's plan; without one the rest of the last plan goes on. */
 static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const double *x_pb = hsep_at(self, self->x_pb);
-    double *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
+    const hsep_real *x_pb = hsep_at(self, self->x_pb);
+    hsep_real *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
     trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED);
-    for (uint64_t k = 0; k < self->preview; k++) {
+    for (hsep_word k = 0; k < self->preview; k++) {
         target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
     }
     hsep_planner_open(task->planner, task->x_d);
@@ -115,22 +115,23 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
 }
 
 HSEP_API void hsep_trusted_planner_begin(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best)
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, hsep_word best)
 {
-    const size_t late = (size_t)self->late * sizeof(double);
-    double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
+    const size_t late = (size_t)self->late * sizeof(hsep_real);
+    hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
     self->penalty = 0.0;
     trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(double));
+    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
     memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
-    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(double));
-    for (uint64_t k = 0; k < self->preview; k++) {
+    memcpy(
+        hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(hsep_real));
+    for (hsep_word k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
-    const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
+    const hsep_word pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->varied = self->late + (pinned > 0 ? pinned : 1);
     hsep_trusted_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
@@ -146,9 +147,9 @@ HSEP_API void hsep_trusted_planner_begin(
 /* Variances of some of the samples under the rest of the last plan. */
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const uint64_t all = self->preview + self->late, left = all - self->varied;
-    const uint64_t part = (all - 1) / HSEP_TRUSTED_VARIANCES + 1;
-    const uint64_t last = self->varied + (left < part ? left : part);
+    const hsep_word all = self->preview + self->late, left = all - self->varied;
+    const hsep_word part = (all - 1) / HSEP_TRUSTED_VARIANCES + 1;
+    const hsep_word last = self->varied + (left < part ? left : part);
     hsep_trusted_vary(task->model, self->varied, last);
     self->varied = last;
     self->stage = last < all ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
@@ -157,16 +158,16 @@ static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_
 /* Begin a Newton step: linearise at the best plan, which was predicted last. */
 static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_linearised_change change = {
         .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
-    double *target = hsep_at(self, self->target);
+    hsep_real *target = hsep_at(self, self->target);
     hsep_linearised_at(
         (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb, &change,
         trusted_planner_reaches[self->steps]);
-    for (uint64_t k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
-        const uint64_t j = self->preview - 1 - k;
+    for (hsep_word k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
+        const hsep_word j = self->preview - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
     }
     self->steps++;
@@ -176,7 +177,7 @@ static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_
 }
 
 /* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
-static double *trusted_planner_column_of(hsep_trusted_planner *self, uint64_t j, uint64_t spacing)
+static hsep_real *trusted_planner_column_of(hsep_trusted_planner *self, hsep_word j, hsep_word spacing)
 {
     return hsep_at(self, self->W) + (j * self->preview - spacing * (j * (j - 1) / 2));
 }
@@ -185,13 +186,13 @@ static double *trusted_planner_column_of(hsep_trusted_planner *self, uint64_t j,
 static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
-    const uint64_t n = self->n, spacing = splines->spacing;
-    const uint64_t all = n * self->preview - spacing * (n * (n - 1) / 2);
-    double *target = hsep_at(self, self->target);
-    for (uint64_t done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
-        const uint64_t j = self->columns++, first = j * spacing, length = self->preview - first;
-        double *column = trusted_planner_column_of(self, j, spacing);
+    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    const hsep_word n = self->n, spacing = splines->spacing;
+    const hsep_word all = n * self->preview - spacing * (n * (n - 1) / 2);
+    hsep_real *target = hsep_at(self, self->target);
+    for (hsep_word done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
+        const hsep_word j = self->columns++, first = j * spacing, length = self->preview - first;
+        hsep_real *column = trusted_planner_column_of(self, j, spacing);
         hsep_linearised_column((hsep_linearised *)hsep_at(self, self->linearised), task->model, first, column);
         hsep_axpy(target + first, at[j], column, length);
         done += length;
@@ -203,12 +204,12 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
 static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const uint64_t n = self->n, preview = self->preview, spacing = splines->spacing;
-    double *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
-    for (uint64_t i = 0; i < n; i++) {
-        const double *left = trusted_planner_column_of(self, i, spacing);
-        for (uint64_t j = i; j < n; j++) { /* column j begins (j - i) spacing later */
-            const double *right = trusted_planner_column_of(self, j, spacing);
+    const hsep_word n = self->n, preview = self->preview, spacing = splines->spacing;
+    hsep_real *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
+    for (hsep_word i = 0; i < n; i++) {
+        const hsep_real *left = trusted_planner_column_of(self, i, spacing);
+        for (hsep_word j = i; j < n; j++) { /* column j begins (j - i) spacing later */
+            const hsep_real *right = trusted_planner_column_of(self, j, spacing);
             *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
         }
         v[i] = hsep_dot(left, target + i * spacing, preview - i * spacing);
@@ -222,10 +223,10 @@ static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trus
 static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
-    double *P = hsep_planner_quadratic(task->planner), *v = hsep_planner_linear(task->planner);
-    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(self->n) * sizeof(double));
-    memcpy(v, hsep_at(self, self->v), (size_t)self->n * sizeof(double));
+    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    hsep_real *P = hsep_planner_quadratic(task->planner), *v = hsep_planner_linear(task->planner);
+    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(self->n) * sizeof(hsep_real));
+    memcpy(v, hsep_at(self, self->v), (size_t)self->n * sizeof(hsep_real));
     hsep_splines_difference_gram(splines, 1, self->penalty, P);
     hsep_splines_difference_product(splines, 1, self->penalty, at, v);
     hsep_planner_regularise(task->planner);
@@ -241,8 +242,8 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
 /* Judge a try, and take it if it is better. */
 static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    double *c = hsep_planner_coefficients(task->planner);
-    const double cost = trusted_planner_at(self, task, c, 0), gain = self->cost - cost;
+    hsep_real *c = hsep_planner_coefficients(task->planner);
+    const hsep_real cost = trusted_planner_at(self, task, c, 0), gain = self->cost - cost;
     const int may_try = self->tries_in_all < HSEP_TRUSTED_TOGETHER;
     self->stage = HSEP_TRUSTED_COMPARE;
     if (trusted_planner_better(cost, self->cost)) {
@@ -252,21 +253,22 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
         self->penalty *= trusted_planner_lower;
         self->stage = is_last || !may_try ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
     } else {
-        self->penalty = fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
+        self->penalty = hsep_fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
         self->stage = self->tries < HSEP_TRUSTED_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
     }
     trusted_planner_copy(self, c, hsep_at(self, self->rest));
 }
 
 /* Share of a window in which a plan is at the bound of the change. */
-static double trusted_planner_bounded(const hsep_trusted_planner *self, const hsep_splines *splines, const double c[])
+static hsep_real trusted_planner_bounded(
+    const hsep_trusted_planner *self, const hsep_splines *splines, const hsep_real c[])
 {
-    const uint64_t count = HSEP_DECIDED + self->n;
-    double bounded = 0.0;
-    for (uint64_t k = 0; k < self->Np; k++) {
-        bounded += fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > trusted_planner_at_bound;
+    const hsep_word count = HSEP_DECIDED + self->n;
+    hsep_real bounded = 0.0;
+    for (hsep_word k = 0; k < self->Np; k++) {
+        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > trusted_planner_at_bound;
     }
-    return bounded / (double)self->Np;
+    return bounded / (hsep_real)self->Np;
 }
 
 /* Whether the best plan asks for more than compensation is made for. A motor at its limit does not follow, so that the
@@ -275,16 +277,16 @@ static double trusted_planner_bounded(const hsep_trusted_planner *self, const hs
 static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const double error = sqrt(self->cost / (double)self->preview) * splines->share[0];
-    const double longer = trusted_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
-                          trusted_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
+    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * splines->share[0];
+    const hsep_real longer = trusted_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
+                             trusted_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
     return error > trusted_planner_left && longer > trusted_planner_bound_share;
 }
 
 /* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 0);
+    const hsep_real cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 0);
     int is_better = trusted_planner_better(self->cost, cost);
     if (is_better && trusted_planner_runs_away(self, task)) {
         self->ended = 1;
@@ -296,7 +298,7 @@ static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trust
         self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
 }
 
-HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self)
+HSEP_API hsep_word hsep_trusted_planner_next(const hsep_trusted_planner *self)
 {
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
@@ -312,7 +314,7 @@ HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self)
 
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    double *c = hsep_planner_coefficients(task->planner);
+    hsep_real *c = hsep_planner_coefficients(task->planner);
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         break;

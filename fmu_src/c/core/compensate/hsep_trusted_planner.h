@@ -19,7 +19,7 @@
 #include "hsep_planner.h"
 #include "hsep_trusted.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_TRUSTED_STEPS 4      /* Newton steps of a plan at most, */
 #define HSEP_TRUSTED_TRIES 6      /* tries of each, */
@@ -52,36 +52,36 @@ typedef enum {
 } hsep_trusted_stage;
 
 typedef struct {
-    uint64_t preview, p, Np;
-    uint64_t late;         /* samples before the window that are not measured yet: they are predicted, too */
-    uint64_t n;            /* splines of a plan */
-    uint64_t stage;        /* hsep_trusted_stage */
-    uint64_t follows;      /* whether the trusted model may plan */
-    uint64_t steps;        /* Newton steps begun */
-    uint64_t varied;       /* samples whose variance under the rest of the last plan is computed */
-    uint64_t columns;      /* splines whose change of x_h is computed */
-    uint64_t tries;        /* of this step, and */
-    uint64_t tries_in_all; /* of all */
-    uint64_t solver_steps; /* of all bounded tries */
-    uint64_t planned;      /* model of the plan: 0 none, 1 physics, 2 trusted */
-    uint64_t ended;        /* whether the trusted model plans no more in this run */
-    double cost;           /* m2, of the best plan so far */
-    double penalty;        /* on the change of velocity, in the unit of the jerk's weight */
-    double start;          /* m, position of rest */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
-    uint64_t best;       /* (3 + n,) m, those of the best plan so far */
-    uint64_t of_physics; /* (3 + n,) m, those of the physics model's */
-    uint64_t command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
-    uint64_t x_pb;       /* (preview + late,) m, their prediction by the physics model, */
-    uint64_t e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
-    uint64_t target;     /* (preview,) m, work */
-    uint64_t W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
-    uint64_t P;          /* triangle of n rows: W' W + jerk_weight D' D */
-    uint64_t v;          /* (n,) m, linear term of it */
-    uint64_t linearised;
-    uint64_t physics; /* G_pb at the beginning of the window, */
-    uint64_t trial;   /* and for a trial */
+    hsep_word preview, p, Np;
+    hsep_word late;         /* samples before the window that are not measured yet: they are predicted, too */
+    hsep_word n;            /* splines of a plan */
+    hsep_word stage;        /* hsep_trusted_stage */
+    hsep_word follows;      /* whether the trusted model may plan */
+    hsep_word steps;        /* Newton steps begun */
+    hsep_word varied;       /* samples whose variance under the rest of the last plan is computed */
+    hsep_word columns;      /* splines whose change of x_h is computed */
+    hsep_word tries;        /* of this step, and */
+    hsep_word tries_in_all; /* of all */
+    hsep_word solver_steps; /* of all bounded tries */
+    hsep_word planned;      /* model of the plan: 0 none, 1 physics, 2 trusted */
+    hsep_word ended;        /* whether the trusted model plans no more in this run */
+    hsep_real cost;         /* m2, of the best plan so far */
+    hsep_real penalty;      /* on the change of velocity, in the unit of the jerk's weight */
+    hsep_real start;        /* m, position of rest */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
+    hsep_word best;       /* (3 + n,) m, those of the best plan so far */
+    hsep_word of_physics; /* (3 + n,) m, those of the physics model's */
+    hsep_word command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
+    hsep_word x_pb;       /* (preview + late,) m, their prediction by the physics model, */
+    hsep_word e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
+    hsep_word target;     /* (preview,) m, work */
+    hsep_word W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
+    hsep_word P;          /* triangle of n rows: W' W + jerk_weight D' D */
+    hsep_word v;          /* (n,) m, linear term of it */
+    hsep_word linearised;
+    hsep_word physics; /* G_pb at the beginning of the window, */
+    hsep_word trial;   /* and for a trial */
 } hsep_trusted_planner;
 
 HSEP_ASSERT_WORDS(hsep_trusted_planner, 31);
@@ -90,18 +90,18 @@ HSEP_ASSERT_WORDS(hsep_trusted_planner, 31);
 typedef struct {
     hsep_trusted *model;
     hsep_planner *planner;
-    const double *spline; /* (preview,) m/m, a spline filtered by the physics model */
-    const double *x_d;    /* (preview,) m, commanded positions */
+    const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
+    const hsep_real *x_d;    /* (preview,) m, commanded positions */
 } hsep_trusted_task;
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_trusted_planner_size(
-    const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real
+hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_trusted_planner_init(
     hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
-    double start);
+    hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_trusted_planner_init with these parameters began. */
 HSEP_API int hsep_trusted_planner_valid(
@@ -109,9 +109,10 @@ HSEP_API int hsep_trusted_planner_valid(
 
 /* What is before a window. */
 typedef struct {
-    const hsep_physics *physics;         /* G_pb at its beginning */
-    const double *late_command, *late_x; /* (late,) m, command and x_pb of the samples not measured yet, newest first */
-    const double *residuals;             /* (p,) m, the last ones measured, newest first */
+    const hsep_physics *physics; /* G_pb at its beginning */
+    const hsep_real *late_command,
+        *late_x;                /* (late,) m, command and x_pb of the samples not measured yet, newest first */
+    const hsep_real *residuals; /* (p,) m, the last ones measured, newest first */
 } hsep_trusted_before;
 
 /* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
@@ -119,10 +120,10 @@ typedef struct {
  * that of hsep_trusted_forecast; with a late measurement its variances, late^2 / 2 multiply-adds for each
  * expert, here and in the last part. */
 HSEP_API void hsep_trusted_planner_begin(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best);
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, hsep_word best);
 
 /* Work of the part that is next, in steps of the interior-point solver; 0: the plan is made and predicted. */
-HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self);
+HSEP_API hsep_word hsep_trusted_planner_next(const hsep_trusted_planner *self);
 
 /* Do that part. */
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);

@@ -7,14 +7,14 @@
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double trusted_planner_lay_out(
+static hsep_real trusted_planner_lay_out(
     hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
 {
-    const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
-    const double preview = (double)planner->preview, all = (double)parameters->n,
-                 filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
-    double end = HSEP_WORDS(hsep_trusted_planner);
+    const hsep_word n = hsep_splines_count(planner->preview, planner->spacing);
+    const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
+                    filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const hsep_real columns = (hsep_real)n, coefficients = HSEP_DECIDED + columns;
+    hsep_real end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;
     self->late = parameters->settings->measurement_delay;
     self->p = parameters->settings->p;
@@ -25,26 +25,26 @@ static double trusted_planner_lay_out(
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
-    self->e_h = hsep_take(&end, all + (double)self->p);
+    self->e_h = hsep_take(&end, all + (hsep_real)self->p);
     self->target = hsep_take(&end, preview);
-    self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
+    self->W = hsep_take(&end, columns * preview - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
     self->P = hsep_take(&end, hsep_triangle(n));
     self->v = hsep_take(&end, columns);
     self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_trusted_planner_size(
-    const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+HSEP_API hsep_real
+hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
 {
     return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
 }
 
 HSEP_API void hsep_trusted_planner_init(
     hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
-    double start)
+    hsep_real start)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
@@ -61,7 +61,7 @@ HSEP_API void hsep_trusted_planner_init(
 HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
 {
-    const uint64_t n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     hsep_trusted_planner got;
     memcpy(&got, block, sizeof got);
     (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */

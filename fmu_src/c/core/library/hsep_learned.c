@@ -27,6 +27,18 @@ HSEP_API int hsep_learned_read(hsep_learned_source *source, void *to, size_t siz
     return source->read(source, to, size) == size;
 }
 
+HSEP_API int hsep_learned_numbers(hsep_learned_source *source, hsep_real to[], uint64_t n)
+{
+    for (uint64_t i = 0; i < n; i++) {
+        double number;
+        if (!hsep_learned_read(source, &number, sizeof number)) {
+            return 0;
+        }
+        to[i] = (hsep_real)number;
+    }
+    return 1;
+}
+
 HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
 {
     unsigned char bytes[LEARNED_CHUNK + sizeof(uint64_t)];
@@ -55,24 +67,22 @@ HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
 /* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
 static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
-    for (uint64_t i = 0; i < hsep_residual_n_learned(model); i++) {
-        if (!hsep_learned_read(source, hsep_residual_learned(model, i), sizeof(double))) {
+    for (hsep_word i = 0; i < hsep_residual_n_learned(model); i++) {
+        if (!hsep_learned_numbers(source, hsep_residual_learned(model, i), 1)) {
             return 0;
         }
     }
-    double *errors = hsep_uncertainty_learned(uncertainty);
-    return hsep_learned_read(source, errors, HSEP_N_UNCERTAINTY * sizeof(double)) &&
+    return hsep_learned_numbers(source, hsep_uncertainty_learned(uncertainty), HSEP_N_UNCERTAINTY) &&
            hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
 }
 
 /* Read a factor row after row through the model's own row: 0 if it is damaged. */
 static int learned_take_factor(
-    hsep_learned_source *source, hsep_residual_model *model, uint64_t factor, uint64_t n_samples)
+    hsep_learned_source *source, hsep_residual_model *model, hsep_word factor, hsep_word n_samples)
 {
-    const uint64_t n = hsep_residual_n_features(model, factor);
-    for (uint64_t i = 0; i <= n; i++) {
-        const size_t left = (size_t)(n + 1 - i);
-        if (!hsep_learned_read(source, hsep_residual_factor_row(model, factor), left * sizeof(double)) ||
+    const hsep_word n = hsep_residual_n_features(model, factor);
+    for (hsep_word i = 0; i <= n; i++) {
+        if (!hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) ||
             !hsep_residual_load(model, factor, i, n_samples)) {
             return 0;
         }
@@ -83,10 +93,10 @@ static int learned_take_factor(
 /* Bytes of a file with this head. */
 static double learned_size(const hsep_learned_head *head, hsep_residual_model *model)
 {
-    double words = 4.0 * (double)head->n_settings + (double)head->n_learned + 1.0;
-    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
+    double words = 4 * (double)head->n_settings + (double)head->n_learned + 1;
+    for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
         const double n = (double)hsep_residual_n_features(model, i);
-        words += 0.5 * (n + 1.0) * (n + 2.0);
+        words += (n + 1) * (n + 2) / 2;
     }
     return (double)sizeof *head + words * (double)sizeof(double);
 }
@@ -99,8 +109,8 @@ HSEP_API int hsep_learned_take(
         !learned_take_numbers(source, model, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
-    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!learned_take_factor(source, model, i, head->n_samples)) {
+    for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
+        if (!learned_take_factor(source, model, i, (hsep_word)head->n_samples)) {
             return 0;
         }
     }
@@ -109,7 +119,7 @@ HSEP_API int hsep_learned_take(
 }
 
 /* The number of a mode by the name that the file has it under, mode[1].f_n; NULL if there is none. */
-static const double *learned_mode_number(const hsep_parameters *parameters, const char *name)
+static const hsep_real *learned_mode_number(const hsep_parameters *parameters, const char *name)
 {
     uint64_t mode = 0;
     if (strncmp(name, "mode[", 5) != 0) {
@@ -134,19 +144,19 @@ static const double *learned_mode_number(const hsep_parameters *parameters, cons
 /* Whether a setting of the file is one that weights depend on, and has this value now. */
 static int learned_agrees(const hsep_learned_setting *setting, const hsep_parameters *parameters)
 {
-    const double *number = learned_mode_number(parameters, setting->name);
+    const hsep_real *number = learned_mode_number(parameters, setting->name);
     if (number != NULL) {
-        return *number == setting->value;
+        return *number == (hsep_real)setting->value;
     }
 #define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
     if (learned && strcmp(setting->name, #own) == 0) { \
-        return (double)parameters->predictor.own == setting->value; \
+        return (hsep_real)parameters->predictor.own == (hsep_real)setting->value; \
     }
     HSEP_PREDICTOR_RANGES(SAME)
 #undef SAME
 #define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
     if (learned && strcmp(setting->name, #own) == 0) { \
-        return (double)parameters->trust.own == setting->value; \
+        return (hsep_real)parameters->trust.own == (hsep_real)setting->value; \
     }
     HSEP_TRUST_RANGES(SAME)
 #undef SAME

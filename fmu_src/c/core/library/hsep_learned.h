@@ -18,14 +18,14 @@ typedef struct {
     uint64_t n_settings, n_modes, n_samples, n_learned;
 } hsep_learned_head;
 
-HSEP_ASSERT_WORDS(hsep_learned_head, 5);
+HSEP_ASSERT(learned_head, sizeof(hsep_learned_head) == 40);
 
 typedef struct {
     char name[24]; /* filled with 0 */
     double value;
 } hsep_learned_setting;
 
-HSEP_ASSERT_WORDS(hsep_learned_setting, 4);
+HSEP_ASSERT(learned_setting, sizeof(hsep_learned_setting) == 32);
 
 /* Where the bytes come from: read up to so many of them and return how many there were. */
 typedef struct hsep_learned_source hsep_learned_source;
@@ -41,6 +41,9 @@ HSEP_API hsep_learned_source hsep_learned_in_memory(const void *bytes, size_t si
 
 /* Read exactly so many bytes; 0 if there are less. */
 HSEP_API int hsep_learned_read(hsep_learned_source *source, void *to, size_t size);
+
+/* Read n numbers, which a file has in 8 bytes each; 0 if there are less. */
+HSEP_API int hsep_learned_numbers(hsep_learned_source *source, hsep_real to[], uint64_t n);
 
 /* Sum up a source to its end; whether its last 8 bytes are the checksum of the others. size: of all of it, bytes. */
 HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size);

@@ -13,7 +13,8 @@ HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters)
 }
 
 HSEP_API hsep_began hsep_compensator_init(
-    hsep_compensator *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size)
+    hsep_compensator *self, const hsep_parameters *parameters, hsep_real start, const void *weights,
+    size_t weights_size)
 {
     const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
     hsep_compensator_block_init(self, &derived, start);
@@ -27,7 +28,7 @@ HSEP_API hsep_began hsep_compensator_init(
     return began;
 }
 
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k)
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k)
 {
     const size_t expected = hsep_compensator_size(parameters);
     if (expected == 0 || size != expected) {

@@ -13,7 +13,7 @@ HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
 }
 
 HSEP_API hsep_began hsep_predictor_init(
-    hsep_predictor *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size)
+    hsep_predictor *self, const hsep_parameters *parameters, hsep_real start, const void *weights, size_t weights_size)
 {
     const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
     hsep_predictor_block_init(self, &derived, start);
@@ -24,7 +24,7 @@ HSEP_API hsep_began hsep_predictor_init(
     return began;
 }
 
-HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, uint64_t k)
+HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k)
 {
     const size_t expected = hsep_predictor_size(parameters);
     if (expected == 0 || size != expected) {

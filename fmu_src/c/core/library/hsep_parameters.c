@@ -2,11 +2,11 @@
 
 #include "hsep_ranges.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <string.h>
 
-static const double parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
-static const double parameters_warm_up = 0.3;            /* s, where it is automatic, without trust */
+static const hsep_real parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
+static const hsep_real parameters_warm_up = 0.3;            /* s, where it is automatic, without trust */
 
 HSEP_API void hsep_defaults(hsep_parameters *parameters)
 {
@@ -23,9 +23,9 @@ HSEP_API void hsep_defaults(hsep_parameters *parameters)
 }
 
 /* Whether a value is in a range, in which nonzero is the least magnitude but 0; NaN is not. */
-static int parameters_within(double value, double least, double most, double nonzero, double automatic)
+static int parameters_within(hsep_real value, hsep_real least, hsep_real most, hsep_real nonzero, hsep_real automatic)
 {
-    const int tiny = fabs(value) > 0.0 && fabs(value) < nonzero;
+    const int tiny = hsep_fabs(value) > 0.0 && hsep_fabs(value) < nonzero;
     return (value >= least && value <= most && !tiny) || value == automatic;
 }
 
@@ -44,14 +44,14 @@ HSEP_API int hsep_predictor_allows(const hsep_parameters *parameters)
     const hsep_predictor_settings *settings = &parameters->predictor;
     int allowed = parameters->n_modes >= 1 && parameters->modes != NULL;
 #define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((double)settings->name, least, most, nonzero, automatic);
+    allowed &= parameters_within((hsep_real)settings->name, least, most, nonzero, automatic);
     HSEP_PREDICTOR_RANGES(ALLOWED)
 #undef ALLOWED
 #define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((double)parameters->trust.name, least, most, nonzero, automatic);
+    allowed &= parameters_within((hsep_real)parameters->trust.name, least, most, nonzero, automatic);
     HSEP_TRUST_RANGES(ALLOWED)
 #undef ALLOWED
-    for (uint64_t i = 0; allowed && i < parameters->n_modes; i++) {
+    for (hsep_word i = 0; allowed && i < parameters->n_modes; i++) {
         allowed = parameters_mode_allowed(&parameters->modes[i]);
     }
     return allowed && settings->p <= settings->Np && settings->q < settings->Np;
@@ -63,7 +63,7 @@ HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters)
     const hsep_predictor_settings *predictor = &parameters->predictor;
     int allowed = hsep_predictor_allows(parameters);
 #define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((double)settings->name, least, most, nonzero, automatic);
+    allowed &= parameters_within((hsep_real)settings->name, least, most, nonzero, automatic);
     HSEP_COMPENSATOR_RANGES(ALLOWED)
 #undef ALLOWED
     return allowed && predictor->Np % settings->spacing == 0 &&
@@ -72,16 +72,16 @@ HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters)
 }
 
 /* Warm-up, s. */
-static double parameters_t_init(const hsep_parameters *parameters)
+static hsep_real parameters_t_init(const hsep_parameters *parameters)
 {
-    const double automatic = parameters->trust.trust ? 0.0 : parameters_warm_up;
+    const hsep_real automatic = parameters->trust.trust ? 0.0 : parameters_warm_up;
     return parameters->predictor.t_init < 0.0 ? automatic : parameters->predictor.t_init;
 }
 
 /* How many samples have t < t_init; whole, >= 0. */
-static double parameters_samples(double t_init, double T_s)
+static hsep_real parameters_samples(hsep_real t_init, hsep_real T_s)
 {
-    return fmax(0.0, ceil(t_init / T_s - parameters_warm_up_tolerance));
+    return hsep_fmax(0.0, hsep_ceil(t_init / T_s - parameters_warm_up_tolerance));
 }
 
 HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters)
@@ -92,7 +92,7 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
         .trust = parameters->trust,
         .preview = settings->Np,
         /* The warm-up counts from the end of the first fill. */
-        .n_init = (double)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
+        .n_init = (hsep_real)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
         .planned = 0,
         .n_modes = parameters->n_modes,
         .modes = parameters->modes};
@@ -101,12 +101,13 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
 HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters)
 {
     const hsep_compensator_settings *settings = &parameters->compensator;
-    const double T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
+    const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
     hsep_compensator_parameters derived = {.predictor = hsep_predictor_derive(parameters)};
     derived.predictor.preview = settings->preview;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
-    derived.predictor.n_init = parameters_samples(t_init > 0.0 ? t_init + (double)settings->preview * T_s : 0.0, T_s);
+    derived.predictor.n_init =
+        parameters_samples(t_init > 0.0 ? t_init + (hsep_real)settings->preview * T_s : 0.0, T_s);
     derived.predictor.planned = 1;
     derived.planner = (hsep_planner_parameters){
         .Np = parameters->predictor.Np,
@@ -122,4 +123,4 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     return derived;
 }
 
-HSEP_API size_t hsep_block_bytes(double bytes) { return bytes < 0.5 * (double)SIZE_MAX ? (size_t)bytes : 0; }
+HSEP_API size_t hsep_block_bytes(hsep_real bytes) { return bytes < 0.5 * (hsep_real)SIZE_MAX ? (size_t)bytes : 0; }

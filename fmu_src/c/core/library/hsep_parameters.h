@@ -15,6 +15,6 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
 HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters);
 
 /* Bytes of a block as an object's size; 0 if it cannot be one. */
-HSEP_API size_t hsep_block_bytes(double bytes);
+HSEP_API size_t hsep_block_bytes(hsep_real bytes);
 
 #endif

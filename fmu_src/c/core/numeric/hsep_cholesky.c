@@ -2,21 +2,21 @@
 
 #include "hsep_vector.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 
 /* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. */
-static int cholesky_pivot(double row[], uint64_t length, const double *least)
+static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *least)
 {
     if (least != NULL && !(row[0] >= *least)) {
         row[0] = *least;
     }
-    if (!(row[0] > 0.0 && row[0] < HUGE_VAL)) {
+    if (!(row[0] > 0.0 && row[0] < INFINITY)) {
         return 0;
     }
-    const double root = sqrt(row[0]), inverse = 1.0 / root;
+    const hsep_real root = hsep_sqrt(row[0]), inverse = 1.0 / root;
     row[0] = root;
-    for (uint64_t j = 1; j < length; j++) {
+    for (hsep_word j = 1; j < length; j++) {
         row[j] *= inverse;
     }
     return 1;
@@ -26,13 +26,14 @@ static int cholesky_pivot(double row[], uint64_t length, const double *least)
 #define CHOLESKY_PANEL 8
 
 /* Finish count rows, from row k of n on, of which those above have been taken; return whether they have pivots. */
-static int cholesky_panel(double *const rows[CHOLESKY_PANEL], uint64_t count, uint64_t length, const double least[])
+static int cholesky_panel(
+    hsep_real *const rows[CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
 {
-    for (uint64_t r = 0; r < count; r++) {
-        uint64_t above = 0;
+    for (hsep_word r = 0; r < count; r++) {
+        hsep_word above = 0;
         if (r >= 4) {
-            const double a[4] = {rows[0][r], rows[1][r - 1], rows[2][r - 2], rows[3][r - 3]};
-            const double *const x[4] = {rows[0] + r, rows[1] + r - 1, rows[2] + r - 2, rows[3] + r - 3};
+            const hsep_real a[4] = {rows[0][r], rows[1][r - 1], rows[2][r - 2], rows[3][r - 3]};
+            const hsep_real *const x[4] = {rows[0] + r, rows[1] + r - 1, rows[2] + r - 2, rows[3] + r - 3};
             hsep_take_four(rows[r], a, x, length - r);
             above = 4;
         }
@@ -46,24 +47,24 @@ static int cholesky_panel(double *const rows[CHOLESKY_PANEL], uint64_t count, ui
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double least[])
+HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[])
 {
-    double *row = triangle;
-    for (uint64_t k = 0; k < n; k += CHOLESKY_PANEL) {
-        const uint64_t length = n - k, count = length < CHOLESKY_PANEL ? length : CHOLESKY_PANEL;
-        double *rows[CHOLESKY_PANEL] = {NULL};
-        for (uint64_t r = 0; r < count; r++) {
+    hsep_real *row = triangle;
+    for (hsep_word k = 0; k < n; k += CHOLESKY_PANEL) {
+        const hsep_word length = n - k, count = length < CHOLESKY_PANEL ? length : CHOLESKY_PANEL;
+        hsep_real *rows[CHOLESKY_PANEL] = {NULL};
+        for (hsep_word r = 0; r < count; r++) {
             rows[r] = row;
             row += length - r;
         }
         if (!cholesky_panel(rows, count, length, least != NULL ? least + k : NULL)) {
             return 0;
         }
-        double *y = row;
-        for (uint64_t i = CHOLESKY_PANEL; i < length; i++) { /* what they leave of the rows below */
-            double a[CHOLESKY_PANEL];
-            const double *x[CHOLESKY_PANEL];
-            for (uint64_t r = 0; r < CHOLESKY_PANEL; r++) {
+        hsep_real *y = row;
+        for (hsep_word i = CHOLESKY_PANEL; i < length; i++) { /* what they leave of the rows below */
+            hsep_real a[CHOLESKY_PANEL];
+            const hsep_real *x[CHOLESKY_PANEL];
+            for (hsep_word r = 0; r < CHOLESKY_PANEL; r++) {
                 x[r] = rows[r] + (i - r);
                 a[r] = *x[r];
             }
@@ -74,16 +75,16 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double le
     return 1;
 }
 
-HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
+HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[])
 {
-    const double *row = triangle;
-    for (uint64_t first = 0; first < n; first += CHOLESKY_PANEL) { /* R' y = b */
-        const uint64_t left = n - first, count = left < CHOLESKY_PANEL ? left : CHOLESKY_PANEL;
-        const double *x[CHOLESKY_PANEL] = {NULL};
-        double *y = b + first;
-        for (uint64_t r = 0; r < count; r++) {
+    const hsep_real *row = triangle;
+    for (hsep_word first = 0; first < n; first += CHOLESKY_PANEL) { /* R' y = b */
+        const hsep_word left = n - first, count = left < CHOLESKY_PANEL ? left : CHOLESKY_PANEL;
+        const hsep_real *x[CHOLESKY_PANEL] = {NULL};
+        hsep_real *y = b + first;
+        for (hsep_word r = 0; r < count; r++) {
             y[r] /= row[0];
-            for (uint64_t j = 1; r + j < count; j++) {
+            for (hsep_word j = 1; r + j < count; j++) {
                 y[r + j] -= y[r] * row[j];
             }
             x[r] = row + (CHOLESKY_PANEL - r);
@@ -93,7 +94,7 @@ HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[
             hsep_take_eight(y + CHOLESKY_PANEL, y, x, left - CHOLESKY_PANEL);
         }
     }
-    for (uint64_t i = n; i-- > 0;) { /* R x = y */
+    for (hsep_word i = n; i-- > 0;) { /* R x = y */
         row -= n - i;
         b[i] = (b[i] - hsep_dot(row + 1, b + i + 1, n - i - 1)) / row[0];
     }

@@ -1,6 +1,6 @@
 /* Cholesky factor of a symmetric, positive definite matrix, P = R' R, and the equations it solves.
  *
- * A triangle of n rows is kept without gaps, by rows from the diagonal to the right: n (n + 1) / 2 doubles.
+ * A triangle of n rows is kept without gaps, by rows from the diagonal to the right: n (n + 1) / 2 numbers.
  * Reentrant; allocates nothing.
  */
 #ifndef HSEP_CHOLESKY_H
@@ -8,17 +8,17 @@
 
 #include "hsep_api.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* Doubles of a triangle of n rows. */
-static inline double hsep_triangle(uint64_t n) { return 0.5 * (double)n * ((double)n + 1.0); }
+static inline hsep_real hsep_triangle(hsep_word n) { return 0.5 * (hsep_real)n * ((hsep_real)n + 1.0); }
 
 /* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
  * is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL: nothing is.
  * Cost: n^3 / 6 multiply-adds. */
-HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n, const double least[]);
+HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[]);
 
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
-HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[]);
+HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[]);
 
 #endif

@@ -7,7 +7,7 @@
  * than its penalty. What rounding takes from an entry is carried along and given back with the next rows, so that the
  * digits do not wear off.
  *
- * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_GRAM_H
 #define HSEP_GRAM_H
@@ -15,33 +15,45 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
+
+/* Least pivot, m2, where a penalty underflows; that of the target, relative to its square; and what rounding leaves
+ * unresolved of the sum of squares, relative to that of the targets'. */
+#ifdef HSEP_FLOAT32
+#define HSEP_GRAM_LEAST 1e-36F
+#define HSEP_GRAM_OF_TARGET 6e-8F
+#define HSEP_GRAM_RESOLUTION 3e-7F
+#else
+#define HSEP_GRAM_LEAST 1e-40
+#define HSEP_GRAM_OF_TARGET 1e-16
+#define HSEP_GRAM_RESOLUTION 1e-14
+#endif
 
 #define HSEP_GRAM_TOGETHER 4 /* rows that are added in one go */
 #define HSEP_GRAM_ABREAST 4  /* rows whose leverages are computed side by side */
 
 typedef struct {
-    uint64_t n;       /* features */
-    uint64_t waiting; /* rows that are not added yet, fewer than HSEP_GRAM_TOGETHER */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
-    uint64_t sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
-    uint64_t carries; /* and what rounding took from them */
+    hsep_word n;       /* features */
+    hsep_word waiting; /* rows that are not added yet, fewer than HSEP_GRAM_TOGETHER */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
+    hsep_word sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
+    hsep_word carries; /* and what rounding took from them */
 } hsep_gram;
 
 HSEP_ASSERT_WORDS(hsep_gram, 5);
 
-/* Bytes of the block, counted in double so that no size can overflow: about 8 n^2. */
-HSEP_API double hsep_gram_size(uint64_t n);
+/* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
+HSEP_API hsep_real hsep_gram_size(hsep_word n);
 
 /* Fill the block for n >= 1 features, without rows. */
-HSEP_API void hsep_gram_init(hsep_gram *self, uint64_t n);
+HSEP_API void hsep_gram_init(hsep_gram *self, hsep_word n);
 
 /* Whether a block, in any alignment, is one that hsep_gram_init with n features began. */
-HSEP_API int hsep_gram_valid(const void *block, uint64_t n);
+HSEP_API int hsep_gram_valid(const void *block, hsep_word n);
 
 /* Where the next row goes, (n + 1,): phi, then its target; what is there before does not matter. */
-HSEP_API double *hsep_gram_row(hsep_gram *self);
+HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 
 /* Take in that row, all entries of which must be finite. Cost: n^2 / 2 times 4 multiply-adds and 6 additions at every
  * fourth row. */
@@ -50,30 +62,30 @@ HSEP_API void hsep_gram_fold(hsep_gram *self);
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
  * rows of a factor are worth those it comes from. Fails, and returns 0, if an entry is not finite or a diagonal entry
  * of R is 0. Cost: that of hsep_gram_fold. */
-HSEP_API int hsep_gram_load(hsep_gram *self, uint64_t i);
+HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
-HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, double weight);
-HSEP_API void hsep_gram_discount(hsep_gram *self, double weight);
+HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
+HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 
 /* Add the rows that wait to the sums now, so that a solution need not: before the last row of a window comes. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
 /* Sum of the squares of the targets, m2. */
-HSEP_API double hsep_gram_square(const hsep_gram *self);
+HSEP_API hsep_real hsep_gram_square(const hsep_gram *self);
 
 /* Solve for the weights w, (m,), of the first m features; with the rows of other, settled and of the same features,
  * weighed by weight, or NULL. penalties: (m,) > 0; factor: triangle of m + 1 rows, [R z; 0 rho] with R' R = gram +
  * penalties afterwards, by rows from the diagonal on; least: (m + 1,), work. Return the first sum, of which rounding
  * leaves 1e-14 of the square of the targets. Cost: m^3 / 6 + m^2 multiply-adds, and m^2 / 2 for each row that waits. */
-HSEP_API double hsep_gram_solve(
-    const hsep_gram *self, const hsep_gram *other, double weight, const double penalties[], uint64_t m, double factor[],
-    double least[], double w[]);
+HSEP_API hsep_real hsep_gram_solve(
+    const hsep_gram *self, const hsep_gram *other, hsep_real weight, const hsep_real penalties[], hsep_word m,
+    hsep_real factor[], hsep_real least[], hsep_real w[]);
 
 /* phi' (R' R)^-1 phi of HSEP_GRAM_ABREAST rows phi, entry after entry side by side in rows, which is used up: the
  * variances of w' phi relative to that of the noise. factor: that of hsep_gram_solve. Cost: m^2 / 2 multiply-adds for
  * each. */
 HSEP_API void hsep_gram_leverages(
-    const double factor[], uint64_t m, double rows[], double leverages[HSEP_GRAM_ABREAST]);
+    const hsep_real factor[], hsep_word m, hsep_real rows[], hsep_real leverages[HSEP_GRAM_ABREAST]);
 
 #endif

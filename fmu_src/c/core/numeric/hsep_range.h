@@ -2,28 +2,29 @@
 #ifndef HSEP_RANGE_H
 #define HSEP_RANGE_H
 
-#include <math.h>
-#include <stdint.h>
+#include "hsep_math.h"
+#include "hsep_real.h"
+
 #include <string.h>
 
-#define HSEP_PREDICTION_MAX 1e100 /* m: sums of squares of smaller values cannot overflow */
+#define HSEP_PREDICTION_MAX HSEP_HUGE(1e100) /* m: sums of squares of smaller values cannot overflow */
 
-/* Whether all entries of a, (n,) doubles in any alignment, are numbers within +- limit. */
-static inline int hsep_within(const void *a, uint64_t n, double limit)
+/* Whether all entries of a, (n,) numbers in any alignment, are numbers within +- limit. */
+static inline int hsep_within(const void *a, hsep_word n, hsep_real limit)
 {
     int within = 1;
-    for (uint64_t i = 0; i < n; i++) {
-        double entry;
+    for (hsep_word i = 0; i < n; i++) {
+        hsep_real entry;
         memcpy(&entry, (const char *)a + i * sizeof entry, sizeof entry);
-        within &= fabs(entry) <= limit; /* NaN is not */
+        within &= hsep_fabs(entry) <= limit; /* NaN is not */
     }
     return within;
 }
 
 /* A value within +- bound; bound if it is not a number. */
-static inline double hsep_clip(double value, double bound)
+static inline hsep_real hsep_clip(hsep_real value, hsep_real bound)
 {
-    const double below = value < bound ? value : bound;
+    const hsep_real below = value < bound ? value : bound;
     return below > -bound ? below : -bound;
 }
 

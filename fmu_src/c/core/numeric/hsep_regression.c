@@ -2,32 +2,32 @@
 
 #include "hsep_tiles.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
-static const double regression_lambda_min = 1e-290;
+static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 
 /* Bound on what a weight makes of a diagonal entry of D: far below any penalty, and no square of a row times its
  * reciprocal overflows. */
-static const double regression_discounted_min = 1e-100;
+static const hsep_real regression_discounted_min = HSEP_TINY(1e-100);
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static double regression_lay_out(hsep_regression *self, uint64_t n)
+static hsep_real regression_lay_out(hsep_regression *self, hsep_word n)
 {
-    double end = HSEP_WORDS(hsep_regression);
+    hsep_real end = HSEP_WORDS(hsep_regression);
     self->n = n;
     self->n_tiles = n / HSEP_TILE + 1;
-    const double n_tiles = (double)self->n_tiles;
+    const hsep_real n_tiles = (hsep_real)self->n_tiles;
     self->inverse_d = hsep_take(&end, HSEP_TILE * n_tiles);
     self->row = hsep_take(&end, HSEP_TILE * n_tiles);
     self->tiles = hsep_take(&end, HSEP_TILE_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_regression_size(uint64_t n) { return regression_lay_out(&(hsep_regression){0}, n); }
+HSEP_API hsep_real hsep_regression_size(hsep_word n) { return regression_lay_out(&(hsep_regression){0}, n); }
 
-HSEP_API int hsep_regression_valid(const void *block, uint64_t n)
+HSEP_API int hsep_regression_valid(const void *block, hsep_word n)
 {
     hsep_regression got;
     memcpy(&got, block, sizeof got);
@@ -35,37 +35,37 @@ HSEP_API int hsep_regression_valid(const void *block, uint64_t n)
     return memcmp(&got, block, sizeof got) == 0;
 }
 
-HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda)
+HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real lambda)
 {
     memset(self, 0, (size_t)hsep_regression_size(n));
     (void)regression_lay_out(self, n);
-    for (uint64_t i = 0; i < n; i++) {
+    for (hsep_word i = 0; i < n; i++) {
         hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
         *hsep_regression_entry(self, i, i) = 1.0;
     }
 }
 
-HSEP_API double *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
+HSEP_API hsep_real *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
 /* u := u + change with what rounding takes from it kept in carry, and given back next time (Kahan 1965). */
-static inline void regression_add(double *restrict u, double *restrict carry, double change)
+static inline void regression_add(hsep_real *restrict u, hsep_real *restrict carry, hsep_real change)
 {
-    const double wanted = change + *carry, sum = *u + wanted;
+    const hsep_real wanted = change + *carry, sum = *u + wanted;
     *carry = wanted - (sum - *u);
     *u = sum;
 }
 
 /* Rotate 4 entries x of the row with 4 entries u of a row of U:  x := x - pivot u,  u := u + gain x.
  * Written out, as regression_add has it, for compilers to make vectors of it. */
-static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain)
+static inline void regression_four(hsep_real *restrict u, hsep_real *restrict x, hsep_real pivot, hsep_real gain)
 {
-    double *restrict carry = u + HSEP_TILE_ENTRIES;
-    const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
-    const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
-    const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
-    const double c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
-    const double s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
-    const double e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
+    hsep_real *restrict carry = u + HSEP_TILE_ENTRIES;
+    const hsep_real u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
+    const hsep_real x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
+    const hsep_real c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
+    const hsep_real c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
+    const hsep_real s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
+    const hsep_real e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
     u[0] = s0, u[1] = s1, u[2] = s2, u[3] = s3;
     carry[0] = e0, carry[1] = e1, carry[2] = e2, carry[3] = e3;
     x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
@@ -73,12 +73,12 @@ static inline void regression_four(double *restrict u, double *restrict x, doubl
 
 /* Rotate the row x, (4 n,), with 4 rows of U in n tiles. */
 static inline void regression_sweep(
-    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
+    hsep_real *restrict tile, hsep_real *restrict x, hsep_word n, const hsep_real pivot[4], const hsep_real gain[4])
 {
-    const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
-    const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
-    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
-        double y[4] = {x[0], x[1], x[2], x[3]};
+    const hsep_real p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
+    const hsep_real g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
+    for (hsep_word t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+        hsep_real y[4] = {x[0], x[1], x[2], x[3]};
         regression_four(tile, y, p0, g0);
         regression_four(tile + 4, y, p1, g1);
         regression_four(tile + 8, y, p2, g2);
@@ -90,30 +90,31 @@ static inline void regression_sweep(
 /* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: that loses nothing when keep is
  * small. */
 static void regression_sweep_large(
-    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4],
-    const double keep[4], const int large[4])
+    hsep_real *restrict tile, hsep_real *restrict x, hsep_word n, const hsep_real pivot[4], const hsep_real gain[4],
+    const hsep_real keep[4], const int large[4])
 {
-    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+    for (hsep_word t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         for (int r = 0; r < 4; r++) {
-            double *restrict u = tile + 4 * r;
+            hsep_real *restrict u = tile + 4 * r;
             if (!large[r]) {
                 regression_four(u, x, pivot[r], gain[r]);
                 continue;
             }
-            const double k = keep[r], g = gain[r], p = pivot[r];
-            const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3], x0 = x[0], x1 = x[1], x2 = x[2], x3 = x[3];
+            const hsep_real k = keep[r], g = gain[r], p = pivot[r];
+            const hsep_real u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3], x0 = x[0], x1 = x[1], x2 = x[2], x3 = x[3];
             u[0] = k * u0 + g * x0, u[1] = k * u1 + g * x1, u[2] = k * u2 + g * x2, u[3] = k * u3 + g * x3;
             x[0] = x0 - p * u0, x[1] = x1 - p * u1, x[2] = x2 - p * u2, x[3] = x3 - p * u3;
-            memset(u + HSEP_TILE_ENTRIES, 0, 4 * sizeof(double));
+            memset(u + HSEP_TILE_ENTRIES, 0, 4 * sizeof(hsep_real));
         }
     }
 }
 
 /* The same for one entry. */
-static void regression_rotate(double *tile, int place, double *x, double pivot, double gain, double keep, int large)
+static void regression_rotate(
+    hsep_real *tile, int place, hsep_real *x, hsep_real pivot, hsep_real gain, hsep_real keep, int large)
 {
-    double *u = &tile[place], *carry = &tile[HSEP_TILE_ENTRIES + place];
-    const double before = *x;
+    hsep_real *u = &tile[place], *carry = &tile[HSEP_TILE_ENTRIES + place];
+    const hsep_real before = *x;
     *x = before - pivot * *u;
     if (large) {
         *u = keep * *u + gain * before;
@@ -125,24 +126,24 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
 
 HSEP_API void hsep_regression_fold(hsep_regression *self)
 {
-    double *inverse_d = hsep_at(self, self->inverse_d), *x = hsep_regression_row(self);
-    double *tile = hsep_at(self, self->tiles);
+    hsep_real *inverse_d = hsep_at(self, self->inverse_d), *x = hsep_regression_row(self);
+    hsep_real *tile = hsep_at(self, self->tiles);
     /* The row still weighs 1/v. With x_j its entry at the pivot, u a row of U and d that row's weight:
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
      * v, and with it every division, is not needed for the x of the next pivot: they run beside the sweeps.
      * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
-    double v = 1.0;
-    uint64_t rows = self->n;
-    for (uint64_t left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
+    hsep_real v = 1.0;
+    hsep_word rows = self->n;
+    for (hsep_word left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
         const unsigned height = rows < HSEP_TILE ? (unsigned)rows : HSEP_TILE;
         rows -= height;
-        double pivot[4], gain[4], keep[4];
+        hsep_real pivot[4], gain[4], keep[4];
         int large[4], any_large = 0;
         for (unsigned r = 0; r < height; r++) {
-            const double scaled = x[r] * inverse_d[r];
-            const double next = v + x[r] * scaled;
+            const hsep_real scaled = x[r] * inverse_d[r];
+            const hsep_real next = v + x[r] * scaled;
             pivot[r] = x[r];
             gain[r] = scaled / next;
             keep[r] = v / next;
@@ -166,38 +167,38 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
     self->n_samples++;
 }
 
-HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)
+HSEP_API void hsep_regression_discount(hsep_regression *self, hsep_real weight)
 {
-    double *inverse_d = hsep_at(self, self->inverse_d);
-    for (uint64_t i = 0; i < self->n; i++) {
-        inverse_d[i] = fmin(inverse_d[i] / weight, fmax(inverse_d[i], 1.0 / regression_discounted_min));
+    hsep_real *inverse_d = hsep_at(self, self->inverse_d);
+    for (hsep_word i = 0; i < self->n; i++) {
+        inverse_d[i] = hsep_fmin(inverse_d[i] / weight, hsep_fmax(inverse_d[i], 1.0 / regression_discounted_min));
     }
     self->residual_sum *= weight;
 }
 
-HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
+HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
-    const uint64_t n = self->n, n_tiles = self->n_tiles;
-    const double *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
+    const hsep_word n = self->n, n_tiles = self->n_tiles;
+    const hsep_real *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
-    for (uint64_t band = n_tiles; band-- > 0;) {
-        const uint64_t first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
+    for (hsep_word band = n_tiles; band-- > 0;) {
+        const hsep_word first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
         tile -= HSEP_TILE_STRIDE * (n_tiles - band);
-        double sum[4] = {0.0, 0.0, 0.0, 0.0};
-        const double *t = tile + HSEP_TILE_STRIDE;
-        for (uint64_t j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
+        hsep_real sum[4] = {0.0, 0.0, 0.0, 0.0};
+        const hsep_real *t = tile + HSEP_TILE_STRIDE;
+        for (hsep_word j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
             for (int r = 0; r < 4; r++) {
                 sum[r] += t[4 * r] * w[j] + t[4 * r + 1] * w[j + 1] + t[4 * r + 2] * w[j + 2] + t[4 * r + 3] * w[j + 3];
             }
         }
-        for (uint64_t r = height; r-- > 0;) {
+        for (hsep_word r = height; r-- > 0;) {
             /* w_r = z_r - sum_j>r u_rj w_j: the target's tile has the last features and z, and may be this one. */
-            const double *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
-            double w_r = last[n % HSEP_TILE] - sum[r];
-            for (uint64_t c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
+            const hsep_real *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
+            hsep_real w_r = last[n % HSEP_TILE] - sum[r];
+            for (hsep_word c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
                 w_r -= last[c] * w[n - n % HSEP_TILE + c];
             }
-            for (uint64_t c = r + 1; c < height; c++) {
+            for (hsep_word c = r + 1; c < height; c++) {
                 w_r -= tile[4 * r + c] * w[first + c];
             }
             w[first + r] = w_r;
@@ -205,11 +206,11 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
     }
 }
 
-HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
+HSEP_API int hsep_regression_load(hsep_regression *self, hsep_word i)
 {
-    const uint64_t n = self->n;
-    const double *row = hsep_regression_row(self);
-    for (uint64_t j = i; j <= n; j++) {
+    const hsep_word n = self->n;
+    const hsep_real *row = hsep_regression_row(self);
+    for (hsep_word j = i; j <= n; j++) {
         if (!isfinite(row[j - i])) {
             return 0;
         }
@@ -221,9 +222,9 @@ HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
     if (row[0] == 0.0) {
         return 0;
     }
-    hsep_at(self, self->inverse_d)[i] = 1.0 / fmax(row[0] * row[0], regression_lambda_min);
-    for (uint64_t j = i + 1; j <= n; j++) {
-        double *entry = hsep_regression_entry(self, i, j);
+    hsep_at(self, self->inverse_d)[i] = 1.0 / hsep_fmax(row[0] * row[0], regression_lambda_min);
+    for (hsep_word j = i + 1; j <= n; j++) {
+        hsep_real *entry = hsep_regression_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
         entry[HSEP_TILE_ENTRIES] = 0.0;
     }

@@ -8,7 +8,7 @@
  * rotations times at most sqrt(2), see hsep_regression.c; and what rounding takes from an entry is carried along and
  * given back with the next row, so that the digits do not wear off over 10^8 rows.
  *
- * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H
@@ -17,33 +17,33 @@
 #include "hsep_layout.h"
 #include "hsep_tiles.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    uint64_t n;          /* features */
-    uint64_t n_tiles;    /* tiles of 4 columns that n features and the target need */
-    uint64_t n_samples;  /* rows taken in */
-    double residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t inverse_d; /* (4 n_tiles,) 1/D */
-    uint64_t row;       /* (4 n_tiles,) the row that comes next */
-    uint64_t tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
+    hsep_word n;            /* features */
+    hsep_word n_tiles;      /* tiles of 4 columns that n features and the target need */
+    hsep_word n_samples;    /* rows taken in */
+    hsep_real residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word inverse_d; /* (4 n_tiles,) 1/D */
+    hsep_word row;       /* (4 n_tiles,) the row that comes next */
+    hsep_word tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
 } hsep_regression;
 
 HSEP_ASSERT_WORDS(hsep_regression, 7);
 
-/* Bytes of the block, counted in double so that no size can overflow: about 8 n^2. */
-HSEP_API double hsep_regression_size(uint64_t n);
+/* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
+HSEP_API hsep_real hsep_regression_size(hsep_word n);
 
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
-HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda);
+HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real lambda);
 
 /* Whether a block, in any alignment, is one that hsep_regression_init with n features began. */
-HSEP_API int hsep_regression_valid(const void *block, uint64_t n);
+HSEP_API int hsep_regression_valid(const void *block, hsep_word n);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */
-HSEP_API double *hsep_regression_row(hsep_regression *self);
+HSEP_API hsep_real *hsep_regression_row(hsep_regression *self);
 
 /* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite.
  * Cost: n^2 / 2 times 2 multiplications and 5 additions, and 2 n divisions, no matter how many rows were there
@@ -51,23 +51,23 @@ HSEP_API double *hsep_regression_row(hsep_regression *self);
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
-HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
+HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
 
 /* Weigh all rows so far, and lambda with them, by a weight in the sum of squares, 0 <= weight <= 1. */
-HSEP_API void hsep_regression_discount(hsep_regression *self, double weight);
+HSEP_API void hsep_regression_discount(hsep_regression *self, hsep_real weight);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
  * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
-HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i);
+HSEP_API int hsep_regression_load(hsep_regression *self, hsep_word i);
 
 /* Entry (i, j), i <= j, of [U z]. */
-static inline const double *hsep_regression_entry_const(const hsep_regression *self, uint64_t i, uint64_t j)
+static inline const hsep_real *hsep_regression_entry_const(const hsep_regression *self, hsep_word i, hsep_word j)
 {
     return hsep_at_const(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
 }
 
-static inline double *hsep_regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
+static inline hsep_real *hsep_regression_entry(hsep_regression *self, hsep_word i, hsep_word j)
 {
     return hsep_at(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
 }

@@ -8,17 +8,17 @@
 #ifndef HSEP_TILES_H
 #define HSEP_TILES_H
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_TILE 4
 #define HSEP_TILE_ENTRIES 16 /* of a tile */
-#define HSEP_TILE_STRIDE 32  /* doubles from tile to tile: the entries, then their carries */
+#define HSEP_TILE_STRIDE 32  /* numbers from tile to tile: the entries, then their carries */
 
 /* Place of entry (i, j), i <= j, of [U z] in tiles for 4 n_tiles columns. */
-static inline uint64_t hsep_tile_place(uint64_t n_tiles, uint64_t i, uint64_t j)
+static inline hsep_word hsep_tile_place(hsep_word n_tiles, hsep_word i, hsep_word j)
 {
-    const uint64_t row = i / HSEP_TILE, column = j / HSEP_TILE;
-    const uint64_t tile = row * n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
+    const hsep_word row = i / HSEP_TILE, column = j / HSEP_TILE;
+    const hsep_word tile = row * n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
     return HSEP_TILE_STRIDE * tile + 4 * (i % HSEP_TILE) + j % HSEP_TILE;
 }
 

@@ -1,27 +1,27 @@
-/* Vectors of two doubles where the compiler has them, one double elsewhere or with HSEP_NO_VECTORS; sums and products
+/* Vectors of two numbers where the compiler has them, one number elsewhere or with HSEP_NO_VECTORS; sums and products
  * of arrays, four entries at a time. Lanes do not meet: results are the same to the last bit whatever a vector holds,
  * and no addition waits for the one before. Reentrant; allocate nothing. */
 #ifndef HSEP_VECTOR_H
 #define HSEP_VECTOR_H
 
-#include <stdint.h>
+#include "hsep_real.h"
 #include <string.h>
 
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
 #define HSEP_LANES 2
-typedef double hsep_lanes __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
-typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef hsep_real hsep_lanes __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
+typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
 #else
 #define HSEP_LANES 1
-typedef double hsep_lanes;
+typedef hsep_real hsep_lanes;
 #endif
 
-/* Vectors that hold four doubles. */
+/* Vectors that hold four numbers. */
 #define HSEP_OF_FOUR (4 / HSEP_LANES)
 
-/* The vectors that begin at a double, in any alignment of doubles. */
-static inline hsep_lanes *hsep_lanes_at(double *a) { return (hsep_lanes *)(void *)a; }
-static inline const hsep_lanes *hsep_lanes_const(const double *a) { return (const hsep_lanes *)(const void *)a; }
+/* The vectors that begin at a number, in any alignment of numbers. */
+static inline hsep_lanes *hsep_lanes_at(hsep_real *a) { return (hsep_lanes *)(void *)a; }
+static inline const hsep_lanes *hsep_lanes_const(const hsep_real *a) { return (const hsep_lanes *)(const void *)a; }
 
 /* Entry by entry a where it is larger than b, else b. */
 static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
@@ -35,11 +35,11 @@ static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
 }
 
 /* sum_i a_i b_i, both (n,). */
-static inline double hsep_dot(const double a[], const double b[], uint64_t n)
+static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_word n)
 {
     hsep_lanes sums[HSEP_OF_FOUR];
-    double s[4] = {0.0, 0.0, 0.0, 0.0};
-    uint64_t i = 0;
+    hsep_real s[4] = {0.0, 0.0, 0.0, 0.0};
+    hsep_word i = 0;
     memcpy(sums, s, sizeof s);
     for (; i + 4 <= n; i += 4) {
         const hsep_lanes *x = hsep_lanes_const(a + i), *y = hsep_lanes_const(b + i);
@@ -56,10 +56,10 @@ static inline double hsep_dot(const double a[], const double b[], uint64_t n)
 
 /* start + sum_i w_i e_i, both (n,), e a recursion's own values, newest first: the newest, which are only just computed,
  * come last, and older ones need not wait for them. */
-static inline double hsep_recur(double start, const double w[], const double e[], uint64_t n)
+static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const hsep_real e[], hsep_word n)
 {
     if (n < 4) {
-        for (uint64_t i = n; i-- > 0;) {
+        for (hsep_word i = n; i-- > 0;) {
             start += w[i] * e[i];
         }
         return start;
@@ -69,9 +69,9 @@ static inline double hsep_recur(double start, const double w[], const double e[]
 }
 
 /* y += a x, both (n,). */
-static inline void hsep_axpy(double *restrict y, double a, const double *restrict x, uint64_t n)
+static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real *restrict x, hsep_word n)
 {
-    uint64_t i = 0;
+    hsep_word i = 0;
     for (; i + 4 <= n; i += 4) {
         hsep_lanes *to = hsep_lanes_at(y + i);
         const hsep_lanes *from = hsep_lanes_const(x + i);
@@ -85,11 +85,11 @@ static inline void hsep_axpy(double *restrict y, double a, const double *restric
 }
 
 /* y -= sum_r a_r x_r over 4 or 8 arrays x_r, all (n,), one after the other: y is loaded and stored once for all. */
-static inline void hsep_take_four(double *restrict y, const double a[4], const double *const x[4], uint64_t n)
+static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], const hsep_real *const x[4], hsep_word n)
 {
-    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
-    uint64_t j = 0;
+    const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+    const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
+    hsep_word j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
         *hsep_lanes_at(y + j) =
             (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
@@ -101,11 +101,12 @@ static inline void hsep_take_four(double *restrict y, const double a[4], const d
     }
 }
 
-static inline void hsep_take_eight(double *restrict y, const double a[8], const double *const x[8], uint64_t n)
+static inline void hsep_take_eight(
+    hsep_real *restrict y, const hsep_real a[8], const hsep_real *const x[8], hsep_word n)
 {
-    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
-    const double *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
-    uint64_t j = 0;
+    const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
+    const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
+    hsep_word j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
         const hsep_lanes first =
             (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
@@ -116,7 +117,7 @@ static inline void hsep_take_eight(double *restrict y, const double a[8], const 
                                 a7 * *hsep_lanes_const(x7 + j);
     }
     for (; j < n; j++) {
-        const double first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+        const hsep_real first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
         y[j] = (((first - a4 * x4[j]) - a5 * x5[j]) - a6 * x6[j]) - a7 * x7[j];
     }
 }

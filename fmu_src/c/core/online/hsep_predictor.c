@@ -2,7 +2,7 @@
 
 #include "hsep_range.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -24,12 +24,12 @@ static int predictor_settled(hsep_predictor *self)
     return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
 }
 
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
-    const uint64_t i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
+    const hsep_word i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
     /* What was measured is that of late samples ago. */
-    const double x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
-    const double x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
+    const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
+    const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     const hsep_residual_window window = hsep_predictor_window(self);
@@ -43,7 +43,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     if (self->k >= self->preview + late && !isnan(x_meas)) {
         self->residual = x_meas - x_pb;
     }
-    if (self->k >= self->preview + late && (double)self->k >= self->n_init + (double)late && !isnan(x_meas)) {
+    if (self->k >= self->preview + late && (hsep_real)self->k >= self->n_init + (hsep_real)late && !isnan(x_meas)) {
         self->n_measured++;
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
         self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
@@ -57,22 +57,22 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
 /* Correct the state at the beginning of the run, if its first residuals tell that it was in motion. */
 static void predictor_start(hsep_predictor *self)
 {
-    const uint64_t Np = self->Np, late = self->late;
+    const hsep_word Np = self->Np, late = self->late;
     hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
     hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
     hsep_trusted *trusted = hsep_residual_trusted(hsep_predictor_model(self));
-    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    double *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
-    const double *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
-    for (uint64_t j = 0; j < Np; j++) {
+    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    hsep_real *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
+    const hsep_real *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
+    for (hsep_word j = 0; j < Np; j++) {
         work[j] = e[j] - e_h[j];
     }
     if (hsep_start_estimate(motion, command, work)) {
-        for (uint64_t j = 0; j < Np; j++) {
+        for (hsep_word j = 0; j < Np; j++) {
             e[j] += past_x[late + j];
         }
         hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
-        for (uint64_t j = 0; j < Np; j++) {
+        for (hsep_word j = 0; j < Np; j++) {
             e[j] -= past_x[late + j];
         }
         hsep_trusted_begin_in_motion(trusted, command + late, past_x + late);
@@ -81,43 +81,43 @@ static void predictor_start(hsep_predictor *self)
 
 HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 {
-    const uint64_t n = self->n, late = self->late;
+    const hsep_word n = self->n, late = self->late;
     const hsep_residual_window window = hsep_predictor_window(self);
     hsep_residual_model *model = hsep_predictor_model(self);
-    double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
     if (self->motion && self->k == self->preview + self->Np) {
         predictor_start(self);
     }
     if (hsep_residual_finish(model, &window)) {
         hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, hsep_residual_accepted(model));
     }
-    memcpy(past_x + n, past_x + late, (size_t)self->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
-    memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(double));
+    memcpy(past_x + n, past_x + late, (size_t)self->q * sizeof(hsep_real)); /* q < Np, p <= Np: they do not overlap */
+    memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(hsep_real));
 }
 
 /* Keep the samples of the window that are not measured yet, before the next one. */
 static void predictor_keep(hsep_predictor *self)
 {
-    const uint64_t late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
-    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    memmove(command + self->Np, command, (size_t)late * sizeof(double));
-    memmove(past_x + self->Np, past_x, (size_t)late * sizeof(double));
+    const hsep_word late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
+    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    memmove(command + self->Np, command, (size_t)late * sizeof(hsep_real));
+    memmove(past_x + self->Np, past_x, (size_t)late * sizeof(hsep_real));
     for (int i = 0; i < 4; i++) {
-        double *kept = hsep_at(self, signals[i] - late);
-        memmove(kept, kept + self->Np, (size_t)late * sizeof(double));
+        hsep_real *kept = hsep_at(self, signals[i] - late);
+        memmove(kept, kept + self->Np, (size_t)late * sizeof(hsep_real));
     }
 }
 
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
-    const uint64_t n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
-    const double *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
-    double *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
+    const hsep_word n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
+    const hsep_real *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
+    hsep_real *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     predictor_keep(self);
-    memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
-    memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
+    memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(hsep_real));
+    memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(hsep_real));
     if (e_h != past_e) {
-        memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(double));
+        memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(hsep_real));
     }
     hsep_residual_begin(hsep_predictor_model(self), self->k >= self->preview); /* the first fill is not learned */
     self->n_published = 0;
@@ -125,9 +125,9 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 }
 
 /* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
-static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
+static void predictor_bound(hsep_predictor *self, hsep_word first, hsep_word last)
 {
-    const double *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
+    const hsep_real *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
     if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb, last - first, HSEP_PREDICTION_MAX)) {
         self->divergence = HSEP_DIVERGES_X_PB;
     } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h, last - first, HSEP_PREDICTION_MAX)) {
@@ -135,13 +135,13 @@ static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
     }
 }
 
-HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
+HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_word last)
 {
-    const uint64_t Np = self->Np, first = self->n_published;
-    const double *past_x = hsep_at(self, self->past_x);
-    double *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
-    double *x_hold = hsep_at(self, self->x_hold);
-    for (uint64_t i = first; i < last; i++) {
+    const hsep_word Np = self->Np, first = self->n_published;
+    const hsep_real *past_x = hsep_at(self, self->past_x);
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
+    hsep_real *x_hold = hsep_at(self, self->x_hold);
+    for (hsep_word i = first; i < last; i++) {
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
         x_hold[i] = x_pb[i] + self->held;
@@ -151,16 +151,16 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
 }
 
 /* Samples within the warm-up, of the window and the late ones before it. */
-static uint64_t predictor_warm_up(const hsep_predictor *self, uint64_t late)
+static hsep_word predictor_warm_up(const hsep_predictor *self, hsep_word late)
 {
-    const double left = self->n_init - (double)(self->k - self->k % self->Np) + (double)late;
-    const uint64_t n = self->Np + late;
-    return left >= (double)n ? n : left > 0.0 ? (uint64_t)left : 0;
+    const hsep_real left = self->n_init - (hsep_real)(self->k - self->k % self->Np) + (hsep_real)late;
+    const hsep_word n = self->Np + late;
+    return left >= (hsep_real)n ? n : left > 0.0 ? (hsep_word)left : 0;
 }
 
-HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
+HSEP_API hsep_word hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
 
-HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, uint64_t first, uint64_t last)
+HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, hsep_word last)
 {
     hsep_uncertainty_signals signals = {
         .x_pb = hsep_at(self, self->past_x),
@@ -175,9 +175,9 @@ HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, uint64_t first, u
 /* Take in commands and x_pb of the window that begins as they came, eq. (2), behind those that are not measured yet. */
 static void predictor_open(hsep_predictor *self)
 {
-    const uint64_t Np = self->Np;
-    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    for (uint64_t i = 0; i < Np; i++) {
+    const hsep_word Np = self->Np;
+    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    for (hsep_word i = 0; i < Np; i++) {
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
         past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
     }
@@ -190,21 +190,21 @@ static void predictor_open(hsep_predictor *self)
 /* Predict the next samples of the window; those that are not measured yet with the first of them. */
 static void predictor_go_on(hsep_predictor *self)
 {
-    const uint64_t late = self->late, published = self->n_published, left = self->Np - published;
-    const uint64_t part = hsep_residual_part(hsep_predictor_model(self)),
-                   last = published + (left < part ? left : part);
-    const uint64_t first = published > 0 ? late + published : 0;
+    const hsep_word late = self->late, published = self->n_published, left = self->Np - published;
+    const hsep_word part = hsep_residual_part(hsep_predictor_model(self)),
+                    last = published + (left < part ? left : part);
+    const hsep_word first = published > 0 ? late + published : 0;
     const hsep_residual_window window = hsep_predictor_window(self);
     hsep_residual_predict(hsep_predictor_model(self), &window, first, late + last);
     hsep_predictor_publish(self, last);
     hsep_predictor_predict_std(self, first, late + last);
 }
 
-HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
-    const uint64_t Np = self->Np;
-    const double relative = x_d_ahead - self->start;
-    double *ahead_pb = hsep_at(self, self->ahead_pb);
+    const hsep_word Np = self->Np;
+    const hsep_real relative = x_d_ahead - self->start;
+    hsep_real *ahead_pb = hsep_at(self, self->ahead_pb);
     hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         if (self->n_published < Np) {
@@ -214,7 +214,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     }
     hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
-        memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->p) * sizeof(double));
+        memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->p) * sizeof(hsep_real));
     }
     hsep_predictor_begin(self);
     predictor_open(self);
@@ -223,20 +223,20 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     return 1;
 }
 
-HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i)
+HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i)
 {
     const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);
     return hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i];
 }
 
-static double predictor_rms(const hsep_predictor *self, double sum)
+static hsep_real predictor_rms(const hsep_predictor *self, hsep_real sum)
 {
-    return self->n_measured > 0 ? sqrt(sum / (double)self->n_measured) : 0.0;
+    return self->n_measured > 0 ? hsep_sqrt(sum / (hsep_real)self->n_measured) : 0.0;
 }
 
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
 {
-    const uint64_t i = self->k % self->Np;
+    const hsep_word i = self->k % self->Np;
     outputs->x_d = hsep_at_const(self, self->x_d)[i];
     outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
     outputs->x_h = hsep_at_const(self, self->x_h)[i];

@@ -34,60 +34,60 @@
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
     hsep_predictor_settings settings;
     hsep_trust_settings trust;
-    uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
+    hsep_word preview;      /* samples from r(k) to the drive, >= Np; Np alone */
+    hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
-    uint64_t n_modes;       /* >= 1 */
+    hsep_word n_modes;      /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 
 struct hsep_predictor {
-    uint64_t Np, late, n, preview; /* n = Np + late */
-    uint64_t p, q;                 /* lags of e_pb and of x_pb */
-    double n_init;
-    double start;                /* position of rest, m */
-    uint64_t k;                  /* index of the next sample */
-    uint64_t n_published;        /* samples of the window that are predicted */
-    uint64_t n_physics;          /* leading samples of the window where x_h = x_pb */
-    uint64_t n_measured;         /* samples since t_init */
-    double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
-    double sum_hold;             /* m2, the same if the last residual measured before each window were held */
-    double residual;             /* m, of the last sample measured, as published; 0 before any behind the first fill */
-    double held;                 /* m, that before the window */
-    uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t ahead;    /* (preview,) m, ring of the commands that came last */
-    uint64_t x_d;      /* (preview,) m, commands of the window and what follows it */
-    uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
-    uint64_t x_h;      /* (Np,) m, hybrid predictions, */
-    uint64_t x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
-    uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    uint64_t command;  /* (n,) m, commands of the window relative to start, newest first */
-    uint64_t past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
-    uint64_t past_e;   /* (n + p,) m, e_pb likewise, as measured */
-    uint64_t e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
-    uint64_t physics, uncertainty;
-    uint64_t model;  /* the residual model */
-    uint64_t motion; /* the motion before the run; with trust, alone */
+    hsep_word Np, late, n, preview; /* n = Np + late */
+    hsep_word p, q;                 /* lags of e_pb and of x_pb */
+    hsep_real n_init;
+    hsep_real start;                /* position of rest, m */
+    hsep_word k;                    /* index of the next sample */
+    hsep_word n_published;          /* samples of the window that are predicted */
+    hsep_word n_physics;            /* leading samples of the window where x_h = x_pb */
+    hsep_word n_measured;           /* samples since t_init */
+    hsep_real sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
+    hsep_real sum_hold;             /* m2, the same if the last residual measured before each window were held */
+    hsep_real residual;   /* m, of the last sample measured, as published; 0 before any behind the first fill */
+    hsep_real held;       /* m, that before the window */
+    hsep_word divergence; /* hsep_divergence of the first window that diverged; latched */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word ahead;    /* (preview,) m, ring of the commands that came last */
+    hsep_word x_d;      /* (preview,) m, commands of the window and what follows it */
+    hsep_word x_pb;     /* (Np,) m, the window: physics-based predictions, */
+    hsep_word x_h;      /* (Np,) m, hybrid predictions, */
+    hsep_word x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
+    hsep_word ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
+    hsep_word command;  /* (n,) m, commands of the window relative to start, newest first */
+    hsep_word past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
+    hsep_word past_e;   /* (n + p,) m, e_pb likewise, as measured */
+    hsep_word e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
+    hsep_word physics, uncertainty;
+    hsep_word model;  /* the residual model */
+    hsep_word motion; /* the motion before the run; with trust, alone */
 };
 
 HSEP_ASSERT_WORDS(hsep_predictor, 33);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_predictor_block_size(const hsep_predictor_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_predictor_block_init(
-    hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
+    hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment and of hsep_predictor_block_size(parameters) bytes, is a valid state for these
  * parameters at sample k: its layout is that of hsep_predictor_block_init, and every index lies within it. */
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k);
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_word k);
 
 /* The residual model, and its parameters. */
 HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
@@ -99,7 +99,7 @@ HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
 
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
 /* Finish a window: learn it with trust, and its errors; its residuals become the past of the next one. */
 HSEP_API void hsep_predictor_finish(hsep_predictor *self);
@@ -111,13 +111,13 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self);
 
 /* Publish the samples of the window up to last - 1, whose x_pb are in past_x and residuals in e_h; eq. (4). */
-HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
+HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_word last);
 
 /* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published, their commands
  * being in command. */
-HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, uint64_t first, uint64_t last);
+HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, hsep_word last);
 
 /* Leading samples of the window in the warm-up. */
-HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);
+HSEP_API hsep_word hsep_predictor_warm_up(const hsep_predictor *self);
 
 #endif

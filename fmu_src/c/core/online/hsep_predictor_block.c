@@ -3,7 +3,7 @@
 
 #include "hsep_range.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -53,18 +53,18 @@ static int predictor_corrects_start(const hsep_predictor_parameters *parameters)
 }
 
 /* Take a signal of the window, this long, and what is before it; return the offset of the window. */
-static uint64_t predictor_take(double *end, double late, double count)
+static hsep_word predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 {
-    return hsep_take(end, late + count) + (uint64_t)late;
+    return hsep_take(end, late + count) + (hsep_word)late;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
-    const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
-    const double late = (double)parameters->settings.measurement_delay, n = Np + late;
-    const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
-    double end = HSEP_WORDS(hsep_predictor);
+    const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
+    const hsep_real late = (hsep_real)parameters->settings.measurement_delay, n = Np + late;
+    const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
+    hsep_real end = HSEP_WORDS(hsep_predictor);
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     const hsep_start_parameters start = predictor_start_parameters(parameters);
     self->Np = parameters->settings.Np;
@@ -88,21 +88,22 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
     self->model = hsep_take_block(&end, hsep_residual_size(&model));
     self->motion = predictor_corrects_start(parameters) ? hsep_take_block(&end, hsep_start_size(&start)) : 0;
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_predictor_block_size(const hsep_predictor_parameters *parameters)
+HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters)
 {
     return predictor_lay_out(&(hsep_predictor){0}, parameters);
 }
 
-HSEP_API void hsep_predictor_block_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+HSEP_API void hsep_predictor_block_init(
+    hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
     memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
     (void)predictor_lay_out(self, parameters);
     self->start = start;
-    self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
-    for (uint64_t i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
+    self->n_published = self->n_physics = self->Np;            /* the first fill is not predicted */
+    for (hsep_word i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
         hsep_at(self, 0)[i] = start;
     }
     hsep_physics_init(
@@ -119,14 +120,14 @@ HSEP_API void hsep_predictor_block_init(hsep_predictor *self, const hsep_predict
     }
 }
 
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_word k)
 {
     hsep_predictor got;
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     const hsep_start_parameters motion = predictor_start_parameters(parameters);
-    const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
+    const hsep_real sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.divergence <= HSEP_DIVERGES_X_DM &&
@@ -135,7 +136,7 @@ HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_
         (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &motion)) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
-    const double residuals[2] = {got.residual, got.held};
+    const hsep_real residuals[2] = {got.residual, got.held};
     sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX);
     for (int i = 0; i < 4; i++) {
         sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);

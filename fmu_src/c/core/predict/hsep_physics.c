@@ -1,18 +1,18 @@
 #include "hsep_physics.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <string.h>
 
 #define PHYSICS_TERMS 20 /* of the series: 0.5^20 / 20! < 1e-24 */
 
-static const double physics_two_pi = 6.283185307179586;
+static const hsep_real physics_two_pi = 6.283185307179586;
 
 /* E := F G + scale E, all (4, 4) by rows; E is none of the others. */
-static void physics_multiply(double E[16], const double F[16], const double G[16], double scale)
+static void physics_multiply(hsep_real E[16], const hsep_real F[16], const hsep_real G[16], hsep_real scale)
 {
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {
-            double sum = scale * E[4 * i + j];
+            hsep_real sum = scale * E[4 * i + j];
             for (int k = 0; k < 4; k++) {
                 sum += F[4 * i + k] * G[4 * k + j];
             }
@@ -24,26 +24,26 @@ static void physics_multiply(double E[16], const double F[16], const double G[16
 /* E := exp(M) - I, both (4, 4) by rows; M is halved on the way until its norm is at most 1/2.
  * Scaling and squaring (Moler and Van Loan 2003, method 3) of exp - I instead of exp: entries much smaller than 1
  * keep their relative accuracy, and many squarings do not wear the digits off. */
-static void physics_expm1(double E[16], double M[16])
+static void physics_expm1(hsep_real E[16], hsep_real M[16])
 {
-    double norm = 0.0;
+    hsep_real norm = 0.0;
     for (int i = 0; i < 16; i += 4) {
-        norm = fmax(norm, fabs(M[i]) + fabs(M[i + 1]) + fabs(M[i + 2]) + fabs(M[i + 3]));
+        norm = hsep_fmax(norm, hsep_fabs(M[i]) + hsep_fabs(M[i + 1]) + hsep_fabs(M[i + 2]) + hsep_fabs(M[i + 3]));
     }
     int exponent = 0;
-    (void)frexp(norm, &exponent); /* norm < 2^exponent */
+    (void)hsep_frexp(norm, &exponent); /* norm < 2^exponent */
     const int squarings = exponent + 1 > 0 ? exponent + 1 : 0;
     for (int i = 0; i < 16; i++) {
-        M[i] = ldexp(M[i], -squarings);
+        M[i] = hsep_ldexp(M[i], -squarings);
     }
     /* exp(M) - I = M (I + M/2 (I + M/3 (I + ...))), from the inside out */
-    double P[16], Q[16];
+    hsep_real P[16], Q[16];
     memset(P, 0, sizeof P);
     for (int term = PHYSICS_TERMS; term >= 1; term--) {
         memcpy(Q, M, sizeof Q);
         physics_multiply(Q, M, P, 1.0); /* Q = M + M P */
         for (int i = 0; i < 16; i++) {
-            P[i] = Q[i] / term;
+            P[i] = Q[i] / (hsep_real)term;
         }
     }
     memcpy(E, P, 16 * sizeof *E);
@@ -53,12 +53,12 @@ static void physics_expm1(double E[16], double M[16])
     }
 }
 
-HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double T_s, hsep_hold hold)
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold)
 {
-    const double omega = physics_two_pi * continuous->f_n; /* rad/s */
+    const hsep_real omega = physics_two_pi * continuous->f_n; /* rad/s */
     /* States (omega^2 z, omega z') with z'' + 2 zeta omega z' + omega^2 z = u, both in m; then u and its ramp
      * (Van Loan 1978): the exponential of the augmented matrix holds Phi, Gamma_1 and Gamma_2. */
-    double M[16] = {0.0}, E[16];
+    hsep_real M[16] = {0.0}, E[16];
     M[1] = omega * T_s;
     M[4] = -omega * T_s;
     M[5] = -2.0 * continuous->zeta * omega * T_s;
@@ -71,7 +71,7 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
     mode->A[3] = 1.0 + E[5];
     mode->c[0] = continuous->alpha / (omega * omega);
     mode->c[1] = continuous->beta / omega;
-    const double gamma_1[2] = {E[2], E[6]}, gamma_2[2] = {E[3], E[7]};
+    const hsep_real gamma_1[2] = {E[2], E[6]}, gamma_2[2] = {E[3], E[7]};
     if (hold == HSEP_ZERO_ORDER_HOLD) {
         mode->b[0] = gamma_1[0];
         mode->b[1] = gamma_1[1];
@@ -89,14 +89,14 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
 #define PHYSICS_TOGETHER 64 /* samples whose response is computed mode by mode */
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double physics_lay_out(hsep_physics *self, uint64_t n_modes, uint64_t dead_time)
+static hsep_real physics_lay_out(hsep_physics *self, hsep_word n_modes, hsep_word dead_time)
 {
-    double end = HSEP_WORDS(hsep_physics);
+    hsep_real end = HSEP_WORDS(hsep_physics);
     self->n_modes = n_modes;
     self->dead_time = dead_time;
-    self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_discrete_mode));
-    self->ring = hsep_take(&end, (double)dead_time);
-    return end * sizeof(double);
+    self->modes = hsep_take(&end, (hsep_real)n_modes * HSEP_WORDS(hsep_discrete_mode));
+    self->ring = hsep_take(&end, (hsep_real)dead_time);
+    return end * sizeof(hsep_real);
 }
 
 static hsep_discrete_mode *physics_modes(hsep_physics *self)
@@ -104,12 +104,12 @@ static hsep_discrete_mode *physics_modes(hsep_physics *self)
     return (hsep_discrete_mode *)hsep_at(self, self->modes);
 }
 
-HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
+HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time)
 {
     return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
 }
 
-HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time)
+HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time)
 {
     hsep_physics got;
     memcpy(&got, block, sizeof got);
@@ -118,24 +118,24 @@ HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t de
 }
 
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double T_s, hsep_hold hold)
+    hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold)
 {
     (void)physics_lay_out(self, n_modes, dead_time);
     self->oldest = 0;
-    for (uint64_t i = 0; i < n_modes; i++) {
+    for (hsep_word i = 0; i < n_modes; i++) {
         hsep_discretise(&physics_modes(self)[i], &modes[i], T_s, hold);
     }
-    memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(double));
+    memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_physics_begin(hsep_physics *self, const double state[])
+HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])
 {
-    double *ring = hsep_at(self, self->ring);
+    hsep_real *ring = hsep_at(self, self->ring);
     self->oldest = 0;
-    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
+    for (hsep_word i = 0; i < 2 * self->n_modes; i++) {
         physics_modes(self)[i / 2].s[i % 2] = state != NULL ? state[i] : 0.0;
     }
-    for (uint64_t i = 0; i < self->dead_time; i++) {
+    for (hsep_word i = 0; i < self->dead_time; i++) {
         ring[i] = state != NULL ? state[2 * self->n_modes + i] : 0.0;
     }
 }
@@ -143,37 +143,37 @@ HSEP_API void hsep_physics_begin(hsep_physics *self, const double state[])
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
 {
     const hsep_discrete_mode *modes = (const hsep_discrete_mode *)hsep_at_const(other, other->modes);
-    const double *ring = hsep_at_const(other, other->ring);
-    for (uint64_t i = 0; i < self->n_modes; i++) {
+    const hsep_real *ring = hsep_at_const(other, other->ring);
+    for (hsep_word i = 0; i < self->n_modes; i++) {
         physics_modes(self)[i].s[0] += modes[i].s[0];
         physics_modes(self)[i].s[1] += modes[i].s[1];
     }
-    for (uint64_t i = 0; i < self->dead_time; i++) {
+    for (hsep_word i = 0; i < self->dead_time; i++) {
         hsep_at(self, self->ring)[(self->oldest + i) % self->dead_time] += ring[(other->oldest + i) % self->dead_time];
     }
 }
 
 /* The command that leaves the dead time as another one enters it. */
-static double physics_delay(hsep_physics *self, double u)
+static hsep_real physics_delay(hsep_physics *self, hsep_real u)
 {
-    double *oldest = hsep_at(self, self->ring) + self->oldest;
-    const double delayed = *oldest;
+    hsep_real *oldest = hsep_at(self, self->ring) + self->oldest;
+    const hsep_real delayed = *oldest;
     *oldest = u;
     self->oldest = self->oldest + 1 == self->dead_time ? 0 : self->oldest + 1;
     return delayed;
 }
 
 /* Add the response of one mode to commands u, (n,), its state in registers. */
-static void physics_respond(hsep_discrete_mode *m, const double *restrict u, double *restrict x_pb, size_t n)
+static void physics_respond(hsep_discrete_mode *m, const hsep_real *restrict u, hsep_real *restrict x_pb, size_t n)
 {
-    const double a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
-    const double c0 = m->c[0], c1 = m->c[1], d = m->d;
-    double s0 = m->s[0], s1 = m->s[1];
+    const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
+    const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d;
+    hsep_real s0 = m->s[0], s1 = m->s[1];
     for (size_t k = 0; k < n; k++) {
         /* x_pb = c s + d u */
         x_pb[k] += c0 * s0 + c1 * s1 + d * u[k];
         /* s := A s + b u */
-        const double next = a00 * s0 + a01 * s1 + b0 * u[k];
+        const hsep_real next = a00 * s0 + a01 * s1 + b0 * u[k];
         s1 = a10 * s0 + a11 * s1 + b1 * u[k];
         s0 = next;
     }
@@ -181,16 +181,16 @@ static void physics_respond(hsep_discrete_mode *m, const double *restrict u, dou
     m->s[1] = s1;
 }
 
-HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
+HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n)
 {
-    double u[PHYSICS_TOGETHER]; /* x_pb may be x_d */
+    hsep_real u[PHYSICS_TOGETHER]; /* x_pb may be x_d */
     for (size_t first = 0; first < n; first += PHYSICS_TOGETHER) {
         const size_t count = n - first < PHYSICS_TOGETHER ? n - first : PHYSICS_TOGETHER;
         for (size_t k = 0; k < count; k++) {
             u[k] = self->dead_time > 0 ? physics_delay(self, x_d[first + k]) : x_d[first + k];
         }
-        memset(x_pb + first, 0, count * sizeof(double));
-        for (uint64_t i = 0; i < self->n_modes; i++) {
+        memset(x_pb + first, 0, count * sizeof(hsep_real));
+        for (hsep_word i = 0; i < self->n_modes; i++) {
             physics_respond(&physics_modes(self)[i], u, x_pb + first, count);
         }
     }
@@ -198,19 +198,20 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[
 
 /* Add the responses of one mode of count models to n samples of the signals u, their states in registers. */
 static void physics_respond_abreast(
-    hsep_physics *const models[], size_t count, uint64_t mode, const double *restrict u, double *restrict x, size_t n)
+    hsep_physics *const models[], size_t count, hsep_word mode, const hsep_real *restrict u, hsep_real *restrict x,
+    size_t n)
 {
     const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
-    const double a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
-    const double c0 = m->c[0], c1 = m->c[1], d = m->d;
-    double s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
+    const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
+    const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d;
+    hsep_real s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
     for (size_t i = 0; i < count; i++) {
         s0[i] = physics_modes(models[i])[mode].s[0];
         s1[i] = physics_modes(models[i])[mode].s[1];
     }
     for (size_t k = 0; k < n; k++, u += HSEP_PHYSICS_ABREAST, x += HSEP_PHYSICS_ABREAST) {
         for (size_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-            const double next = a00 * s0[i] + a01 * s1[i] + b0 * u[i];
+            const hsep_real next = a00 * s0[i] + a01 * s1[i] + b0 * u[i];
             x[i] += c0 * s0[i] + c1 * s1[i] + d * u[i];
             s1[i] = a10 * s0[i] + a11 * s1[i] + b1 * u[i];
             s0[i] = next;
@@ -222,16 +223,16 @@ static void physics_respond_abreast(
     }
 }
 
-HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, double u[], double x[], size_t n)
+HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, hsep_real u[], hsep_real x[], size_t n)
 {
     for (size_t i = 0; i < count && models[i]->dead_time > 0; i++) {
         for (size_t k = 0; k < n; k++) {
-            double *command = u + HSEP_PHYSICS_ABREAST * k + i;
+            hsep_real *command = u + HSEP_PHYSICS_ABREAST * k + i;
             *command = physics_delay(models[i], *command);
         }
     }
-    memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(double));
-    for (uint64_t mode = 0; mode < models[0]->n_modes; mode++) {
+    memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(hsep_real));
+    for (hsep_word mode = 0; mode < models[0]->n_modes; mode++) {
         physics_respond_abreast(models, count, mode, u, x, n);
     }
 }

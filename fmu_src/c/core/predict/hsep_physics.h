@@ -1,6 +1,6 @@
 /* Discrete-time physics-based model G_pb under a zero- or first-order hold; eqs. (2) and (15).
  *
- * Memory is one block: the struct, then its arrays as doubles. No pointers, so a copy of the block is the state.
+ * Memory is one block: the struct, then its arrays of numbers. No pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing; nothing here can fail once the parameters are in range.
  */
 #ifndef HSEP_PHYSICS_H
@@ -10,24 +10,24 @@
 #include "hsep_layout.h"
 
 #include <stddef.h>
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* A mode between two samples: s(k+1) = A s(k) + b u(k), its part of x_pb(k) is c s(k) + d u(k); s in m. */
 typedef struct {
-    double A[4]; /* (2, 2) by rows, 1 */
-    double b[2]; /* (2,), 1 */
-    double c[2]; /* (2,), 1 */
-    double d;    /* 1; 0 for a zero-order hold */
-    double s[2]; /* (2,), m, the state */
+    hsep_real A[4]; /* (2, 2) by rows, 1 */
+    hsep_real b[2]; /* (2,), 1 */
+    hsep_real c[2]; /* (2,), 1 */
+    hsep_real d;    /* 1; 0 for a zero-order hold */
+    hsep_real s[2]; /* (2,), m, the state */
 } hsep_discrete_mode;
 
 typedef struct {
-    uint64_t n_modes;
-    uint64_t dead_time; /* whole samples by which the command is delayed */
-    uint64_t oldest;    /* index of the next command to leave the dead time's ring */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t modes; /* hsep_discrete_mode[n_modes] */
-    uint64_t ring;  /* (dead_time,) m, commands within the dead time */
+    hsep_word n_modes;
+    hsep_word dead_time; /* whole samples by which the command is delayed */
+    hsep_word oldest;    /* index of the next command to leave the dead time's ring */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word modes; /* hsep_discrete_mode[n_modes] */
+    hsep_word ring;  /* (dead_time,) m, commands within the dead time */
 } hsep_physics;
 
 HSEP_ASSERT_WORDS(hsep_mode, 4);
@@ -36,34 +36,34 @@ HSEP_ASSERT_WORDS(hsep_physics, 5);
 
 /* Fill a mode for the sampling interval T_s, s, at rest. Exact up to rounding in every damping regime.
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times T_s. */
-HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double T_s, hsep_hold hold);
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time);
 
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double T_s, hsep_hold hold);
+    hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold);
 
 /* Whether a block, in any alignment, is one that hsep_physics_init with these parameters began. */
-HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time);
+HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time);
 
 /* Begin with a state: (2 n_modes + dead_time,), m, of the modes, then the commands within the dead time, oldest first;
  * NULL: at rest. */
-HSEP_API void hsep_physics_begin(hsep_physics *self, const double state[]);
+HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);
 
 /* Add the state of another one with the same parameters: the responses are those to the sum of the commands. */
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
 
 /* Response x_pb, (n,), m, to n commands x_d, (n,), m, relative to the initial position; eq. (2).
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
-HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
+HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n);
 
 #define HSEP_PHYSICS_ABREAST 4 /* signals side by side at most */
 
 /* Responses x, m, of count models with the same parameters to the signals u, m, both (n, HSEP_PHYSICS_ABREAST), sample
  * after sample: the same numbers as one model after the other, whose every sample waits for the one before. u is
  * delayed by the dead time; behind count it is finite. The states are carried from call to call. */
-HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, double u[], double x[], size_t n);
+HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, hsep_real u[], hsep_real x[], size_t n);
 
 #endif

@@ -19,7 +19,7 @@
 #define HSEP_UNCERTAINTY_FLOOR 1e-06
 
 /* Variance, m2, that no divisor is below. */
-#define HSEP_UNCERTAINTY_LEAST_VARIANCE 1e-100
+#define HSEP_UNCERTAINTY_LEAST_VARIANCE HSEP_TINY(1e-100)
 
 /* Largest square of an error, relative to its variance, that counts; least change of a component in one window. */
 #define HSEP_UNCERTAINTY_OUTLYING 16.0
@@ -71,16 +71,16 @@
 #define HSEP_EXPERT_RESOLUTION 1e-13
 
 /* Magnitude of a feature that counts as 0. */
-#define HSEP_EXPERT_LEAST 1e-150
+#define HSEP_EXPERT_LEAST HSEP_TINY(1e-150)
 
 /* Mean square, m2, that counts as 0. */
-#define HSEP_STACK_LEAST_SQUARE 1e-300
+#define HSEP_STACK_LEAST_SQUARE HSEP_TINY(1e-300)
 
 /* Lags of a row that may stand for samples without a measurement. */
 #define HSEP_TRUSTED_BRIDGED 3
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
-#define HSEP_DISTURBANCES_LEAST_VELOCITY 1e-200
+#define HSEP_DISTURBANCES_LEAST_VELOCITY HSEP_TINY(1e-200)
 
 /* Largest order of a difference of x_pb: velocity, acceleration and jerk. */
 #define HSEP_DISTURBANCES_DIFFERENCES 3

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Parts in which the one that can be trusted predicts a window: its variances are dear. */
-static const uint64_t residual_parts = 25;
+static const hsep_word residual_parts = 25;
 
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
 {
@@ -33,25 +33,25 @@ static const hsep_trusted *residual_trusted(const hsep_residual_model *self)
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
+static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
-    double end = HSEP_WORDS(hsep_residual_model);
+    hsep_real end = HSEP_WORDS(hsep_residual_model);
     self->Np = parameters->settings->Np;
     self->late = parameters->settings->measurement_delay;
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
     self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
     self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_residual_size(const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters)
 {
     return residual_lay_out(&(hsep_residual_model){0}, parameters);
 }
 
-HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, double start)
+HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     (void)residual_lay_out(self, parameters);
@@ -73,24 +73,24 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
 }
 
-HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self)
+HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self)
 {
     return self->trusted ? HSEP_N_EVIDENCE : 1;
 }
 
-HSEP_API uint64_t hsep_residual_n_features(hsep_residual_model *self, uint64_t factor)
+HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor)
 {
     return self->trusted ? hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor)->n
                          : hsep_paper_regression(hsep_residual_paper(self))->n;
 }
 
-HSEP_API double *hsep_residual_factor_row(hsep_residual_model *self, uint64_t factor)
+HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor)
 {
     return self->trusted ? hsep_gram_row(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor))
                          : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
 }
 
-HSEP_API int hsep_residual_load(hsep_residual_model *self, uint64_t factor, uint64_t i, uint64_t n_samples)
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_word n_samples)
 {
     if (self->trusted) {
         return hsep_gram_load(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor), i);
@@ -100,12 +100,12 @@ HSEP_API int hsep_residual_load(hsep_residual_model *self, uint64_t factor, uint
     return hsep_regression_load(regression, i);
 }
 
-HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self)
+HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self)
 {
     return self->trusted ? hsep_trusted_n_learned(hsep_residual_trusted(self)) : 0;
 }
 
-HSEP_API double *hsep_residual_learned(hsep_residual_model *self, uint64_t i)
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self, hsep_word i)
 {
     return self->trusted ? hsep_trusted_learned(hsep_residual_trusted(self), i) : NULL;
 }
@@ -132,15 +132,15 @@ HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
     }
 }
 
-HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self)
+HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self)
 {
-    const uint64_t part = (self->Np - 1) / residual_parts + 1;
+    const hsep_word part = (self->Np - 1) / residual_parts + 1;
     /* Two at least, because the spread of errors follows from differences. */
     return self->trusted ? (part > 2 ? part : 2) : self->Np;
 }
 
 HSEP_API void hsep_residual_predict(
-    hsep_residual_model *self, const hsep_residual_window *window, uint64_t first, uint64_t last)
+    hsep_residual_model *self, const hsep_residual_window *window, hsep_word first, hsep_word last)
 {
     if (!self->trusted) {
         hsep_paper_predict(hsep_residual_paper(self), window, first, last);
@@ -177,7 +177,7 @@ HSEP_API void hsep_residual_take_in(
 
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window)
 {
-    const uint64_t late = self->late;
+    const hsep_word late = self->late;
     if (self->trusted && (self->learning || self->planned)) {
         hsep_trusted_learn(
             hsep_residual_trusted(self), window->command + late, window->x_pb + late, window->e + late,
@@ -186,13 +186,13 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
     return self->learning != 0;
 }
 
-HSEP_API const double *hsep_residual_accepted(const hsep_residual_model *self)
+HSEP_API const hsep_real *hsep_residual_accepted(const hsep_residual_model *self)
 {
     const hsep_trusted *trusted = residual_trusted(self);
     return trusted != NULL ? hsep_at_const(trusted, trusted->accepted) : NULL;
 }
 
-HSEP_API uint64_t hsep_residual_n_rejected(const hsep_residual_model *self)
+HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self)
 {
     const hsep_trusted *trusted = residual_trusted(self);
     return trusted != NULL ? trusted->n_rejected : 0;

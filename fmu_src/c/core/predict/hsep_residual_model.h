@@ -18,32 +18,33 @@
 #include "hsep_trusted.h"
 #include "hsep_uncertainty.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
     const hsep_predictor_settings *settings;
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
-    uint64_t n_modes;
-    uint64_t preview; /* samples from the command to the drive, >= Np */
-    int planned;      /* whether a compensator decides the commands */
+    hsep_word n_modes;
+    hsep_word preview; /* samples from the command to the drive, >= Np */
+    int planned;       /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 
 typedef struct {
-    uint64_t Np, late, n; /* samples of a window, those not measured yet before it, both together */
-    uint64_t planned;     /* whether a compensator decides the commands */
-    uint64_t learning;    /* whether the window is learned */
-    /* Offsets in doubles from the beginning of the struct; one of them is 0 */
-    uint64_t paper, trusted;
+    hsep_word Np, late, n; /* samples of a window, those not measured yet before it, both together */
+    hsep_word planned;     /* whether a compensator decides the commands */
+    hsep_word learning;    /* whether the window is learned */
+    /* Offsets in words from the beginning of the struct; one of them is 0 */
+    hsep_word paper, trusted;
 } hsep_residual_model;
 
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_residual_size(const hsep_residual_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters);
 
 /* Fill the block, at rest at start, m, with nothing learned. */
-HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, double start);
+HSEP_API void hsep_residual_init(
+    hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_residual_init with these parameters began. */
 HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters);
@@ -57,17 +58,17 @@ HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_res
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
  * one of them. The first one is that of the physics model's residual. */
-HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self);
-HSEP_API uint64_t hsep_residual_n_features(hsep_residual_model *self, uint64_t factor);
+HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self);
+HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor);
 
 /* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_samples: rows that the
  * factor is from. */
-HSEP_API double *hsep_residual_factor_row(hsep_residual_model *self, uint64_t factor);
-HSEP_API int hsep_residual_load(hsep_residual_model *self, uint64_t factor, uint64_t i, uint64_t n_samples);
+HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor);
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_word n_samples);
 
 /* Numbers learned besides them and whether they are in range; those of hsep_trusted_learned, none without. */
-HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self);
-HSEP_API double *hsep_residual_learned(hsep_residual_model *self, uint64_t i);
+HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self);
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self, hsep_word i);
 HSEP_API int hsep_residual_sound(hsep_residual_model *self);
 
 /* Begin another run with what was learned. */
@@ -80,11 +81,11 @@ HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
 /* Samples that are predicted in one go. Constant cost. */
-HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self);
+HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self);
 
 /* Predict the residuals of samples first ... last - 1; first is 0, or where the last call ended. */
 HSEP_API void hsep_residual_predict(
-    hsep_residual_model *self, const hsep_residual_window *window, uint64_t first, uint64_t last);
+    hsep_residual_model *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
 
 /* Add to the signals of a prediction's errors what the model itself tells. */
 HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals);
@@ -98,9 +99,9 @@ HSEP_API void hsep_residual_take_in(
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window);
 
 /* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
-HSEP_API const double *hsep_residual_accepted(const hsep_residual_model *self);
+HSEP_API const hsep_real *hsep_residual_accepted(const hsep_residual_model *self);
 
 /* Measurements of this run that were missing or not plausible. */
-HSEP_API uint64_t hsep_residual_n_rejected(const hsep_residual_model *self);
+HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self);
 
 #endif

@@ -6,21 +6,21 @@
 #ifndef HSEP_RESIDUAL_WINDOW_H
 #define HSEP_RESIDUAL_WINDOW_H
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    const double *command; /* (n,) m, commands relative to the start */
-    const double *x_pb;    /* (n + q,) m, physics-based prediction, relative to the start */
-    double *e;             /* (n + p,) m, residuals as measured; alone the predictor keeps e_h at the same place */
-    double *e_h;           /* (n + p,) m, residuals as predicted, behind them the measured ones */
+    const hsep_real *command; /* (n,) m, commands relative to the start */
+    const hsep_real *x_pb;    /* (n + q,) m, physics-based prediction, relative to the start */
+    hsep_real *e;             /* (n + p,) m, residuals as measured; alone the predictor keeps e_h at the same place */
+    hsep_real *e_h;           /* (n + p,) m, residuals as predicted, behind them the measured ones */
 } hsep_residual_window;
 
 /* A sample of it whose measurement came. */
 typedef struct {
-    uint64_t i;          /* sample of the window, 0 ... Np - 1 */
-    double relative;     /* m, measured position relative to the start */
-    const double *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
-    int settled;         /* whether the window's commands and x_pb will not change any more */
+    hsep_word i;            /* sample of the window, 0 ... Np - 1 */
+    hsep_real relative;     /* m, measured position relative to the start */
+    const hsep_real *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
+    int settled;            /* whether the window's commands and x_pb will not change any more */
 } hsep_residual_sample;
 
 #endif

@@ -1,62 +1,62 @@
 /* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are uint64_t. */
+ * Whole numbers, truth values and choices are hsep_word. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* clang-format off */
 #define HSEP_PREDICTOR_SETTINGS(SETTING) \
     /* samples in a look-ahead window */ \
-    SETTING(uint64_t, Np) \
+    SETTING(hsep_word, Np) \
     /* number of past residuals e_pb (measured minus physics-based position) among the features */ \
-    SETTING(uint64_t, p) \
+    SETTING(hsep_word, p) \
     /* number of past physics-based predictions x_pb among the features */ \
-    SETTING(uint64_t, q) \
+    SETTING(hsep_word, q) \
     /* ridge penalty on the weights of the residual model, m2 */ \
-    SETTING(double, lambda) \
+    SETTING(hsep_real, lambda) \
     /* sampling interval of command and measurement, s */ \
-    SETTING(double, T_s) \
+    SETTING(hsep_real, T_s) \
     /* warm-up: until then the prediction x_h is the physics-based x_pb, while learning goes on, s */ \
-    SETTING(double, t_init) \
+    SETTING(hsep_real, t_init) \
     /* how the command x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
-    SETTING(uint64_t, input_hold) \
+    SETTING(hsep_word, input_hold) \
     /* whole samples by which the measured position is late */ \
-    SETTING(uint64_t, measurement_delay) \
+    SETTING(hsep_word, measurement_delay) \
     /* whole samples of dead time in the physics model */ \
-    SETTING(uint64_t, dead_time)
+    SETTING(hsep_word, dead_time)
 
 #define HSEP_TRUST_SETTINGS(SETTING) \
     /* whether the residual model is trusted only as far as its variance allows; false: the paper's */ \
-    SETTING(uint64_t, trust) \
+    SETTING(hsep_word, trust) \
     /* prior standard deviation of a feature's effect, with trust; 0: from the residuals, m */ \
-    SETTING(double, effect) \
+    SETTING(hsep_real, effect) \
     /* standard deviation of the measurement noise, with trust; 0: estimated, m */ \
-    SETTING(double, noise_std) \
+    SETTING(hsep_real, noise_std) \
     /* time after which samples have lost 63 % of their weight, with trust; 0: never, s */ \
-    SETTING(double, forgetting) \
+    SETTING(hsep_real, forgetting) \
     /* period of a disturbance that repeats with the position (cogging, screw pitch), with trust; 0: none, m */ \
-    SETTING(double, period)
+    SETTING(hsep_real, period)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
     /* samples of the command that are planned ahead, at least Np + 4 spacing + 3 */ \
-    SETTING(uint64_t, preview) \
+    SETTING(hsep_word, preview) \
     /* samples between the knots of the spline that changes the command, a divisor of Np */ \
-    SETTING(uint64_t, spacing) \
+    SETTING(hsep_word, spacing) \
     /* weight of the jerk of the command's change against the tracking error */ \
-    SETTING(double, jerk_weight) \
+    SETTING(hsep_real, jerk_weight) \
     /* largest velocity of the modified command, m/s */ \
-    SETTING(double, v_max) \
+    SETTING(hsep_real, v_max) \
     /* largest acceleration of the modified command, m/s2 */ \
-    SETTING(double, a_max) \
+    SETTING(hsep_real, a_max) \
     /* largest jerk of the modified command, m/s3 */ \
-    SETTING(double, j_max) \
+    SETTING(hsep_real, j_max) \
     /* largest change of the command, m */ \
-    SETTING(double, change_max) \
+    SETTING(hsep_real, change_max) \
     /* whether the modified command never turns while the commanded position moves */ \
-    SETTING(uint64_t, no_reversal) \
+    SETTING(hsep_word, no_reversal) \
     /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \
-    SETTING(uint64_t, compensate)
+    SETTING(hsep_word, compensate)
 
 /* clang-format on */
 

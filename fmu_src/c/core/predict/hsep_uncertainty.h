@@ -16,60 +16,60 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_N_COMPONENTS 3
 #define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 
 typedef struct {
-    uint64_t Np;
-    double theta[HSEP_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
-    double evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
-    double factor;                      /* c in the middle of a window */
-    double ratio;                       /* c at its end relative to that at its beginning */
-    double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
-    uint64_t n;                         /* samples that are predicted */
-    double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t e_h;        /* (n,) m, residual of the window as published */
-    uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first, which is 1 */
-    uint64_t std;        /* (n,) m, standard deviation of the error */
+    hsep_word Np;
+    hsep_real theta[HSEP_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
+    hsep_real evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
+    hsep_real factor;                      /* c in the middle of a window */
+    hsep_real ratio;                       /* c at its end relative to that at its beginning */
+    hsep_real recent;                      /* m2, recent mean square of the residual; 0 before the first window */
+    hsep_word n;                           /* samples that are predicted */
+    hsep_real felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word e_h;        /* (n,) m, residual of the window as published */
+    hsep_word components; /* (n, HSEP_N_COMPONENTS) m2 but for the first, which is 1 */
+    hsep_word std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
 HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n);
 
 /* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
  * given standard deviation, m, or 0. */
-HSEP_API double hsep_uncertainty_first_variance(double lambda, double noise_std);
+HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real noise_std);
 
 /* Fill the block. variance: that first one. */
-HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance);
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_word n, hsep_real variance);
 
 /* Whether a block, in any alignment, is one that hsep_uncertainty_init with these parameters began. */
-HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n);
+HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n);
 
 /* The numbers learned, (HSEP_N_UNCERTAINTY,), and whether they are in range. */
-HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self);
+HSEP_API hsep_real *hsep_uncertainty_learned(hsep_uncertainty *self);
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 
 /* Signals that tell of a prediction's error. */
 typedef struct {
-    const double *x_pb;     /* (n,) m, physics-based prediction */
-    const double *e_h;      /* (n,) m, predicted residual */
-    uint64_t n_physics;     /* leading samples where it is not published */
-    const double *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
+    const hsep_real *x_pb;     /* (n,) m, physics-based prediction */
+    const hsep_real *e_h;      /* (n,) m, predicted residual */
+    hsep_word n_physics;       /* leading samples where it is not published */
+    const hsep_real *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
 } hsep_uncertainty_signals;
 
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at
  * least two, or n, as differences are taken. */
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t first, uint64_t last);
+    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word first, hsep_word last);
 
 /* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
  * all of them. */
-HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], const double accepted[]);
+HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[], const hsep_real accepted[]);
 
 #endif

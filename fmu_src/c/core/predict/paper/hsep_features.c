@@ -1,6 +1,6 @@
 #include "hsep_features.h"
 
-HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q)
+HSEP_API void hsep_features_lay_out(hsep_features *self, hsep_word p, hsep_word q)
 {
     self->p = p;
     self->q = q;

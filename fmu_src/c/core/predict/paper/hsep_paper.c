@@ -8,17 +8,17 @@ HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self)
 }
 
 /* Set what follows from the settings; return the bytes of the block. */
-static double paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
+static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
 {
-    double end = HSEP_WORDS(hsep_paper);
+    hsep_real end = HSEP_WORDS(hsep_paper);
     hsep_features_lay_out(&self->features, settings->p, settings->q);
     self->n = settings->Np + settings->measurement_delay;
-    self->weights = hsep_take(&end, (double)self->features.n);
+    self->weights = hsep_take(&end, (hsep_real)self->features.n);
     self->regression = hsep_take_block(&end, hsep_regression_size(self->features.n));
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_paper_size(const hsep_predictor_settings *settings)
+HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings)
 {
     return paper_lay_out(&(hsep_paper){0}, settings);
 }
@@ -42,7 +42,7 @@ HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias)
 {
     const hsep_features *f = &self->features;
-    const double *w = hsep_at_const(self, self->weights);
+    const hsep_real *w = hsep_at_const(self, self->weights);
     return (hsep_recursion){
         .w_x = w + f->x, .w_e = w + f->e, .p = f->p, .q = f->q, .bias = with_bias ? w[HSEP_BIAS] : 0.0};
 }
@@ -50,10 +50,10 @@ HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bi
 HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample)
 {
     const hsep_features *f = &self->features;
-    double *row = hsep_regression_row(hsep_paper_regression(self)); /* phi(k), its target e_pb(k) behind it */
+    hsep_real *row = hsep_regression_row(hsep_paper_regression(self)); /* phi(k), its target e_pb(k) behind it */
     row[HSEP_BIAS] = 1.0;
-    memcpy(row + f->x, sample->x, (size_t)(f->q + 1) * sizeof(double));
-    memcpy(row + f->e, sample->e + 1, (size_t)f->p * sizeof(double));
+    memcpy(row + f->x, sample->x, (size_t)(f->q + 1) * sizeof(hsep_real));
+    memcpy(row + f->e, sample->e + 1, (size_t)f->p * sizeof(hsep_real));
     row[f->n] = sample->e[0];
     hsep_regression_fold(hsep_paper_regression(self));
 }
@@ -64,7 +64,7 @@ HSEP_API void hsep_paper_begin(hsep_paper *self)
 }
 
 HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, uint64_t first, uint64_t last)
+    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last)
 {
     const hsep_recursion recursion = hsep_paper_recursion(self, 1);
     hsep_recursion_run(&recursion, window->x_pb, window->e_h, self->n, first, last); /* Eq. (4) */

@@ -1,6 +1,6 @@
 /* The paper's residual model: a ridge regression of e_pb on the features phi, eqs. (4) to (6).
  *
- * Every sample is a row, folded when it is measured. Memory is one block: the struct, then its arrays as doubles; no
+ * Every sample is a row, folded when it is measured. Memory is one block: the struct, then its arrays of numbers; no
  * pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_PAPER_H
@@ -14,20 +14,20 @@
 #include "hsep_residual_window.h"
 #include "hsep_settings.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    uint64_t n; /* samples of a prediction, with those that are late */
+    hsep_word n; /* samples of a prediction, with those that are late */
     hsep_features features;
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t weights; /* (n,) w */
-    uint64_t regression;
+    /* Offsets in words from the beginning of the struct */
+    hsep_word weights; /* (n,) w */
+    hsep_word regression;
 } hsep_paper;
 
 HSEP_ASSERT_WORDS(hsep_paper, 8);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_paper_size(const hsep_predictor_settings *settings);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
 
 /* Fill the block with nothing learned. */
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
@@ -45,7 +45,7 @@ HSEP_API void hsep_paper_begin(hsep_paper *self);
 
 /* Predict the residuals of samples first ... last - 1; eq. (4). */
 HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, uint64_t first, uint64_t last);
+    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
 
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias);

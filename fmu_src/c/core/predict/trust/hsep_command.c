@@ -2,41 +2,41 @@
 
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n)
+static hsep_real command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n)
 {
-    double end = HSEP_WORDS(hsep_command);
+    hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
     self->p = HSEP_TRUST_LAGS_OF_COMMAND;
     self->count = self->p + 2;
     self->n_before = settings->dead_time + self->p + 1;
-    self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)self->p + 1.0);
-    self->rows = hsep_take(&end, (double)n * (double)self->count);
-    self->shares = hsep_take(&end, (double)self->count);
-    return end * sizeof(double);
+    self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)settings->dead_time + (hsep_real)self->p + 1.0);
+    self->rows = hsep_take(&end, (hsep_real)n * (hsep_real)self->count);
+    self->shares = hsep_take(&end, (hsep_real)self->count);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n)
+HSEP_API hsep_real hsep_command_size(const hsep_predictor_settings *settings, hsep_word n)
 {
     return command_lay_out(&(hsep_command){0}, settings, n);
 }
 
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n)
+HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n)
 {
     memset(self, 0, (size_t)hsep_command_size(settings, n));
     (void)command_lay_out(self, settings, n);
-    for (uint64_t i = 0; i < self->count; i++) {
-        const double age = i > 0 ? (double)(i - 1) / (double)self->p : 0.0;
-        hsep_at(self, self->shares)[i] = sqrt(pow(HSEP_TRUST_LAST_LAG, age));
+    for (hsep_word i = 0; i < self->count; i++) {
+        const hsep_real age = i > 0 ? (hsep_real)(i - 1) / (hsep_real)self->p : 0.0;
+        hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, age));
     }
 }
 
-HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n)
+HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, hsep_word n)
 {
     hsep_command got;
     memcpy(&got, block, sizeof got);
@@ -44,50 +44,50 @@ HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings
     return memcmp(&got, block, sizeof got) == 0;
 }
 
-HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature)
+HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature)
 {
     return hsep_at_const(self, self->shares)[feature];
 }
 
-HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m)
+HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m)
 {
     hsep_command_take_in(self, x_d, m);
     hsep_command_fill(self, m, 0, m);
 }
 
-HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m)
+HSEP_API void hsep_command_take_in(hsep_command *self, const hsep_real x_d[], hsep_word m)
 {
-    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(double));
+    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last)
+HSEP_API void hsep_command_fill(hsep_command *self, hsep_word m, hsep_word first, hsep_word last)
 {
-    const double *commands = hsep_at(self, self->commands) + (self->n - m);
-    double *row = hsep_at(self, self->rows) + first * self->count;
-    for (uint64_t k = first; k < last; k++, row += self->count) {
-        const double *late = commands + (m - 1 - k) + self->dead_time;
+    const hsep_real *commands = hsep_at(self, self->commands) + (self->n - m);
+    hsep_real *row = hsep_at(self, self->rows) + first * self->count;
+    for (hsep_word k = first; k < last; k++, row += self->count) {
+        const hsep_real *late = commands + (m - 1 - k) + self->dead_time;
         row[0] = 1.0;
-        for (uint64_t i = 1; i < self->count; i++) {
+        for (hsep_word i = 1; i < self->count; i++) {
             row[i] = late[i - 1] - late[i];
         }
     }
 }
 
-HSEP_API const double *hsep_command_late(const hsep_command *self, uint64_t m)
+HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_word m)
 {
     return hsep_at_const(self, self->commands) + (self->n - m) + self->dead_time;
 }
 
-HSEP_API void hsep_command_end(hsep_command *self, uint64_t m)
+HSEP_API void hsep_command_end(hsep_command *self, hsep_word m)
 {
-    double *before = hsep_at(self, self->commands) + self->n;
-    memmove(before, before - m, (size_t)self->n_before * sizeof(double));
+    hsep_real *before = hsep_at(self, self->commands) + self->n;
+    memmove(before, before - m, (size_t)self->n_before * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_command_begin(hsep_command *self, double first, double second)
+HSEP_API void hsep_command_begin(hsep_command *self, hsep_real first, hsep_real second)
 {
-    double *before = hsep_at(self, self->commands) + self->n;
-    for (uint64_t i = 0; i < self->n_before; i++) {
-        before[i] = first - (second - first) * (double)(i + 1);
+    hsep_real *before = hsep_at(self, self->commands) + self->n;
+    for (hsep_word i = 0; i < self->n_before; i++) {
+        before[i] = first - (second - first) * (hsep_real)(i + 1);
     }
 }

@@ -13,50 +13,50 @@
 #include "hsep_layout.h"
 #include "hsep_settings.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    uint64_t n;         /* samples of a prediction */
-    uint64_t dead_time; /* samples */
-    uint64_t p;         /* lags, and increments after the first, whatever those of the settings are */
-    uint64_t count;     /* features without lags, p + 2 */
-    uint64_t n_before;  /* commands before a window that its features need */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
+    hsep_word n;         /* samples of a prediction */
+    hsep_word dead_time; /* samples */
+    hsep_word p;         /* lags, and increments after the first, whatever those of the settings are */
+    hsep_word count;     /* features without lags, p + 2 */
+    hsep_word n_before;  /* commands before a window that its features need */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
-    uint64_t rows;     /* (n, count) features, sample after sample */
-    uint64_t shares;   /* (count,) effects that they may have, relative to the largest */
+    hsep_word rows;     /* (n, count) features, sample after sample */
+    hsep_word shares;   /* (count,) effects that they may have, relative to the largest */
 } hsep_command;
 
 HSEP_ASSERT_WORDS(hsep_command, 8);
 
-/* Bytes of the block, counted in double so that no size can overflow; n: samples of a prediction. */
-HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n);
+/* Bytes of the block, counted as a number so that no size can overflow; n: samples of a prediction. */
+HSEP_API hsep_real hsep_command_size(const hsep_predictor_settings *settings, hsep_word n);
 
 /* Fill the block, at rest. */
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n);
+HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n);
 
 /* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
-HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n);
+HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, hsep_word n);
 
 /* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
-HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature);
+HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
  * others. */
-HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m);
+HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m);
 
 /* The same in parts: begin, then fill the rows of samples first ... last - 1. */
-HSEP_API void hsep_command_take_in(hsep_command *self, const double x_d[], uint64_t m);
-HSEP_API void hsep_command_fill(hsep_command *self, uint64_t m, uint64_t first, uint64_t last);
+HSEP_API void hsep_command_take_in(hsep_command *self, const hsep_real x_d[], hsep_word m);
+HSEP_API void hsep_command_fill(hsep_command *self, hsep_word m, hsep_word first, hsep_word last);
 
 /* Of these, the commands as many samples ago as the dead time has, (m,), m. */
-HSEP_API const double *hsep_command_late(const hsep_command *self, uint64_t m);
+HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_word m);
 
 /* End the window, which are the m samples taken in last. */
-HSEP_API void hsep_command_end(hsep_command *self, uint64_t m);
+HSEP_API void hsep_command_end(hsep_command *self, hsep_word m);
 
 /* Begin with the motion that goes on with the commands first and second, m, before the window. */
-HSEP_API void hsep_command_begin(hsep_command *self, double first, double second);
+HSEP_API void hsep_command_begin(hsep_command *self, hsep_real first, hsep_real second);
 
 #endif

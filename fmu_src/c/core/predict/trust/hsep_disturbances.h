@@ -16,7 +16,7 @@
 #include "hsep_physics.h"
 #include "hsep_settings.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_DISTURBANCES_FRICTION 6 /* disturbances of friction, the first ones, */
 #define HSEP_DISTURBANCES_STIFFNESS 6
@@ -27,71 +27,73 @@
 
 /* What was before a sample. */
 typedef struct {
-    double x_d;                             /* m, last command */
-    double x_pb[HSEP_DISTURBANCES_PAST];    /* m, last predictions, newest first */
-    double filtered[HSEP_DISTURBANCES_MAX]; /* last filtered disturbances */
+    hsep_real x_d;                             /* m, last command */
+    hsep_real x_pb[HSEP_DISTURBANCES_PAST];    /* m, last predictions, newest first */
+    hsep_real filtered[HSEP_DISTURBANCES_MAX]; /* last filtered disturbances */
 } hsep_disturbed;
 
 typedef struct {
-    uint64_t n_differences; /* of x_pb, at most 3 */
-    uint64_t count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
-    uint64_t n;             /* features */
-    double period;          /* m, of a disturbance that repeats with the position; 0: none */
-    double origin;          /* m, the start: what repeats does not know of it */
-    uint64_t of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb */
-    double T_s;             /* s */
-    hsep_disturbed before;  /* the window that comes next */
-    hsep_disturbed after;   /* the samples that were tried last */
-    uint64_t filter_words;  /* doubles of a filter */
-    uint64_t filters;       /* offset of the hsep_physics of each disturbance before the window, */
-    uint64_t tried;         /* and after the samples that were tried last */
+    hsep_word n_differences; /* of x_pb, at most 3 */
+    hsep_word count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
+    hsep_word n;             /* features */
+    hsep_real period;        /* m, of a disturbance that repeats with the position; 0: none */
+    hsep_real origin;        /* m, the start: what repeats does not know of it */
+    hsep_word of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb */
+    hsep_real T_s;           /* s */
+    hsep_disturbed before;   /* the window that comes next */
+    hsep_disturbed after;    /* the samples that were tried last */
+    hsep_word filter_words;  /* words of a filter */
+    hsep_word filters;       /* offset of the hsep_physics of each disturbance before the window, */
+    hsep_word tried;         /* and after the samples that were tried last */
 } hsep_disturbances;
 
 HSEP_ASSERT_WORDS(hsep_disturbed, 15);
 HSEP_ASSERT_WORDS(hsep_disturbances, 40);
 
 /* Disturbances with a period, or without one, 0. */
-HSEP_API uint64_t hsep_disturbances_count(double period);
+HSEP_API hsep_word hsep_disturbances_count(hsep_real period);
 
 /* Features for the largest lag q, and a period or none, 0. */
-HSEP_API uint64_t hsep_disturbances_n(uint64_t q, double period);
+HSEP_API hsep_word hsep_disturbances_n(hsep_word q, hsep_real period);
 
 /* Effect that a feature may have, relative to the largest. */
-HSEP_API double hsep_disturbances_share(const hsep_disturbances *self, uint64_t feature);
+HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_disturbances_size(const hsep_predictor_settings *settings, double period, uint64_t n_modes);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_disturbances_size(const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes);
 
 /* Fill the block, at rest at start, m. modes: (n_modes,); of_motion: whether the damping is that of the position's own
  * velocity: behind a compensator x_pb turns with every change of the command, and is far from the motion. */
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, double period, const hsep_mode modes[],
-    uint64_t n_modes, int of_motion, double start);
+    hsep_disturbances *self, const hsep_predictor_settings *settings, hsep_real period, const hsep_mode modes[],
+    hsep_word n_modes, int of_motion, hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_disturbances_init with these parameters began. */
 HSEP_API int hsep_disturbances_valid(
-    const void *block, const hsep_predictor_settings *settings, double period, uint64_t n_modes, int of_motion);
+    const void *block, const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes, int of_motion);
 
 /* Begin again, at rest but for a motion that went on as the n samples begin, (n,) m each. */
-HSEP_API void hsep_disturbances_restart(hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n);
+HSEP_API void hsep_disturbances_restart(
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n);
 
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
-HSEP_API double hsep_disturbances_peak_velocity(const hsep_disturbances *self, const double x_d[], uint64_t n);
+HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_word n);
 
 /* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for those that
  * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6
  * tanh and 9 (6 n_modes) multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(
-    hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n, double velocity_scale, double rows[]);
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n, hsep_real velocity_scale,
+    hsep_real rows[]);
 
 /* Fill stiffness, damping and what repeats of these samples in the rows, which act at the position x, (n,), m; may be
  * tried again. Those of samples first ... last - 1 alone, as x becomes known; first is 0, or where the last call
  * ended. */
 HSEP_API void hsep_disturbances_motion(
-    hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[]);
+    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_real rows[]);
 HSEP_API void hsep_disturbances_motion_of(
-    hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, uint64_t first, uint64_t last,
-    double rows[]);
+    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
+    hsep_real rows[]);
 
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
@@ -101,7 +103,7 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
  * repeats with the position, 1/m. reach: half of the change of velocity that the friction's slope is taken over,
  * relative to the velocity scale; 0: the tangent. */
 HSEP_API void hsep_disturbances_slopes(
-    const hsep_disturbances *self, const double x_d[], const double x_pb[], const double x[], uint64_t n,
-    double velocity_scale, double reach, double slopes[]);
+    const hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real x[], hsep_word n,
+    hsep_real velocity_scale, hsep_real reach, hsep_real slopes[]);
 
 #endif

@@ -15,40 +15,40 @@
 #include "hsep_gram.h"
 #include "hsep_layout.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* Size of the residuals so far. */
 typedef struct {
-    double largest_square; /* m2, largest mean square of a window */
-    double largest;        /* m, largest magnitude */
+    hsep_real largest_square; /* m2, largest mean square of a window */
+    hsep_real largest;        /* m, largest magnitude */
 } hsep_residual_scale;
 
 typedef struct {
-    uint64_t Np, n;       /* samples of a window, and of a prediction, n >= Np */
-    uint64_t n_static, p; /* features without lags, lags */
+    hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
+    hsep_word n_static, p; /* features without lags, lags */
 } hsep_expert_shape;
 
 typedef struct {
-    uint64_t Np, n, n_static, p;
-    double noise_variance; /* m2, of a row about the model; 0 until it is known */
-    double correlation;    /* rows that count as one: errors of neighbouring rows are alike */
-    double variance;       /* m2, of the noise that the penalties come from */
-    double rows_variance;  /* m2, mean square of the rows about the weights */
-    double largest_square; /* m2, largest mean square of a window, and */
-    double bound;          /* m, bound on the prediction, as it was made */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t lag_scales;   /* (p,) prior standard deviations of the weights of the lags */
-    uint64_t penalties;    /* (n_static + p,) of the weights */
-    uint64_t weights;      /* (n_static + p,) */
-    uint64_t run;          /* (n + p,) m, the recursion, behind it measured residuals */
-    uint64_t unshrunk;     /* (n + p,) m, the same within bounds */
-    uint64_t e_h;          /* (n,) m, shrunk by its variance, and bounded */
-    uint64_t kept;         /* (n,) what the variance leaves of it */
-    uint64_t response;     /* (n + p,) the recursion's impulse response, behind it 0 */
-    uint64_t squares;      /* (n,) its squares, oldest first */
-    uint64_t variances;    /* (n,) m2, of the rows */
-    uint64_t factor;       /* triangle of n_static + p + 1 rows: that of the solution */
-    uint64_t side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
+    hsep_word Np, n, n_static, p;
+    hsep_real noise_variance; /* m2, of a row about the model; 0 until it is known */
+    hsep_real correlation;    /* rows that count as one: errors of neighbouring rows are alike */
+    hsep_real variance;       /* m2, of the noise that the penalties come from */
+    hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
+    hsep_real largest_square; /* m2, largest mean square of a window, and */
+    hsep_real bound;          /* m, bound on the prediction, as it was made */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word lag_scales;   /* (p,) prior standard deviations of the weights of the lags */
+    hsep_word penalties;    /* (n_static + p,) of the weights */
+    hsep_word weights;      /* (n_static + p,) */
+    hsep_word run;          /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_word unshrunk;     /* (n + p,) m, the same within bounds */
+    hsep_word e_h;          /* (n,) m, shrunk by its variance, and bounded */
+    hsep_word kept;         /* (n,) what the variance leaves of it */
+    hsep_word response;     /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_word squares;      /* (n,) its squares, oldest first */
+    hsep_word variances;    /* (n,) m2, of the rows */
+    hsep_word factor;       /* triangle of n_static + p + 1 rows: that of the solution */
+    hsep_word side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
@@ -57,10 +57,10 @@ HSEP_ASSERT_WORDS(hsep_expert, 22);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
 HSEP_API void hsep_residual_scale_follow(
-    hsep_residual_scale *self, const double residuals[], const double accepted[], uint64_t n, double count);
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_expert_size(const hsep_expert_shape *shape);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
 
 /* Fill the block, with nothing learned. */
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
@@ -70,12 +70,12 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 
 /* What the weights are solved with. */
 typedef struct {
-    const hsep_gram *gram;  /* of rows whose first features are those of the expert, */
-    const hsep_gram *other; /* more of them, settled, or NULL, */
-    double weight;          /* and the weight of these */
-    double n_rows;          /* and their number, weighted */
-    const double *scales;   /* (n_static,) prior standard deviations of the weights without lags */
-    double first, least;    /* m2, variance of the noise while it is not known, and the least one */
+    const hsep_gram *gram;   /* of rows whose first features are those of the expert, */
+    const hsep_gram *other;  /* more of them, settled, or NULL, */
+    hsep_real weight;        /* and the weight of these */
+    hsep_real n_rows;        /* and their number, weighted */
+    const hsep_real *scales; /* (n_static,) prior standard deviations of the weights without lags */
+    hsep_real first, least;  /* m2, variance of the noise while it is not known, and the least one */
 } hsep_expert_evidence;
 
 /* Solve for the weights from all rows. Cost: that of hsep_gram_solve. */
@@ -86,22 +86,24 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *e
  * unknown; 0: what the variance leaves stays that of the last prediction. Cost: n (n_static + p) multiply-adds, and
  * that of hsep_expert_vary. */
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const double rows[], const double past[], double largest_square, double bound, uint64_t varied);
+    hsep_expert *self, const hsep_real rows[], const hsep_real past[], hsep_real largest_square, hsep_real bound,
+    hsep_word varied);
 
 /* Predict them part by part: begin, then go on with samples first ... last - 1, first being 0, or where the last call
  * ended; the result is the same as with varied = n. */
-HSEP_API void hsep_expert_begin(hsep_expert *self, const double past[], double largest_square, double bound);
-HSEP_API void hsep_expert_go_on(hsep_expert *self, const double rows[], uint64_t first, uint64_t last);
+HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
+HSEP_API void hsep_expert_go_on(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
 /* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
  * them by it. Cost for each: that of hsep_gram_leverages, four at a time, and last multiply-adds. */
-HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last);
+HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
 /* Estimate noise and correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1
  * where it counts, which one does at least; given: m2, variance of the noise, if it is known; else 0. */
-HSEP_API void hsep_expert_judge(hsep_expert *self, const double measured[], const double accepted[], double given);
+HSEP_API void hsep_expert_judge(
+    hsep_expert *self, const hsep_real measured[], const hsep_real accepted[], hsep_real given);
 
 /* What shrinking and bounds leave of the recursion at place j. */
-HSEP_API double hsep_expert_shrink(const hsep_expert *self, uint64_t j);
+HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j);
 
 #endif

@@ -14,22 +14,22 @@ static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HS
 static const hsep_expert_place linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
 
 /* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. of_command: which one. */
-static double linearised_weight(const hsep_trusted *model, hsep_expert_place expert, int of_command)
+static hsep_real linearised_weight(const hsep_trusted *model, hsep_expert_place expert, int of_command)
 {
     const int of_kind = hsep_trusted_is_of_command(model, expert) == of_command;
     return model->predicted[expert] && of_kind ? model->stack.weights[expert] : 0.0;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
+static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
 {
-    const double n = (double)parameters->n, preview = n - (double)parameters->settings->measurement_delay;
-    const double filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    double end = HSEP_WORDS(hsep_linearised);
+    const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)parameters->settings->measurement_delay;
+    const hsep_real filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    hsep_real end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->n;
     self->preview = self->n - parameters->settings->measurement_delay;
     self->count = hsep_disturbances_count(parameters->trust->period);
-    self->slopes = hsep_take(&end, n * (double)self->count);
+    self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
     self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
     self->kept = hsep_take(&end, n * LINEARISED_OF_COMMAND);
@@ -42,10 +42,10 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     self->drive = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
     self->physics = hsep_take_block(&end, filter);
     self->filters = hsep_take_block(&end, HSEP_LINEARISED_EXPERTS * filter);
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters)
+HSEP_API hsep_real hsep_linearised_size(const hsep_trusted_parameters *parameters)
 {
     return linearised_lay_out(&(hsep_linearised){0}, parameters);
 }
@@ -62,7 +62,7 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_par
 
 HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_parameters *parameters)
 {
-    const uint64_t n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     hsep_linearised got;
     memcpy(&got, block, sizeof got);
     (void)linearised_lay_out(&got, parameters); /* changes nothing where it is sound */
@@ -71,26 +71,26 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_paramet
 }
 
 /* Place of the weights of the disturbances among those of an expert. */
-static uint64_t linearised_first(const hsep_linearised *self, const hsep_trusted *model)
+static hsep_word linearised_first(const hsep_linearised *self, const hsep_trusted *model)
 {
     return model->n_static - 2 * self->count;
 }
 
 /* What the slopes give of a change, by the weights of an expert. gain: its first one of those abreast. */
-static void linearised_gains(const hsep_linearised *self, const double weights[], double *gain)
+static void linearised_gains(const hsep_linearised *self, const hsep_real weights[], hsep_real *gain)
 {
-    const double *slopes = hsep_at_const(self, self->slopes);
-    const uint64_t n = self->n;
-    for (uint64_t k = 0; k < n; k++, slopes += self->count) {
-        for (uint64_t part = 0; part < 2; part++, gain += LINEARISED_CHANGES * HSEP_PHYSICS_ABREAST) {
+    const hsep_real *slopes = hsep_at_const(self, self->slopes);
+    const hsep_word n = self->n;
+    for (hsep_word k = 0; k < n; k++, slopes += self->count) {
+        for (hsep_word part = 0; part < 2; part++, gain += LINEARISED_CHANGES * HSEP_PHYSICS_ABREAST) {
             /* the disturbances, their differences */
-            const double *w = weights + part * self->count;
-            double friction = 0.0;
-            double of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
-            for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
+            const hsep_real *w = weights + part * self->count;
+            hsep_real friction = 0.0;
+            hsep_real of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
+            for (hsep_word i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
                 friction += slopes[i] * w[i];
             }
-            for (uint64_t i = HSEP_DISTURBANCES_PERIODIC; i < self->count; i++) {
+            for (hsep_word i = HSEP_DISTURBANCES_PERIODIC; i < self->count; i++) {
                 of_position += w[i] * slopes[i];
             }
             gain[0] = friction;
@@ -101,14 +101,15 @@ static void linearised_gains(const hsep_linearised *self, const double weights[]
 }
 
 /* What the features of x_pb, it and its differences, give of a change behind G_pb. */
-static void linearised_pass(const double weights[], uint64_t count, const double passed[], uint64_t n, double to[])
+static void linearised_pass(
+    const hsep_real weights[], hsep_word count, const hsep_real passed[], hsep_word n, hsep_real to[])
 {
-    double d[LINEARISED_DIFFERENCES] = {0.0}; /* of the sample before */
-    for (uint64_t k = 0; k < n; k++) {
-        double difference = passed[k];
+    hsep_real d[LINEARISED_DIFFERENCES] = {0.0}; /* of the sample before */
+    for (hsep_word k = 0; k < n; k++) {
+        hsep_real difference = passed[k];
         to[k] = 0.0;
-        for (uint64_t i = 0; i < count; i++) {
-            const double before = d[i];
+        for (hsep_word i = 0; i < count; i++) {
+            const hsep_real before = d[i];
             to[k] += weights[i] * difference;
             d[i] = difference;
             difference -= before;
@@ -117,17 +118,17 @@ static void linearised_pass(const double weights[], uint64_t count, const double
 }
 
 /* A change after the dead time, at sample u. */
-static double linearised_acted(const hsep_linearised_change *change, uint64_t u, uint64_t dead_time)
+static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_word u, hsep_word dead_time)
 {
     return u >= dead_time && u - dead_time < change->n ? change->commands[u - dead_time] : 0.0;
 }
 
 /* A change as v_d, x and v. */
-static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, double T_s)
+static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, hsep_real T_s)
 {
-    double *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
-    for (uint64_t u = 0; u < self->preview; u++, signals += LINEARISED_CHANGES) {
-        const double now = u < change->n ? change->commands[u] : 0.0;
+    hsep_real *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
+    for (hsep_word u = 0; u < self->preview; u++, signals += LINEARISED_CHANGES) {
+        const hsep_real now = u < change->n ? change->commands[u] : 0.0;
         signals[0] = (now - last_command) / T_s;
         signals[1] = change->passed[u];
         signals[2] = (change->passed[u] - last_passed) / T_s;
@@ -137,29 +138,29 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
 
 /* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
 static void linearised_shrink(
-    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, double weight, double shrink[])
+    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, hsep_real weight, hsep_real shrink[])
 {
     const hsep_expert *expert = hsep_trusted_expert(model, place);
-    for (uint64_t k = 0; weight > 0.0 && k < self->n; k++) {
+    for (hsep_word k = 0; weight > 0.0 && k < self->n; k++) {
         shrink[k] = weight * hsep_expert_shrink(expert, self->n - 1 - k);
     }
 }
 
 /* What an expert of the command makes of the increments of a change, from rest, (preview,). */
 static void linearised_of_increments(
-    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, uint64_t dead_time,
-    double to[])
+    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_word dead_time,
+    hsep_real to[])
 {
-    const double *weights = hsep_at_const(expert, expert->weights), *lag_weights = weights + expert->n_static;
-    double *run = hsep_at(self, self->run);
-    for (uint64_t u = 0; u < self->preview; u++) {
-        double drive = 0.0;
-        for (uint64_t i = 1; i < expert->n_static && i <= u + 1; i++) {
-            const uint64_t at = u + 1 - i;
-            const double before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
+    const hsep_real *weights = hsep_at_const(expert, expert->weights), *lag_weights = weights + expert->n_static;
+    hsep_real *run = hsep_at(self, self->run);
+    for (hsep_word u = 0; u < self->preview; u++) {
+        hsep_real drive = 0.0;
+        for (hsep_word i = 1; i < expert->n_static && i <= u + 1; i++) {
+            const hsep_word at = u + 1 - i;
+            const hsep_real before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
             drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
         }
-        double *e = run + (self->preview - 1 - u);
+        hsep_real *e = run + (self->preview - 1 - u);
         *e = hsep_recur(drive, lag_weights, e + 1, u < expert->p ? u : expert->p);
         to[u] = *e;
     }
@@ -169,18 +170,18 @@ static void linearised_of_increments(
  * the command make of it. */
 static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
 {
-    const uint64_t dead_time = hsep_trusted_command(model)->dead_time;
-    double *base = hsep_at(self, self->base);
-    memcpy(base, change->passed, (size_t)self->preview * sizeof(double));
-    for (uint64_t i = 0; i < LINEARISED_OF_COMMAND; i++) {
+    const hsep_word dead_time = hsep_trusted_command(model)->dead_time;
+    hsep_real *base = hsep_at(self, self->base);
+    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
+    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++) {
         const hsep_expert_place place = linearised_of_command[i];
-        const double weight = linearised_weight(model, place, 1);
+        const hsep_real weight = linearised_weight(model, place, 1);
         if (weight > 0.0) {
             linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * self->n);
             linearised_of_increments(
                 self, hsep_trusted_expert(model, place), change, dead_time,
                 hsep_at(self, self->of_command) + i * self->preview);
-            for (uint64_t u = 0; u < self->preview; u++) {
+            for (hsep_word u = 0; u < self->preview; u++) {
                 base[u] += weight * (linearised_acted(change, u, dead_time) - change->passed[u]);
             }
         }
@@ -188,22 +189,22 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
 }
 
 HSEP_API void hsep_linearised_at(
-    hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[],
-    const hsep_linearised_change *change, double reach)
+    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
+    const hsep_linearised_change *change, hsep_real reach)
 {
-    const uint64_t n = self->n, first = linearised_first(self, model);
+    const hsep_word n = self->n, first = linearised_first(self, model);
     hsep_disturbances_slopes(
         hsep_trusted_disturbances(model), x_d, x_pb, hsep_at(model, model->x), n, model->forecast_scale, reach,
         hsep_at(self, self->slopes));
     linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
     linearised_command(self, model, change);
-    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-        const double *weights = hsep_at_const(expert, expert->weights);
+        const hsep_real *weights = hsep_at_const(expert, expert->weights);
         if (hsep_trusted_is_of_command(model, linearised_experts[i])) {
             continue;
         }
-        const double weight = linearised_weight(model, linearised_experts[i], 0);
+        const hsep_real weight = linearised_weight(model, linearised_experts[i], 0);
         linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(
@@ -212,17 +213,17 @@ HSEP_API void hsep_linearised_at(
 }
 
 /* The disturbances that a change makes of each expert, in the last count samples. */
-static void linearised_disturbance(hsep_linearised *self, uint64_t count)
+static void linearised_disturbance(hsep_linearised *self, hsep_word count)
 {
-    const uint64_t stride = LINEARISED_GAINS * HSEP_PHYSICS_ABREAST;
-    const double *gain = hsep_at(self, self->gains) + (self->n - count) * stride;
-    const double *change = hsep_at(self, self->change);
-    double *disturbance = hsep_at(self, self->disturbance), last[HSEP_PHYSICS_ABREAST] = {0.0};
-    for (uint64_t u = 0; u < count; u++, gain += stride, change += LINEARISED_CHANGES) {
-        const double *of_difference = gain + stride / 2, v_d = change[0], x = change[1], v = change[2];
-        for (uint64_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-            const double difference = of_difference[i] * v_d + of_difference[HSEP_PHYSICS_ABREAST + i] * x +
-                                      of_difference[2 * HSEP_PHYSICS_ABREAST + i] * v;
+    const hsep_word stride = LINEARISED_GAINS * HSEP_PHYSICS_ABREAST;
+    const hsep_real *gain = hsep_at(self, self->gains) + (self->n - count) * stride;
+    const hsep_real *change = hsep_at(self, self->change);
+    hsep_real *disturbance = hsep_at(self, self->disturbance), last[HSEP_PHYSICS_ABREAST] = {0.0};
+    for (hsep_word u = 0; u < count; u++, gain += stride, change += LINEARISED_CHANGES) {
+        const hsep_real *of_difference = gain + stride / 2, v_d = change[0], x = change[1], v = change[2];
+        for (hsep_word i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
+            const hsep_real difference = of_difference[i] * v_d + of_difference[HSEP_PHYSICS_ABREAST + i] * x +
+                                         of_difference[2 * HSEP_PHYSICS_ABREAST + i] * v;
             *disturbance++ =
                 (gain[i] * v_d + gain[HSEP_PHYSICS_ABREAST + i] * x + gain[2 * HSEP_PHYSICS_ABREAST + i] * v) +
                 (difference - last[i]);
@@ -232,13 +233,13 @@ static void linearised_disturbance(hsep_linearised *self, uint64_t count)
 }
 
 /* These behind G_pb, from rest. */
-static void linearised_filter(hsep_linearised *self, uint64_t count)
+static void linearised_filter(hsep_linearised *self, hsep_word count)
 {
-    const uint64_t words = self->filters - self->physics;
+    const hsep_word words = self->filters - self->physics;
     hsep_physics *filters[HSEP_LINEARISED_EXPERTS];
-    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        double *filter = hsep_at(self, self->filters + i * words);
-        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(double));
+    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        hsep_real *filter = hsep_at(self, self->filters + i * words);
+        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
         filters[i] = (hsep_physics *)filter;
     }
     hsep_physics_abreast(
@@ -248,33 +249,34 @@ static void linearised_filter(hsep_linearised *self, uint64_t count)
 /* Run of the recursion of expert i from rest, driven by the filtered disturbance and what the features of x_pb give,
  * and its part of the change of x_h. */
 static void linearised_run(
-    hsep_linearised *self, const hsep_expert *expert, uint64_t i, uint64_t count, double column[])
+    hsep_linearised *self, const hsep_expert *expert, hsep_word i, hsep_word count, hsep_real column[])
 {
-    const double *lag_weights = hsep_at_const(expert, expert->weights) + expert->n_static;
-    const double *own = hsep_at(self, self->passed) + i * self->preview, *drive = hsep_at(self, self->drive) + i;
-    const double *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
-    double *run = hsep_at(self, self->run);
-    for (uint64_t u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
-        double *e = run + (count - 1 - u);
+    const hsep_real *lag_weights = hsep_at_const(expert, expert->weights) + expert->n_static;
+    const hsep_real *own = hsep_at(self, self->passed) + i * self->preview, *drive = hsep_at(self, self->drive) + i;
+    const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
+    hsep_real *run = hsep_at(self, self->run);
+    for (hsep_word u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
+        hsep_real *e = run + (count - 1 - u);
         *e = hsep_recur(*drive + own[u], lag_weights, e + 1, u < expert->p ? u : expert->p);
         column[u] += shrink[u] * *e;
     }
 }
 
-HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[])
+HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_real column[])
 {
-    const uint64_t count = self->preview - first;
-    const double *of_command = hsep_at(self, self->of_command), *kept = hsep_at(self, self->kept) + (self->n - count);
-    memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(double));
-    for (uint64_t i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
+    const hsep_word count = self->preview - first;
+    const hsep_real *of_command = hsep_at(self, self->of_command),
+                    *kept = hsep_at(self, self->kept) + (self->n - count);
+    memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(hsep_real));
+    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
         const int counts = linearised_weight(model, linearised_of_command[i], 1) > 0.0;
-        for (uint64_t u = 0; counts && u < count; u++) {
+        for (hsep_word u = 0; counts && u < count; u++) {
             column[u] += kept[u] * of_command[u];
         }
     }
     linearised_disturbance(self, count);
     linearised_filter(self, count);
-    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         if (linearised_weight(model, linearised_experts[i], 0) > 0.0) {
             linearised_run(self, hsep_trusted_expert(model, linearised_experts[i]), i, count, column);
         }

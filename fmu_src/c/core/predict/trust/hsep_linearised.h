@@ -17,36 +17,36 @@
 #include "hsep_layout.h"
 #include "hsep_trusted.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 #define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
 
 typedef struct {
-    uint64_t n;       /* samples of a prediction, */
-    uint64_t preview; /* and its last ones, which a change may reach: all but what is late */
-    uint64_t count;   /* disturbances */
-    /* Offsets in doubles from the beginning of the struct; oldest first, if not said; of experts: those of the physics
+    hsep_word n;       /* samples of a prediction, */
+    hsep_word preview; /* and its last ones, which a change may reach: all but what is late */
+    hsep_word count;   /* disturbances */
+    /* Offsets in words from the beginning of the struct; oldest first, if not said; of experts: those of the physics
      * model's residual, behind each other, of experts abreast: HSEP_PHYSICS_ABREAST numbers a sample */
-    uint64_t slopes;      /* (n, count) slopes of the disturbances, sample after sample */
-    uint64_t gains;       /* (n, 6) of experts abreast: what friction, position and damping give of changes of v_d, x
+    hsep_word slopes;      /* (n, count) slopes of the disturbances, sample after sample */
+    hsep_word gains;       /* (n, 6) of experts abreast: what friction, position and damping give of changes of v_d, x
                            * and v, the disturbances themselves and then their differences */
-    uint64_t shrink;      /* (n,) of experts: part of each one in the stack, */
-    uint64_t kept;        /* (2, n) and of those of the command */
-    uint64_t change;      /* (preview, 3) of a change: v_d, x and v, the latter two behind G_pb */
-    uint64_t base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    uint64_t of_command;  /* (2, preview) and what the experts of the command make of it */
-    uint64_t passed;      /* (preview,) of experts: what the features of x_pb give of it */
-    uint64_t run;         /* (preview,) work of a recursion, newest first */
-    uint64_t disturbance; /* (preview,) of experts abreast: disturbances that a change makes, */
-    uint64_t drive;       /* and these behind G_pb */
-    uint64_t physics;     /* G_pb at rest, */
-    uint64_t filters;     /* and of each expert */
+    hsep_word shrink;      /* (n,) of experts: part of each one in the stack, */
+    hsep_word kept;        /* (2, n) and of those of the command */
+    hsep_word change;      /* (preview, 3) of a change: v_d, x and v, the latter two behind G_pb */
+    hsep_word base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
+    hsep_word of_command;  /* (2, preview) and what the experts of the command make of it */
+    hsep_word passed;      /* (preview,) of experts: what the features of x_pb give of it */
+    hsep_word run;         /* (preview,) work of a recursion, newest first */
+    hsep_word disturbance; /* (preview,) of experts abreast: disturbances that a change makes, */
+    hsep_word drive;       /* and these behind G_pb */
+    hsep_word physics;     /* G_pb at rest, */
+    hsep_word filters;     /* and of each expert */
 } hsep_linearised;
 
 HSEP_ASSERT_WORDS(hsep_linearised, 16);
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_linearised_size(const hsep_trusted_parameters *parameters);
 
 /* Fill the block. */
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_parameters *parameters);
@@ -56,20 +56,20 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_paramet
 
 /* A change of the commands that begins at sample 0 of the preview. */
 typedef struct {
-    const double *commands; /* (n,) m, oldest first, and nothing behind them */
-    uint64_t n;
-    const double *passed; /* (preview,) m, the same behind G_pb */
+    const hsep_real *commands; /* (n,) m, oldest first, and nothing behind them */
+    hsep_word n;
+    const hsep_real *passed; /* (preview,) m, the same behind G_pb */
 } hsep_linearised_change;
 
 /* Linearise at commands x_d that the model, which has learned, was last tried with, with the response x_pb, both
  * (n,), m, newest first, for a change that may begin at any sample of the preview. reach: see hsep_disturbances_slopes.
  * Cost: 12 tanh a sample. */
 HSEP_API void hsep_linearised_at(
-    hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[],
-    const hsep_linearised_change *change, double reach);
+    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
+    const hsep_linearised_change *change, hsep_real reach);
 
 /* Change of x_h, (preview - first,), m, by that change of the commands where it begins at sample first of the preview.
  * Cost: for each expert of the physics model's residual 8 n_modes + p + 10 multiply-adds a sample. */
-HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[]);
+HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_real column[]);
 
 #endif

@@ -2,21 +2,21 @@
 
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 
 HSEP_API hsep_reach_window
-hsep_reach_begin(hsep_reach *self, const double x_pb[], double before, uint64_t n, double largest)
+hsep_reach_begin(hsep_reach *self, const hsep_real x_pb[], hsep_real before, hsep_word n, hsep_real largest)
 {
-    for (uint64_t j = n; j-- > 0; before = x_pb[j]) {
-        const double change = fabs(x_pb[j] - before);
+    for (hsep_word j = n; j-- > 0; before = x_pb[j]) {
+        const hsep_real change = hsep_fabs(x_pb[j] - before);
         self->fastest = change > self->fastest ? change : self->fastest;
     }
     return (hsep_reach_window){.largest = largest, .known = largest > 0.0 && self->fastest > 0.0};
 }
 
-HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, double e, double T_s)
+HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, hsep_real e, hsep_real T_s)
 {
-    const double size = fabs(e);
+    const hsep_real size = hsep_fabs(e);
     self->n_missing++;
     if (!isfinite(e)) {
         return 0;
@@ -26,7 +26,7 @@ HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, doubl
     } else if (self->n_beyond > 0) {
         self->n_beyond--;
     }
-    if (self->n_beyond > 0 && (double)self->n_missing <= ceil(HSEP_TRUST_PATIENCE / T_s)) {
+    if (self->n_beyond > 0 && (hsep_real)self->n_missing <= hsep_ceil(HSEP_TRUST_PATIENCE / T_s)) {
         return 0;
     }
     self->n_missing = self->n_beyond = 0;

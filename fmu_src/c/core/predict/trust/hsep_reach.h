@@ -13,20 +13,20 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    double fastest;     /* m, largest change of x_pb from sample to sample so far */
-    uint64_t n_missing; /* samples since the last one that was believed, */
-    uint64_t n_beyond;  /* of these, values out of reach, less those within it that followed */
+    hsep_real fastest;   /* m, largest change of x_pb from sample to sample so far */
+    hsep_word n_missing; /* samples since the last one that was believed, */
+    hsep_word n_beyond;  /* of these, values out of reach, less those within it that followed */
 } hsep_reach;
 
 HSEP_ASSERT_WORDS(hsep_reach, 3);
 
 /* What is known of a window that is judged. */
 typedef struct {
-    double largest; /* m, largest residual believed */
-    uint64_t known; /* whether there was a motion, and a residual, before it */
+    hsep_real largest; /* m, largest residual believed */
+    hsep_word known;   /* whether there was a motion, and a residual, before it */
 } hsep_reach_window;
 
 HSEP_ASSERT_WORDS(hsep_reach_window, 2);
@@ -34,10 +34,10 @@ HSEP_ASSERT_WORDS(hsep_reach_window, 2);
 /* Begin a window. x_pb: (n,) m, newest first; before: m, the last prediction before it; largest: m, the largest
  * residual believed before it. */
 HSEP_API hsep_reach_window
-hsep_reach_begin(hsep_reach *self, const double x_pb[], double before, uint64_t n, double largest);
+hsep_reach_begin(hsep_reach *self, const hsep_real x_pb[], hsep_real before, hsep_word n, hsep_real largest);
 
 /* Judge its next sample by its residual e, m, NaN where it is missing; return whether it is believed. Before the first
  * motion, and over the first window that has a residual, all are. T_s: s. Constant cost. */
-HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, double e, double T_s);
+HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, hsep_real e, hsep_real T_s);
 
 #endif

@@ -3,10 +3,10 @@
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <string.h>
 
-static const double stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
+static const hsep_real stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
 
 HSEP_API void hsep_stack_init(hsep_stack *self)
 {
@@ -16,11 +16,11 @@ HSEP_API void hsep_stack_init(hsep_stack *self)
 
 /* Solve A [u v] = [a b] for n unknowns, A positive definite; it is used up. */
 static void stack_solve(
-    double A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], double u[HSEP_N_EXPERTS], double v[HSEP_N_EXPERTS], int n)
+    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], hsep_real u[HSEP_N_EXPERTS], hsep_real v[HSEP_N_EXPERTS], int n)
 {
     for (int i = 0; i < n; i++) {
         for (int r = i + 1; r < n; r++) {
-            const double factor = A[r][i] / A[i][i];
+            const hsep_real factor = A[r][i] / A[i][i];
             for (int c = i; c < n; c++) {
                 A[r][c] -= factor * A[i][c];
             }
@@ -40,12 +40,12 @@ static void stack_solve(
 
 /* Minimise 1/2 pi' H pi - l' pi over the pi >= 0, sum pi <= 1 that are 0 outside a support of n experts. Return the
  * minimum, or infinity if a weight would be negative. */
-static double stack_try(
-    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const double l[HSEP_N_EXPERTS], const int support[], int n,
-    double pi[HSEP_N_EXPERTS])
+static hsep_real stack_try(
+    hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], const int support[], int n,
+    hsep_real pi[HSEP_N_EXPERTS])
 {
-    double A[HSEP_N_EXPERTS][HSEP_N_EXPERTS] = {{0.0}}, found[HSEP_N_EXPERTS] = {0.0}, ones[HSEP_N_EXPERTS] = {0.0};
-    double sum = 0.0, of_ones = 0.0, cost = 0.0;
+    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS] = {{0.0}}, found[HSEP_N_EXPERTS] = {0.0}, ones[HSEP_N_EXPERTS] = {0.0};
+    hsep_real sum = 0.0, of_ones = 0.0, cost = 0.0;
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
             A[i][j] = H[support[i]][support[j]];
@@ -62,12 +62,12 @@ static double stack_try(
     for (int i = 0; i < n; i++) {
         found[i] -= sum > 1.0 ? (sum - 1.0) / of_ones * ones[i] : 0.0; /* then sum pi = 1 is active */
         if (!(found[i] >= 0.0)) {
-            return HUGE_VAL;
+            return INFINITY;
         }
         pi[support[i]] = found[i];
     }
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        double row = 0.0;
+        hsep_real row = 0.0;
         for (int j = 0; j < HSEP_N_EXPERTS; j++) {
             row += H[i][j] * pi[j];
         }
@@ -78,9 +78,9 @@ static double stack_try(
 
 /* The weights by their active set: all supports are tried. */
 static void stack_minimise(
-    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const double l[HSEP_N_EXPERTS], double weights[HSEP_N_EXPERTS])
+    hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], hsep_real weights[HSEP_N_EXPERTS])
 {
-    double least = 0.0, tried[HSEP_N_EXPERTS];
+    hsep_real least = 0.0, tried[HSEP_N_EXPERTS];
     memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
     for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
         int support[HSEP_N_EXPERTS], n = 0;
@@ -89,7 +89,7 @@ static void stack_minimise(
                 support[n++] = i;
             }
         }
-        const double cost = stack_try(H, l, support, n, tried);
+        const hsep_real cost = stack_try(H, l, support, n, tried);
         if (cost < least) {
             least = cost;
             memcpy(weights, tried, sizeof tried);
@@ -98,23 +98,23 @@ static void stack_minimise(
 }
 
 HSEP_API void hsep_stack_update(
-    hsep_stack *self, double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], double n, double least)
+    hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least)
 {
-    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
+    hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
     self->evidence[0] = HSEP_TRUST_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
     self->evidence[1] = HSEP_TRUST_GAMMA * self->evidence[1] + n;
-    double best = self->evidence[0]; /* of the prediction 0, which is always there */
+    hsep_real best = self->evidence[0]; /* of the prediction 0, which is always there */
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         for (int j = 0; j < HSEP_N_EXPERTS; j++) {
-            double *gram = &self->gram[HSEP_N_EXPERTS * i + j];
+            hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
             *gram = HSEP_TRUST_GAMMA * *gram + products[i][j];
             H[i][j] = *gram;
         }
         self->cross[i] = HSEP_TRUST_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
-        best = fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
+        best = hsep_fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
-    const double square = fmax(fmax(best / self->evidence[1], least), HSEP_STACK_LEAST_SQUARE);
-    const double ridge = HSEP_TRUST_KAPPA * square * n;
+    const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACK_LEAST_SQUARE);
+    const hsep_real ridge = HSEP_TRUST_KAPPA * square * n;
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
         l[i] = self->cross[i] + ridge * stack_first[i];
@@ -124,7 +124,7 @@ HSEP_API void hsep_stack_update(
 
 HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self)
 {
-    const double *weights = self->weights;
+    const hsep_real *weights = self->weights;
     return weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC] ? HSEP_COMMAND : HSEP_LAGGED;
 }
 
@@ -132,7 +132,7 @@ HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_e
 {
     memcpy(
         self->gram + HSEP_N_EXPERTS * (int)to, self->gram + HSEP_N_EXPERTS * (int)expert,
-        HSEP_N_EXPERTS * sizeof(double));
+        HSEP_N_EXPERTS * sizeof(hsep_real));
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         self->gram[HSEP_N_EXPERTS * i + (int)to] = self->gram[HSEP_N_EXPERTS * i + (int)expert];
     }

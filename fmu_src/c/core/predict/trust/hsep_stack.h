@@ -10,7 +10,7 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 /* Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
  * the one of these with lags that led, with little weight of earlier runs. */
@@ -19,10 +19,10 @@ typedef enum { HSEP_HOLD = 0, HSEP_LAGGED, HSEP_STATIC, HSEP_COMMAND, HSEP_DOUBT
 #define HSEP_N_EXPERTS 5
 
 typedef struct {
-    double weights[HSEP_N_EXPERTS];               /* pi */
-    double gram[HSEP_N_EXPERTS * HSEP_N_EXPERTS]; /* m2, F' F so far */
-    double cross[HSEP_N_EXPERTS];                 /* m2, F' e so far */
-    double evidence[2];                           /* e' e so far, m2, and samples */
+    hsep_real weights[HSEP_N_EXPERTS];               /* pi */
+    hsep_real gram[HSEP_N_EXPERTS * HSEP_N_EXPERTS]; /* m2, F' F so far */
+    hsep_real cross[HSEP_N_EXPERTS];                 /* m2, F' e so far */
+    hsep_real evidence[2];                           /* e' e so far, m2, and samples */
 } hsep_stack;
 
 HSEP_ASSERT_WORDS(hsep_stack, HSEP_N_EXPERTS *(HSEP_N_EXPERTS + 2) + 2);
@@ -33,7 +33,7 @@ HSEP_API void hsep_stack_init(hsep_stack *self);
  * it of the predictions and, last, of what was measured; n: its samples, > 0; least: least mean square that errors are
  * judged by, m2. Constant cost. */
 HSEP_API void hsep_stack_update(
-    hsep_stack *self, double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], double n, double least);
+    hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
 
 /* HSEP_COMMAND, if it has more of the weights than HSEP_LAGGED and HSEP_STATIC together, else HSEP_LAGGED. */
 HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self);

@@ -3,18 +3,18 @@
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
-static const double start_two_pi = 6.283185307179586;
+static const hsep_real start_two_pi = 6.283185307179586;
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static double start_lay_out(hsep_start *self, const hsep_start_parameters *parameters)
+static hsep_real start_lay_out(hsep_start *self, const hsep_start_parameters *parameters)
 {
-    const double Np = (double)parameters->Np, n = Np + (double)parameters->late;
-    const double n_states = 2.0 * (double)parameters->n_modes, all = n_states + (double)parameters->dead_time;
-    double end = HSEP_WORDS(hsep_start);
+    const hsep_real Np = (hsep_real)parameters->Np, n = Np + (hsep_real)parameters->late;
+    const hsep_real n_states = 2.0 * (hsep_real)parameters->n_modes, all = n_states + (hsep_real)parameters->dead_time;
+    hsep_real end = HSEP_WORDS(hsep_start);
     self->Np = parameters->Np;
     self->n = parameters->Np + parameters->late;
     self->n_states = 2 * parameters->n_modes;
@@ -26,10 +26,10 @@ static double start_lay_out(hsep_start *self, const hsep_start_parameters *param
     self->weights = hsep_take(&end, n_states);
     self->trial = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
     self->regression = hsep_take_block(&end, hsep_regression_size(self->n_states));
-    return end * sizeof(double);
+    return end * sizeof(hsep_real);
 }
 
-HSEP_API double hsep_start_size(const hsep_start_parameters *parameters)
+HSEP_API hsep_real hsep_start_size(const hsep_start_parameters *parameters)
 {
     return start_lay_out(&(hsep_start){0}, parameters);
 }
@@ -38,17 +38,17 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *par
 {
     memset(self, 0, (size_t)hsep_start_size(parameters));
     (void)start_lay_out(self, parameters);
-    double *states = hsep_at(self, self->states), *within = states + self->n_states;
-    const double late = (double)(parameters->dead_time + parameters->late); /* samples */
-    for (uint64_t i = 0; i < parameters->n_modes; i++) {
+    hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
+    const hsep_real late = (hsep_real)(parameters->dead_time + parameters->late); /* samples */
+    for (hsep_word i = 0; i < parameters->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = v t has the solution omega^2 z = v t - 2 zeta v / omega, in the state
          * (omega^2 z, omega z'). */
-        const double omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / parameters->T_s;
+        const hsep_real omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / parameters->T_s;
         states[2 * i] = -late - 2.0 * parameters->modes[i].zeta * v / omega;
         states[2 * i + 1] = v / omega;
     }
-    for (uint64_t i = 0; i < self->dead_time; i++) {
-        within[i] = (double)i - late;
+    for (hsep_word i = 0; i < self->dead_time; i++) {
+        within[i] = (hsep_real)i - late;
     }
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, parameters->dead_time,
@@ -68,53 +68,56 @@ HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *pa
 
 /* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
  * measurement is late. */
-static void start_respond(hsep_start *self, double step, double x_pb[], uint64_t count)
+static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_word count)
 {
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    const uint64_t late = self->n - self->Np;
+    const hsep_word late = self->n - self->Np;
     hsep_physics_begin(trial, hsep_at(self, self->state));
-    for (uint64_t k = 0; k < count; k++) {
-        const double x_d = k < late ? -step * (double)(late - k) : 0.0;
+    for (hsep_word k = 0; k < count; k++) {
+        const hsep_real x_d = k < late ? -step * (hsep_real)(late - k) : 0.0;
         hsep_physics_forced_response(trial, &x_d, x_pb + k, 1);
     }
 }
 
 /* First step of the commands, m; 0 if the axis begins at rest, as far as they tell. */
-static double start_step(const hsep_start *self, const double x_d[])
+static hsep_real start_step(const hsep_start *self, const hsep_real x_d[])
 {
-    const uint64_t late = self->n - self->Np, first = self->n - 1 - late;
-    double peak = 0.0;
-    for (uint64_t j = first; j-- > 0;) {
-        const double change = fabs(x_d[j] - x_d[j + 1]);
+    const hsep_word late = self->n - self->Np, first = self->n - 1 - late;
+    hsep_real peak = 0.0;
+    for (hsep_word j = first; j-- > 0;) {
+        const hsep_real change = hsep_fabs(x_d[j] - x_d[j + 1]);
         peak = change > peak ? change : peak;
     }
-    const double step = first > 0 ? x_d[first - 1] - x_d[first] : 0.0;
-    return fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
+    const hsep_real step = first > 0 ? x_d[first - 1] - x_d[first] : 0.0;
+    return hsep_fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
 }
 
-HSEP_API int hsep_start_moves(const hsep_start *self, const double x_d[]) { return fabs(start_step(self, x_d)) > 0.0; }
+HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[])
+{
+    return hsep_fabs(start_step(self, x_d)) > 0.0;
+}
 
 /* Whether enough residuals are measured. */
-static int start_knows(const hsep_start *self, const double e[])
+static int start_knows(const hsep_start *self, const hsep_real e[])
 {
-    uint64_t known = 0;
-    for (uint64_t k = self->n - self->Np; k < self->Np; k++) {
+    hsep_word known = 0;
+    for (hsep_word k = self->n - self->Np; k < self->Np; k++) {
         known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
     }
     return known >= HSEP_START_SAMPLES * self->n_states;
 }
 
 /* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
-static void start_fold(hsep_start *self, const double e[])
+static void start_fold(hsep_start *self, const hsep_real e[])
 {
     hsep_regression *regression = (hsep_regression *)hsep_at(self, self->regression);
-    const double *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
+    const hsep_real *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
     hsep_regression_init(regression, self->n_states, HSEP_START_DAMPING);
-    for (uint64_t k = 0; k < self->Np; k++) {
-        double *row = hsep_regression_row(regression);
-        const double measured = e[self->Np - 1 - k];
+    for (hsep_word k = 0; k < self->Np; k++) {
+        hsep_real *row = hsep_regression_row(regression);
+        const hsep_real measured = e[self->Np - 1 - k];
         if (isfinite(measured)) {
-            for (uint64_t i = 0; i < self->n_states; i++) {
+            for (hsep_word i = 0; i < self->n_states; i++) {
                 row[i] = responses[i * self->n + k];
             }
             row[self->n_states] = measured - response[k];
@@ -124,26 +127,26 @@ static void start_fold(hsep_start *self, const double e[])
     hsep_regression_solve(regression, hsep_at(self, self->weights));
 }
 
-HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const double e[])
+HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[])
 {
-    const uint64_t all = self->n_states + self->dead_time;
-    const double step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
-    double *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
-    double seen = 0.0, left = 0.0;
+    const hsep_word all = self->n_states + self->dead_time;
+    const hsep_real step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
+    hsep_real *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
+    hsep_real seen = 0.0, left = 0.0;
     if (!hsep_start_moves(self, x_d) || !start_knows(self, e)) {
         return 0;
     }
-    for (uint64_t i = 0; i < self->n_states; i++) {
-        memset(state, 0, (size_t)all * sizeof(double));
+    for (hsep_word i = 0; i < self->n_states; i++) {
+        memset(state, 0, (size_t)all * sizeof(hsep_real));
         state[i] = 1.0;
         start_respond(self, 0.0, hsep_at(self, self->responses) + i * self->n, self->n);
     }
-    for (uint64_t i = 0; i < all; i++) {
+    for (hsep_word i = 0; i < all; i++) {
         state[i] = step * hsep_at(self, self->states)[i];
     }
     start_respond(self, step, response, self->n);
-    for (uint64_t k = 0; k < self->Np; k++) {
-        const double measured = e[self->Np - 1 - k], rest = measured - response[k];
+    for (hsep_word k = 0; k < self->Np; k++) {
+        const hsep_real measured = e[self->Np - 1 - k], rest = measured - response[k];
         seen += isfinite(measured) ? measured * measured : 0.0;
         left += isfinite(measured) ? rest * rest : 0.0;
     }
@@ -151,7 +154,7 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const dou
         return 0;
     }
     start_fold(self, e);
-    for (uint64_t i = 0; i < self->n_states; i++) {
+    for (hsep_word i = 0; i < self->n_states; i++) {
         state[i] += weights[i];
     }
     start_respond(self, step, response, self->n + self->Np);
@@ -159,18 +162,18 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const dou
 }
 
 HSEP_API void hsep_start_apply(
-    const hsep_start *self, double x_d[], double x_pb[], double ahead[], hsep_physics *physics)
+    const hsep_start *self, hsep_real x_d[], hsep_real x_pb[], hsep_real ahead[], hsep_physics *physics)
 {
-    const uint64_t late = self->n - self->Np;
-    const double *response = hsep_at_const(self, self->response);
-    const double step = late + 1 < self->n ? x_d[self->n - 2 - late] - x_d[self->n - 1 - late] : 0.0;
-    for (uint64_t k = 0; k < late; k++) {
-        x_d[self->n - 1 - k] -= step * (double)(late - k);
+    const hsep_word late = self->n - self->Np;
+    const hsep_real *response = hsep_at_const(self, self->response);
+    const hsep_real step = late + 1 < self->n ? x_d[self->n - 2 - late] - x_d[self->n - 1 - late] : 0.0;
+    for (hsep_word k = 0; k < late; k++) {
+        x_d[self->n - 1 - k] -= step * (hsep_real)(late - k);
     }
-    for (uint64_t k = 0; k < self->n; k++) {
+    for (hsep_word k = 0; k < self->n; k++) {
         x_pb[self->n - 1 - k] += response[k];
     }
-    for (uint64_t i = 0; i < self->Np; i++) {
+    for (hsep_word i = 0; i < self->Np; i++) {
         ahead[i] += response[self->n + i];
     }
     hsep_physics_add(physics, (const hsep_physics *)hsep_at_const(self, self->trial));

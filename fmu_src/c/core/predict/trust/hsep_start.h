@@ -14,32 +14,32 @@
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 
-#include <stdint.h>
+#include "hsep_real.h"
 
 typedef struct {
-    uint64_t Np, n;     /* samples measured and predicted */
-    uint64_t n_states;  /* of the modes */
-    uint64_t dead_time; /* samples */
-    uint64_t states;    /* offsets in doubles: (n_states + dead_time,) state of a motion by one metre a sample */
-    uint64_t state;     /* (n_states + dead_time,) m, the one that is tried */
-    uint64_t response;  /* (n + Np,) m, to it, oldest first */
-    uint64_t responses; /* (n_states, n) to each state of the modes alone, oldest first */
-    uint64_t weights;   /* (n_states,) m, change of the state */
-    uint64_t trial, regression; /* the physics model on its own; least squares */
+    hsep_word Np, n;             /* samples measured and predicted */
+    hsep_word n_states;          /* of the modes */
+    hsep_word dead_time;         /* samples */
+    hsep_word states;            /* offsets in words: (n_states + dead_time,) state of a motion by one metre a sample */
+    hsep_word state;             /* (n_states + dead_time,) m, the one that is tried */
+    hsep_word response;          /* (n + Np,) m, to it, oldest first */
+    hsep_word responses;         /* (n_states, n) to each state of the modes alone, oldest first */
+    hsep_word weights;           /* (n_states,) m, change of the state */
+    hsep_word trial, regression; /* the physics model on its own; least squares */
 } hsep_start;
 
 HSEP_ASSERT_WORDS(hsep_start, 11);
 
 typedef struct {
-    uint64_t Np, late; /* samples of a window, and by which the measurement is late */
-    uint64_t n_modes, dead_time;
+    hsep_word Np, late; /* samples of a window, and by which the measurement is late */
+    hsep_word n_modes, dead_time;
     const hsep_mode *modes; /* (n_modes,) */
-    double T_s;             /* s */
+    hsep_real T_s;          /* s */
     hsep_hold input_hold;
 } hsep_start_parameters;
 
-/* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_start_size(const hsep_start_parameters *parameters);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_start_size(const hsep_start_parameters *parameters);
 
 HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *parameters);
 
@@ -47,16 +47,16 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *par
 HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters);
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */
-HSEP_API int hsep_start_moves(const hsep_start *self, const double x_d[]);
+HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[]);
 
 /* Whether the run began in motion: x_d: (n,), m, commands of its first window; e: (Np,), m, measured residuals of its
  * first samples relative to what was predicted, NaN where missing. Cost: n n_states (9 n_states / 2 + n_states)
  * multiply-adds, once. */
-HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const double e[]);
+HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[]);
 
 /* After that: add the motion to commands and physics-based prediction of the window, (n,), m, to the prediction of the
  * Np samples behind it, oldest first, and to the state of the physics model behind those. */
 HSEP_API void hsep_start_apply(
-    const hsep_start *self, double x_d[], double x_pb[], double ahead[], hsep_physics *physics);
+    const hsep_start *self, hsep_real x_d[], hsep_real x_pb[], hsep_real ahead[], hsep_physics *physics);
 
 #endif

@@ -4,7 +4,7 @@
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -31,13 +31,13 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     }
 }
 
-HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x)
+HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
 {
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
 /* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. */
-static void trusted_begin_window(hsep_trusted *self, const double x_d[], const double x_pb[])
+static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     if (self->forecast_scale != self->velocity_scale) {
@@ -48,7 +48,8 @@ static void trusted_begin_window(hsep_trusted *self, const double x_d[], const d
     self->velocity_scale = self->forecast_scale;
     self->largest_step = self->forecast_step;
     memcpy(
-        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
+        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
+        (size_t)self->n_static * sizeof(hsep_real));
     self->reach_of_window =
         hsep_reach_begin(&self->reach, x_pb, disturbances->before.x_pb[0], self->Np, self->scale.largest);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
@@ -60,12 +61,12 @@ static void trusted_begin_window(hsep_trusted *self, const double x_d[], const d
 
 /* Features of the window up to sample last - 1 as they were measured, and the residual of the command: those before
  * known are there. */
-static void trusted_take_rows(hsep_trusted *self, const double x_pb[], const double e[], uint64_t last)
+static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const hsep_real e[], hsep_word last)
 {
-    const uint64_t first = self->known, Np = self->Np;
-    const double *late = hsep_command_late(hsep_trusted_command(self), Np);
-    double *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0);
-    for (uint64_t j = Np - last; j < Np - first; j++) {
+    const hsep_word first = self->known, Np = self->Np;
+    const hsep_real *late = hsep_command_late(hsep_trusted_command(self), Np);
+    hsep_real *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0);
+    for (hsep_word j = Np - last; j < Np - first; j++) {
         x[j] = x_pb[j] + e[j];
         e_0[j] = x[j] - late[j];
     }
@@ -78,31 +79,38 @@ static void trusted_take_rows(hsep_trusted *self, const double x_pb[], const dou
 
 /* Learn the row [features without lags | lags | residual] of sample k. Those with many lags that stand for samples
  * without a measurement are not. row: (n_static,); e: (Np + lags,), m. */
-static void trusted_fold(hsep_trusted *self, hsep_evidence evidence, uint64_t k, const double row[], const double e[])
+static void trusted_fold(
+    hsep_trusted *self, hsep_evidence evidence, hsep_word k, const hsep_real row[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_trusted_evidence(self, evidence);
-    const uint64_t p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
-    const double *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
-    double n_bridged = 0.0, *to = hsep_gram_row(gram);
-    for (uint64_t i = 0; i < p; i++) {
+    const hsep_word p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
+    const hsep_real *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
+    hsep_real n_bridged = 0.0, *to = hsep_gram_row(gram);
+    for (hsep_word i = 0; i < p; i++) {
         n_bridged += bridged[i];
     }
     if (n_bridged > HSEP_TRUSTED_BRIDGED) {
         return;
     }
-    memcpy(to, row, (size_t)n_static * sizeof(double));
-    memcpy(to + n_static, lags, (size_t)p * sizeof(double));
+    memcpy(to, row, (size_t)n_static * sizeof(hsep_real));
+    memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
     hsep_gram_fold(gram);
     self->n_rows[evidence] += 1.0;
 }
 
+/* What of the rows so far counts on: of more than can be counted without rounding, half. */
+static hsep_real trusted_kept(const hsep_trusted *self, hsep_evidence evidence)
+{
+    return self->n_rows[evidence] < 0.25 * HSEP_EXACT ? self->kept : 0.5 * self->kept;
+}
+
 /* Judge the next sample, and take in those since the last one that is believed, if it is: their residuals are linear in
  * time between both. fold: whether it is learned. */
-static void trusted_follow_sample(hsep_trusted *self, const double x_pb[], double e[], int fold)
+static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const uint64_t k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
-    const double measured = hsep_at(self, self->measured)[j] - x_pb[j];
+    const hsep_word k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
+    const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
     const int accepted = hsep_reach_judge(&self->reach, &self->reach_of_window, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
@@ -110,16 +118,16 @@ static void trusted_follow_sample(hsep_trusted *self, const double x_pb[], doubl
         return;
     }
     e[j] = measured;
-    const double slope = (e[j] - e[known]) / (double)(known - j);
-    for (uint64_t i = known - 1; i > j; i--) {
-        e[i] = slope * (double)(known - i) + e[known];
+    const hsep_real slope = (e[j] - e[known]) / (hsep_real)(known - j);
+    for (hsep_word i = known - 1; i > j; i--) {
+        e[i] = slope * (hsep_real)(known - i) + e[known];
     }
     trusted_take_rows(self, x_pb, e, k + 1);
     if (fold) {
         hsep_command *command = hsep_trusted_command(self);
         if (!(self->n_accepted > 0.0)) {
-            hsep_trusted_discount(self, HSEP_OF_PHYSICS, self->kept);
-            hsep_trusted_discount(self, HSEP_OF_COMMAND, self->kept);
+            hsep_trusted_discount(self, HSEP_OF_PHYSICS, trusted_kept(self, HSEP_OF_PHYSICS));
+            hsep_trusted_discount(self, HSEP_OF_COMMAND, trusted_kept(self, HSEP_OF_COMMAND));
         }
         trusted_fold(self, HSEP_OF_PHYSICS, k, hsep_at(self, self->rows) + k * self->n_static, e);
         trusted_fold(
@@ -129,12 +137,12 @@ static void trusted_follow_sample(hsep_trusted *self, const double x_pb[], doubl
 }
 
 HSEP_API void hsep_trusted_follow(
-    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last)
 {
     if (self->followed == 0 && last > 0) {
         trusted_begin_window(self, x_d, x_pb);
     }
-    for (uint64_t i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
+    for (hsep_word i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
         trusted_follow_sample(self, x_pb, e, 1);
     }
     if (last + 1 == self->Np) { /* the solution comes with the next row */
@@ -144,17 +152,17 @@ HSEP_API void hsep_trusted_follow(
 }
 
 /* Update the weights of the stack with the samples that were published, of those accepted. */
-static void trusted_judge_stack(hsep_trusted *self, const double e[])
+static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 {
-    const double *accepted = hsep_at(self, self->accepted);
-    const uint64_t first = self->late < self->Np ? self->late : 0;
-    double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
-    for (uint64_t j = 0; j < self->Np - first; j++) {
-        double of_sample[HSEP_N_EXPERTS + 1];
+    const hsep_real *accepted = hsep_at(self, self->accepted);
+    const hsep_word first = self->late < self->Np ? self->late : 0;
+    hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
+    for (hsep_word j = 0; j < self->Np - first; j++) {
+        hsep_real of_sample[HSEP_N_EXPERTS + 1];
         if (!(accepted[j] > 0.0)) {
             continue;
         }
-        for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
+        for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
             of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
@@ -186,10 +194,10 @@ static void trusted_forget_earlier_runs(hsep_trusted *self)
 }
 
 /* Judge the experts and their stack by the measurement of their window, of which count samples are learned. */
-static void trusted_judge(hsep_trusted *self, const double e[], double count)
+static void trusted_judge(hsep_trusted *self, const hsep_real e[], hsep_real count)
 {
-    const double *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    const hsep_real *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
                 hsep_trusted_expert(self, (hsep_expert_place)i), hsep_trusted_is_of_command(self, i) ? e_0 : e,
@@ -204,24 +212,25 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
     hsep_residual_scale_follow(&self->scale_of_command, e_0, accepted, self->Np, count);
 }
 
-HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
+HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
-    const uint64_t Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
-    const double step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
-    double *past = hsep_at(self, self->e_0) + Np;
+    const hsep_word Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
+    const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
+    hsep_real *past = hsep_at(self, self->e_0) + Np;
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
     hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
-    for (uint64_t i = 0; i < hsep_trusted_command(self)->p; i++) {
-        past[i] = (x_pb[Np - 1] - step_pb * (double)(i + 1)) - (x_d[Np - 1] - step * (double)(dead_time + i + 1));
+    for (hsep_word i = 0; i < hsep_trusted_command(self)->p; i++) {
+        past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
+HSEP_API void hsep_trusted_learn(
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const uint64_t p = self->p, of_command = hsep_trusted_command(self)->p;
-    double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
+    const hsep_word p = self->p, of_command = hsep_trusted_command(self)->p;
+    hsep_real *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     if (self->followed == 0) {
         trusted_begin_window(self, x_d, x_pb);
     }
@@ -229,19 +238,19 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
         trusted_follow_sample(self, x_pb, e, fold);
     }
     if (self->known < self->Np) { /* none is believed behind it: its residual stays */
-        const uint64_t known = self->Np - self->known;
-        for (uint64_t j = 0; j < known; j++) {
+        const hsep_word known = self->Np - self->known;
+        for (hsep_word j = 0; j < known; j++) {
             e[j] = e[known];
         }
         trusted_take_rows(self, x_pb, e, self->Np);
     }
-    self->n_rejected += self->Np - (uint64_t)self->n_accepted;
+    self->n_rejected += self->Np - (hsep_word)self->n_accepted;
     hsep_disturbances_end(hsep_trusted_disturbances(self));
     if (fold && self->n_accepted > 0.0) {
         trusted_judge(self, e, self->n_accepted);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
-    memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(double));
-    memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(double));
+    memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(hsep_real));
+    memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(hsep_real));
     self->followed = self->known = 0;
 }

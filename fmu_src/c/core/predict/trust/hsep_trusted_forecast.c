@@ -5,7 +5,7 @@
 #include "hsep_range.h"
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 
 /* Those of the command's. */
@@ -20,28 +20,28 @@ static int trusted_predicts_command(const hsep_trusted *self, hsep_expert_place 
 
 /* Whether the commanded velocity outgrows what was learned; the scales of velocity and command with it. A compensator
  * begins to move before the path, with a creep: its first scale is the path's. */
-static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[], uint64_t n_path)
+static int trusted_outgrown(hsep_trusted *self, const hsep_real x_d[], const hsep_real path[], hsep_word n_path)
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
-    const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
-    double most = HSEP_TRUST_OUTGROWN * self->velocity_scale;
-    self->forecast_step = fmax(self->largest_step, peak * self->T_s);
+    hsep_real peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
+    const hsep_real n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
+    hsep_real most = HSEP_TRUST_OUTGROWN * self->velocity_scale;
+    self->forecast_step = hsep_fmax(self->largest_step, peak * self->T_s);
     if (path != NULL && n_rows == 0.0) {
         peak = 0.0;
-        for (uint64_t j = 0; j + 1 < n_path; j++) {
-            peak = fmax(peak, fabs(path[j] - path[j + 1]));
+        for (hsep_word j = 0; j + 1 < n_path; j++) {
+            peak = hsep_fmax(peak, hsep_fabs(path[j] - path[j + 1]));
         }
-        peak = fmax(peak / self->T_s, self->velocity_scale);
+        peak = hsep_fmax(peak / self->T_s, self->velocity_scale);
         most = self->velocity_scale;
     }
-    const int outgrown = peak > fmax(most, HSEP_DISTURBANCES_LEAST_VELOCITY);
+    const int outgrown = peak > hsep_fmax(most, HSEP_DISTURBANCES_LEAST_VELOCITY);
     self->forecast_scale = outgrown ? peak : self->velocity_scale;
     return outgrown;
 }
 
 /* Largest magnitude of a feature of an expert, that of the window to predict included, and its share. */
-static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint64_t feature)
+static hsep_real trusted_largest(hsep_trusted *self, hsep_expert_place expert, hsep_word feature)
 {
     if (hsep_trusted_is_of_command(self, expert)) {
         return feature > 0 ? self->forecast_step : 1.0;
@@ -50,19 +50,19 @@ static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint
 }
 
 /* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
-static void trusted_solve(hsep_trusted *self, hsep_expert_place place, double weight)
+static void trusted_solve(hsep_trusted *self, hsep_expert_place place, hsep_real weight)
 {
     const int of_command = hsep_trusted_is_of_command(self, place);
-    const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
-    const double effect = self->effect > 0.0 ? self->effect : sqrt(square);
+    const hsep_real square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
+    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
     const hsep_evidence evidence = of_command ? HSEP_OF_COMMAND : HSEP_OF_PHYSICS;
-    const double n_earlier = self->n_earlier[evidence];
+    const hsep_real n_earlier = self->n_earlier[evidence];
     hsep_expert *expert = hsep_trusted_expert(self, place);
-    double *scales = hsep_at(self, self->scales);
-    for (uint64_t i = 0; i < expert->n_static; i++) {
-        const double share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
-                                        : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
-        scales[i] = effect * share / fmax(trusted_largest(self, place, i), HSEP_EXPERT_LEAST);
+    hsep_real *scales = hsep_at(self, self->scales);
+    for (hsep_word i = 0; i < expert->n_static; i++) {
+        const hsep_real share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
+                                           : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        scales[i] = effect * share / hsep_fmax(trusted_largest(self, place, i), HSEP_EXPERT_LEAST);
     }
     const hsep_expert_evidence solved = {
         .gram = hsep_trusted_evidence(self, evidence),
@@ -71,56 +71,56 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, double we
         .n_rows = self->n_rows[evidence] + weight * n_earlier,
         .scales = scales,
         .first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square,
-        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square)};
+        .least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square)};
     hsep_expert_solve(expert, &solved);
 }
 
 /* Solve for the weights of the experts of some evidence, the first one with lags, that know something. */
-static void trusted_solve_of(hsep_trusted *self, const hsep_expert_place experts[], uint64_t count)
+static void trusted_solve_of(hsep_trusted *self, const hsep_expert_place experts[], hsep_word count)
 {
-    for (uint64_t i = 0; self->predicted[experts[0]] && i < count; i++) {
+    for (hsep_word i = 0; self->predicted[experts[0]] && i < count; i++) {
         trusted_solve(self, experts[i], 1.0);
     }
-    if (self->predicted[experts[0]] && self->leading == (uint64_t)experts[0] && self->predicted[HSEP_DOUBTING]) {
+    if (self->predicted[experts[0]] && self->leading == (hsep_word)experts[0] && self->predicted[HSEP_DOUBTING]) {
         trusted_solve(self, HSEP_DOUBTING, HSEP_TRUST_LESS);
     }
 }
 
 /* Largest step of the command relative to that before the window, >= 1, where its expert leads: it is linear in the
  * command, and may predict as much more than anything so far. */
-static double trusted_growth(const hsep_trusted *self)
+static hsep_real trusted_growth(const hsep_trusted *self)
 {
     if (!(self->largest_step > 0.0 && hsep_stack_leader(&self->stack) == HSEP_COMMAND)) {
         return 1.0;
     }
-    return fmin(self->forecast_step / self->largest_step, HSEP_TRUST_GROWTH);
+    return hsep_fmin(self->forecast_step / self->largest_step, HSEP_TRUST_GROWTH);
 }
 
 /* Take the scales of the features from the samples that come next, and solve for the weights. */
 static void trusted_scale(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
-    double last_residual)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
+    hsep_real last_residual)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     const int outgrown = trusted_outgrown(self, x_d, path, n_path);
-    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
+    hsep_real *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    for (uint64_t i = 0; i < self->n_static; i++) {
+    for (hsep_word i = 0; i < self->n_static; i++) {
         largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
     }
-    for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
-        for (uint64_t i = 0; i < self->n_static; i++) {
-            const double size = fabs(rows[i]);
+    for (hsep_word k = 0; k < self->n; k++, rows += self->n_static) {
+        for (hsep_word i = 0; i < self->n_static; i++) {
+            const hsep_real size = hsep_fabs(rows[i]);
             largest[i] = size > largest[i] ? size : largest[i];
         }
     }
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
     self->growth = trusted_growth(self);
-    self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
-    const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
-    const double n_of_command = self->n_rows[HSEP_OF_COMMAND] + self->n_earlier[HSEP_OF_COMMAND];
-    const uint64_t known = n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    self->hold = hsep_fmin(hsep_fmax(last_residual, -self->bound), self->bound);
+    const hsep_real n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
+    const hsep_real n_of_command = self->n_rows[HSEP_OF_COMMAND] + self->n_earlier[HSEP_OF_COMMAND];
+    const hsep_word known = n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     self->predicted[HSEP_HOLD] = 1;
     self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;
     self->predicted[HSEP_COMMAND] = n_of_command > 0.0 && self->scale_of_command.largest_square > 0.0;
@@ -130,29 +130,29 @@ static void trusted_scale(
 }
 
 /* What the experts of the command predict of the physics model's residual, at places begin ... end - 1. */
-static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint64_t begin, uint64_t end)
+static void trusted_follow_command(hsep_trusted *self, const hsep_real x_pb[], hsep_word begin, hsep_word end)
 {
-    const double *late = hsep_command_late(hsep_trusted_command(self), self->n);
-    double *stacked = hsep_at(self, self->stacked), most = self->growth * self->bound;
-    for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++, stacked += self->n) {
+    const hsep_real *late = hsep_command_late(hsep_trusted_command(self), self->n);
+    hsep_real *stacked = hsep_at(self, self->stacked), most = self->growth * self->bound;
+    for (hsep_word i = 0; i < TRUSTED_OF_COMMAND; i++, stacked += self->n) {
         const hsep_expert *expert = hsep_trusted_expert(self, trusted_experts_of_command[i]);
-        const double *e_h = hsep_at_const(expert, expert->e_h);
+        const hsep_real *e_h = hsep_at_const(expert, expert->e_h);
         const int predicts = trusted_predicts_command(self, trusted_experts_of_command[i]);
-        for (uint64_t j = begin; predicts && j < end; j++) {
+        for (hsep_word j = begin; predicts && j < end; j++) {
             stacked[j] = hsep_clip(e_h[j] + late[j] - x_pb[j], most);
         }
     }
 }
 
 /* Largest mean square, m2, and bound, m, of an expert. */
-static double trusted_square_of(hsep_trusted *self, uint64_t expert)
+static hsep_real trusted_square_of(hsep_trusted *self, hsep_word expert)
 {
     return hsep_trusted_is_of_command(self, expert)
                ? self->growth * self->growth * self->scale_of_command.largest_square
                : self->scale.largest_square;
 }
 
-static double trusted_bound_of(hsep_trusted *self, uint64_t expert)
+static hsep_real trusted_bound_of(hsep_trusted *self, hsep_word expert)
 {
     return hsep_trusted_is_of_command(self, expert)
                ? HSEP_TRUST_BOUND_OF_COMMAND * (self->growth * self->scale_of_command.largest)
@@ -160,14 +160,14 @@ static double trusted_bound_of(hsep_trusted *self, uint64_t expert)
 }
 
 /* The last residuals before a window as an expert takes them. past: (p,) m, of the physics model. */
-static const double *trusted_past_of(hsep_trusted *self, uint64_t expert, const double past[])
+static const hsep_real *trusted_past_of(hsep_trusted *self, hsep_word expert, const hsep_real past[])
 {
     return hsep_trusted_is_of_command(self, expert) ? hsep_at(self, self->e_0) + self->Np : past;
 }
 
 /* Predict by an expert. rows: features without lags. */
 static void trusted_predict_by(
-    hsep_trusted *self, hsep_expert_place expert, const double rows[], const double past[], uint64_t varied)
+    hsep_trusted *self, hsep_expert_place expert, const hsep_real rows[], const hsep_real past[], hsep_word varied)
 {
     hsep_expert_predict(
         hsep_trusted_expert(self, expert), rows, trusted_past_of(self, expert, past), trusted_square_of(self, expert),
@@ -177,14 +177,14 @@ static void trusted_predict_by(
 /* Predict by all experts that know something, whose rows hold the commands and stiffness and damping at x_pb. past:
  * (p,), m. */
 static void trusted_by_experts(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double past[], uint64_t varied)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real past[], hsep_word varied)
 {
     hsep_command *command = hsep_trusted_command(self);
-    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) {
         const hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
         trusted_predict_by(self, HSEP_STATIC, rows, past, varied > 0 ? self->n : 0);
-        for (uint64_t j = 0; j < self->n; j++) {
+        for (hsep_word j = 0; j < self->n; j++) {
             x[j] = x_pb[j] + hsep_at_const(first, first->e_h)[j];
         }
         hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
@@ -192,7 +192,7 @@ static void trusted_by_experts(
     if (self->predicted[HSEP_COMMAND]) {
         hsep_command_take(command, x_d, self->n);
     }
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             trusted_predict_by(
                 self, (hsep_expert_place)i,
@@ -202,7 +202,7 @@ static void trusted_by_experts(
     trusted_follow_command(self, x_pb, 0, self->n);
 }
 
-HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, uint64_t place)
+HSEP_API hsep_real hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, hsep_word place)
 {
     if (!self->predicted[expert]) {
         return 0.0;
@@ -218,7 +218,7 @@ HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place
 }
 
 /* What is left of the variance of the residual where an expert predicts place j, m2. */
-static double trusted_variance(const hsep_trusted *self, hsep_expert_place expert, uint64_t place)
+static hsep_real trusted_variance(const hsep_trusted *self, hsep_expert_place expert, hsep_word place)
 {
     if (!self->predicted[expert] || expert == HSEP_HOLD) {
         return 0.0;
@@ -228,39 +228,39 @@ static double trusted_variance(const hsep_trusted *self, hsep_expert_place exper
 }
 
 /* e: the stack of the experts, which have predicted samples first ... last - 1. */
-static void trusted_stack(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
+static void trusted_stack(hsep_trusted *self, hsep_real e[], hsep_word first, hsep_word last)
 {
-    const double *weights = self->stack.weights;
-    double *variance = hsep_at(self, self->variance);
-    for (uint64_t j = self->n - last; j < self->n - first; j++) {
-        double sum = 0.0, square = 0.0;
-        for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
-            const double predicted = hsep_trusted_stacked(self, (hsep_expert_place)i, j);
+    const hsep_real *weights = self->stack.weights;
+    hsep_real *variance = hsep_at(self, self->variance);
+    for (hsep_word j = self->n - last; j < self->n - first; j++) {
+        hsep_real sum = 0.0, square = 0.0;
+        for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+            const hsep_real predicted = hsep_trusted_stacked(self, (hsep_expert_place)i, j);
             sum += weights[i] * predicted;
             square += weights[i] * (predicted * predicted + trusted_variance(self, (hsep_expert_place)i, j));
         }
         e[j] = sum;
-        variance[j] = fmax(square - sum * sum, 0.0);
+        variance[j] = hsep_fmax(square - sum * sum, 0.0);
     }
 }
 
 HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t varied)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double *rows = hsep_at(self, self->rows);
+    hsep_real *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
     trusted_by_experts(self, x_d, x_pb, e + self->n, varied);
     trusted_stack(self, e, 0, self->n);
 }
 
-HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t last)
+HSEP_API void hsep_trusted_vary(hsep_trusted *self, hsep_word first, hsep_word last)
 {
     hsep_command *command = hsep_trusted_command(self);
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const int of_command = hsep_trusted_is_of_command(self, i);
-        const double *rows = of_command ? hsep_at(command, command->rows) : hsep_at(self, self->rows);
+        const hsep_real *rows = of_command ? hsep_at(command, command->rows) : hsep_at(self, self->rows);
         if (self->predicted[i]) {
             hsep_expert_vary(hsep_trusted_expert(self, (hsep_expert_place)i), rows, first, last);
         }
@@ -268,10 +268,10 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
 }
 
 /* Begin the prediction of a window part by part. */
-static void trusted_begin(hsep_trusted *self, const double x_d[], const double past[])
+static void trusted_begin(hsep_trusted *self, const hsep_real x_d[], const hsep_real past[])
 {
     hsep_command_take_in(hsep_trusted_command(self), x_d, self->n);
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_begin(
                 hsep_trusted_expert(self, (hsep_expert_place)i), trusted_past_of(self, i, past),
@@ -281,8 +281,8 @@ static void trusted_begin(hsep_trusted *self, const double x_d[], const double p
 }
 
 HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path, double e[],
-    uint64_t last)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
+    hsep_real e[], hsep_word last)
 {
     trusted_scale(self, x_d, x_pb, path, n_path, e[self->n]);
     if (path == NULL) {
@@ -294,14 +294,15 @@ HSEP_API void hsep_trusted_forecast(
     }
 }
 
-HSEP_API void hsep_trusted_go_on(hsep_trusted *self, const double x_pb[], double e[], uint64_t first, uint64_t last)
+HSEP_API void hsep_trusted_go_on(
+    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last)
 {
     hsep_command *command = hsep_trusted_command(self);
-    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
         hsep_expert *at_first = hsep_trusted_expert(self, HSEP_STATIC);
         hsep_expert_go_on(at_first, rows, first, last);
-        for (uint64_t j = self->n - last; j < self->n - first; j++) {
+        for (hsep_word j = self->n - last; j < self->n - first; j++) {
             x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
         }
         hsep_disturbances_motion_of(hsep_trusted_disturbances(self), x_pb, x, self->n, first, last, rows);
@@ -309,7 +310,7 @@ HSEP_API void hsep_trusted_go_on(hsep_trusted *self, const double x_pb[], double
     if (self->predicted[HSEP_COMMAND]) {
         hsep_command_fill(command, self->n, first, last);
     }
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_go_on(
                 hsep_trusted_expert(self, (hsep_expert_place)i),

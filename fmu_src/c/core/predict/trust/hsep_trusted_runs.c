@@ -3,7 +3,7 @@
 
 #include "hsep_trust_constants.h"
 
-#include <math.h>
+#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evi
     }
 }
 
-HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept)
+HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, hsep_real kept)
 {
     if (kept < 1.0) {
         hsep_gram_discount(hsep_trusted_evidence(self, evidence), kept);
@@ -38,10 +38,10 @@ HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, 
 HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
 {
     hsep_gram *of_run = hsep_trusted_evidence(self, evidence);
-    const double most = HSEP_TRUST_CARRIED * (double)self->Np;
+    const hsep_real most = HSEP_TRUST_CARRIED * (hsep_real)self->Np;
     hsep_trusted_believe_earlier(self, evidence);
-    hsep_trusted_discount(self, evidence, most / fmax(self->n_rows[evidence], most));
-    const double n_rows = self->n_rows[evidence];
+    hsep_trusted_discount(self, evidence, most / hsep_fmax(self->n_rows[evidence], most));
+    const hsep_real n_rows = self->n_rows[evidence];
     hsep_gram_settle(of_run);
     memcpy(hsep_trusted_earlier(self, evidence), of_run, (size_t)hsep_gram_size(of_run->n));
     hsep_trusted_forget(self, evidence);

@@ -1,0 +1,109 @@
+"""The C library in single precision, ``HSEP_FLOAT32``, beside itself in double precision."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
+from controllers import target_or_skip
+
+from benchmarks.targets.cases import KINDS, Case, header, recorded
+from benchmarks.targets.targets import FLOAT32, HERE, TARGETS, Replay, build, core_sources, replay
+
+SIZES = [(20, 20), (100, 50)]
+AGREES = 5e-3
+"""Relative difference of the RMS of predictions' errors that the README states for the paper's drive."""
+
+HERE_UNCOUNTED = replace(TARGETS["x86-64"], emulator=())
+
+
+def played(case: Case, *, single: bool) -> Replay:
+    """Return a replay with the compiler of this machine, not counted."""
+    folder = build_folder() / f"{case.kind}_{case.Np}_{case.warm}_{single}"
+    folder.mkdir()
+    (folder / "case.h").write_text(header(case), encoding="utf-8")
+    sources = [HERE / "replay.c", HERE / "board_host.c", *core_sources()]
+    options = [
+        "-O2",
+        *(["-DHSEP_FLOAT32", "-Wno-conversion"] if single else []),
+        f"-I{HERE}",
+        f"-I{folder}",
+        *include_flags(),
+    ]
+    run_compiler([*options, *sources, "-lm", "-o", folder / "program"])
+    return replay(HERE_UNCOUNTED, folder / "program", count=False)
+
+
+@cache
+def errors(case: Case, single: bool) -> tuple[float, Replay]:
+    """Return the RMS of the measured positions minus the predictions for them, m, and the replay."""
+    found = played(case, single=single)
+    samples, _ = recorded(case)
+    column = 0 if case.kind == "predictor" else 1
+    predicted, measured = found.outputs[:-1, column], samples[1:, 1]
+    return float(np.sqrt(np.mean((measured - predicted)[case.Np :] ** 2))), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("warm", [False, True])
+def test_predictions_are_as_good(warm: bool) -> None:
+    case = Case("predictor", 20, 20, 60, warm)
+    (single, of_single), (double, of_double) = errors(case, True), errors(case, False)
+    assert single == pytest.approx(double, rel=AGREES)
+    assert of_single.began == of_double.began == 0
+    assert 2 * of_single.block == of_double.block
+    assert (of_single.outputs != of_double.outputs).any()  # it was another program
+
+
+@pytest.mark.slow
+def test_a_plan_is_that_of_double_precision() -> None:
+    case = Case("compensator", 20, 20, 60)
+    (single, of_single), (double, of_double) = errors(case, True), errors(case, False)
+    assert single == pytest.approx(double, rel=AGREES)
+    change = of_double.outputs[:, 0] - np.concatenate(([0.0] * 40, recorded(case)[0][:-40, 0]))
+    assert np.sqrt(np.mean((of_single.outputs[:, 0] - of_double.outputs[:, 0]) ** 2)) < AGREES * np.ptp(change)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("warm", [False, True])
+def test_a_processor_without_doubles_predicts_as_well(
+    kind: str, size: tuple[int, int], warm: bool, tmp_path: Path
+) -> None:
+    case = Case(kind, *size, 40, warm)
+    machine = target_or_skip("m4f-float32")
+    there = replay(machine, build(machine, case, tmp_path / "there"), count=False)
+    assert there.began == 0
+    samples, _ = recorded(case)
+    column = 0 if kind == "predictor" else 1
+    error = float(np.sqrt(np.mean((samples[1:, 1] - there.outputs[:-1, column])[case.Np :] ** 2)))
+    assert error == pytest.approx(errors(case, False)[0], rel=AGREES)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_no_operation_of_a_sample_is_a_call(tmp_path: Path) -> None:
+    """Of the library's files one alone computes with doubles: the one that reads a weights file."""
+    machine = target_or_skip("m4f-float32")
+    calls = set()
+    for source in core_sources():
+        object_file = tmp_path / f"{source.stem}.o"
+        flags = ["-O2", "-std=c99", "-ffp-contract=off", *include_flags()]
+        subprocess.run([*machine.compiler, *flags, "-c", str(source), "-o", str(object_file)], check=True)
+        names = subprocess.run([machine.nm, object_file], capture_output=True, text=True, check=True).stdout
+        if re.search(r"__aeabi_d\w+", names):
+            calls.add(source.stem)
+    assert calls == {"hsep_learned"}
+
+
+def test_fmus_are_in_double_precision(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="FMUs compute in double precision"):
+        run_compiler([*FLOAT32[:1], *include_flags(), "-c", C_SOURCES / "model" / "hsep_state.c", "-o", tmp_path / "o"])
