@@ -8,46 +8,45 @@ from __future__ import annotations
 
 import ast
 import itertools
-import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict
-from inspect import cleandoc
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+
+import numpy as np
 
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.records import leaves
+from hybridsep.base.settings import PARAMETERS, PredictorSettings
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
-from hybridsep.predict import start_in_motion, uncertainty
-from hybridsep.predict.trust import disturbances, experts, model, stack
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict import uncertainty
+from hybridsep.predict.trust import disturbances, expert, forecast, learn, stack, start, state
 from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.learned import LEARNED
 
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
-CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "trust" / "hsep_trust_constants.h"
-LEARNED_HEADER = CONSTANTS_HEADER.with_name("hsep_trust_learned.h")
-DECLARED_HEADER = SETTINGS_HEADER.with_name("hsep_predict_constants.h")
+CONSTANTS_HEADER = SETTINGS_HEADER.with_name("hsep_predict_constants.h")
 RANGES_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_ranges.h"
 
 DECLARED = {
-    "uncertainty": uncertainty,
-    "start": start_in_motion,
-    "expert": experts,
-    "stack": stack,
-    "trusted": model,
-    "disturbances": disturbances,
+    "uncertainty": [uncertainty],
+    "start": [start],
+    "stack": [stack],
+    "expert": [expert],
+    "disturbances": [disturbances],
+    "trusted": [state, forecast, learn],
 }
 """Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
 
-OF_LIBRARY = (
-    *("N_COMPONENTS", "N_LEARNED", "_SHARE_LEAST", "_SHARE_MOST", "_NO_PENALTY"),
-    *("_N_FRICTION", "_N_LASTING", "_N_PERIODIC", "_OWN_MAX", "_OWN_REACH"),
-    *("HOLD", "LAGGED", "STATIC", "COMMAND", "DOUBTING"),
-)
-"""Constants of these modules that C has not, or among its layouts."""
+PLACES = ("HOLD", "LAGGED", "STATIC", "COMMAND", "DOUBTING", "N_EXPERTS", "OF_PHYSICS", "OF_COMMAND")
+"""Constants without a prefix in C."""
+
+OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE")
+"""Constants of these modules that C has not."""
 
 
 def generated() -> dict[Path, str]:
@@ -56,8 +55,6 @@ def generated() -> dict[Path, str]:
         SETTINGS_HEADER: settings_header(),
         RANGES_HEADER: ranges_header(),
         CONSTANTS_HEADER: constants_header(),
-        LEARNED_HEADER: learned_header(),
-        DECLARED_HEADER: declared_header(),
     }
     return headers | pages()
 
@@ -118,75 +115,58 @@ def ranges_header() -> str:
 
 
 def constants_header() -> str:
-    """Return the C header of the constants of the residual model with trust, each group behind its description."""
-    values = asdict(CONSTANTS)
-    _, attributes = cleandoc(type(CONSTANTS).__doc__ or "").split("----------\n")
-    groups = re.findall(r"^(\w[\w, ]*) : (?:float|int)\n((?: .*\n?)+)", attributes, re.MULTILINE)
-    found = [name for names, _ in groups for name in names.split(", ")]
-    if found != list(values):
-        raise AssertionError(f"constants must be described in their order, {list(values)}, got {found}")
-    parts = []
-    for names, description in groups:
-        text = " ".join(description.replace("`", "").split())
-        lines = textwrap.wrap(f"{text} */", 114)
-        defines = [f"#define HSEP_TRUST_{name.upper()} {_number(values[name])}" for name in names.split(", ")]
-        parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
-    body = "\n\n".join(parts)
-    return f"""/* Constants of the residual model with trust, generated from hybridsep/predict/trust/constants.py. */
-#ifndef HSEP_TRUST_CONSTANTS_H
-#define HSEP_TRUST_CONSTANTS_H
-
-{body}
-
-#endif
-"""
-
-
-def learned_header() -> str:
-    """Return the C header of the ranges of what the residual model with trust has learned."""
-    ranges = "\n".join(
-        f"#define HSEP_LEARNED_{name.upper()} {_number(one.least)}, {_number(one.most)}"
-        for name, one in LEARNED.items()
-    )
-    return f"""/* Least and most of what the residual model with trust has learned, generated from
- * hybridsep/predict/trust/learned.py. */
-#ifndef HSEP_TRUST_LEARNED_H
-#define HSEP_TRUST_LEARNED_H
-
-{ranges}
-
-#endif
-"""
-
-
-def declared_header() -> str:
-    """Return the C header of the constants that modules of the library declare beside what they compute."""
-    parts = []
-    for prefix, module in DECLARED.items():
-        body = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body
-        for statement, reason in itertools.pairwise(body):
-            if not (isinstance(statement, ast.Assign) and isinstance(reason, ast.Expr)):
-                continue
-            target = statement.targets[0]
-            names = [one.id for one in ast.walk(target) if isinstance(one, ast.Name) and one.id.isupper()]
-            used = [name for name in names if name not in OF_LIBRARY]
-            if not used:
-                continue
-            text = " ".join(cleandoc(ast.literal_eval(reason.value)).replace("`", "").split())
-            text = text.replace("λ", "lambda").replace("²", "2")
-            lines = textwrap.wrap(f"{text} */", 114)
-            defines = [
-                f"#define HSEP_{prefix.upper()}_{name.lstrip('_')} {_initialiser(getattr(module, name))}"
-                for name in used
-            ]
-            parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
-    return f"""/* Constants of predictions and their errors, generated from modules of hybridsep/predict. */
+    """Return the C header of the constants of predictions, which the library declares with their reasons."""
+    defines = []
+    for prefix, modules in DECLARED.items():
+        files = ", ".join(f"{module.__name__.replace('.', '/')}.py" for module in modules)
+        rows = [
+            f"#define HSEP_{'' if name in PLACES else f'{prefix.upper()}_'}{name.lstrip('_')} "
+            f"{_initialiser(getattr(module, name))}"
+            for module in modules
+            for name in _declared(module)
+        ]
+        defines.append("\n".join([f"/* {files} */", *rows]))
+    trust = [f"#define HSEP_TRUST_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
+    defines.append("\n".join(["/* hybridsep/predict/trust/constants.py */", *trust]))
+    settings = PredictorSettings(period=1.0)
+    trusted = state.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
+    records = {"LEARNED": trusted.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
+    ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
+    defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
+    body = "\n\n".join(defines)
+    return f"""/* Constants of predictions and their errors, generated: what each means, and why, is in the file named. */
 #ifndef HSEP_PREDICT_CONSTANTS_H
 #define HSEP_PREDICT_CONSTANTS_H
 
-{chr(10).join(f"{part}{chr(10)}" for part in parts)}
+/* clang-format off */
+{body}
+/* clang-format on */
+
 #endif
 """
+
+
+def _declared(module: ModuleType) -> list[str]:
+    """Return the names of a module's constants that C has: with a reason behind them."""
+    names: list[str] = []
+    body = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body
+    for statement, reason in itertools.pairwise(body):
+        if isinstance(statement, ast.Assign) and isinstance(reason, ast.Expr):
+            nodes = ast.walk(statement.targets[0])
+            names += [one.id for one in nodes if isinstance(one, ast.Name) and one.id.isupper()]
+    return [name for name in names if name not in OF_LIBRARY]
+
+
+def _ranges_of(record: Any) -> str:
+    """Return the ranges of a record's numbers, each with how many numbers in a row have it."""
+    each = [
+        (float(least), float(most))
+        for leaf in leaves(record)
+        for _, least, most in np.broadcast(leaf.value, leaf.least, leaf.most)
+    ]
+    runs = [(bounds, len(list(same))) for bounds, same in itertools.groupby(each)]
+    text = ", ".join(f"{{{_number(least)}, {_number(most)}, {n}}}" for (least, most), n in runs)
+    return " \\\n    ".join(["", *textwrap.wrap(text, 112)])[1:]
 
 
 def _initialiser(value: Any) -> str:

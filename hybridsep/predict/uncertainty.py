@@ -34,6 +34,7 @@ _SHARES = (4.0, 2.0)
 """First variance of the error relative to that of its causes: timing, variance of the experts."""
 
 N_COMPONENTS = 1 + len(_SHARES)
+"""Of the variance."""
 
 _UNKNOWN_NOISE = 25.0
 """First variance of a noise that is not known, relative to λ."""

@@ -73,7 +73,7 @@ static int compensator_trusts(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     return self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
-           hsep_paper_regression(hsep_residual_paper(hsep_predictor_model(predictor)))->n_samples > 0 &&
+           hsep_paper_regression(hsep_residual_paper(hsep_predictor_model(predictor)))->n_rows > 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 

@@ -28,7 +28,6 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_real preview = (hsep_real)predictor->preview;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
     self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
@@ -39,7 +38,7 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
     self->trusted =
-        predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&trusted, &parameters->planner)) : 0;
+        predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&model, &parameters->planner)) : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -58,8 +57,7 @@ HSEP_API void hsep_compensator_block_init(
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
     if (self->trusted) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-        const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
-        hsep_trusted_planner_init(hsep_compensator_trusted(self), &trusted, &parameters->planner, start);
+            hsep_trusted_planner_init(hsep_compensator_trusted(self), &model, &parameters->planner, start);
     }
     self->compensate = self->compensate_next = (hsep_word)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];
@@ -80,7 +78,6 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
     hsep_compensator got;
     hsep_predictor online;
     memcpy(&got, block, sizeof got);
@@ -95,6 +92,6 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
            hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
            (!got.trusted ||
-            hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &trusted, &parameters->planner)) &&
+            hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &model, &parameters->planner)) &&
            hsep_predictor_block_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }

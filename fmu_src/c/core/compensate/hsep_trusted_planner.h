@@ -96,16 +96,16 @@ typedef struct {
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real
-hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+hsep_trusted_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_trusted_planner_init(
-    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
+    hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_trusted_planner_init with these parameters began. */
 HSEP_API int hsep_trusted_planner_valid(
-    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+    const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* What is before a window. */
 typedef struct {

@@ -8,7 +8,7 @@
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real trusted_planner_lay_out(
-    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+    hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_word n = hsep_splines_count(planner->preview, planner->spacing);
     const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
@@ -37,13 +37,13 @@ static hsep_real trusted_planner_lay_out(
 }
 
 HSEP_API hsep_real
-hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+hsep_trusted_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
 }
 
 HSEP_API void hsep_trusted_planner_init(
-    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
+    hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start)
 {
     const hsep_predictor_settings *settings = parameters->settings;
@@ -59,7 +59,7 @@ HSEP_API void hsep_trusted_planner_init(
 }
 
 HSEP_API int hsep_trusted_planner_valid(
-    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+    const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     hsep_trusted_planner got;

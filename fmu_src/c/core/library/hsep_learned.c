@@ -67,27 +67,22 @@ HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
 /* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
 static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
-    for (hsep_word i = 0; i < hsep_residual_n_learned(model); i++) {
-        if (!hsep_learned_numbers(source, hsep_residual_learned(model, i), 1)) {
-            return 0;
-        }
-    }
-    return hsep_learned_numbers(source, hsep_uncertainty_learned(uncertainty), HSEP_N_UNCERTAINTY) &&
+    return hsep_learned_numbers(source, hsep_residual_learned(model), hsep_residual_n_learned(model)) &&
+           hsep_learned_numbers(source, uncertainty->theta, HSEP_N_UNCERTAINTY) &&
            hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
 }
 
-/* Read a factor row after row through the model's own row: 0 if it is damaged. */
-static int learned_take_factor(
-    hsep_learned_source *source, hsep_residual_model *model, hsep_word factor, hsep_word n_samples)
+/* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
+static int learned_take_factor(hsep_learned_source *source, hsep_residual_model *model, hsep_word factor)
 {
     const hsep_word n = hsep_residual_n_features(model, factor);
-    for (hsep_word i = 0; i <= n; i++) {
-        if (!hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) ||
-            !hsep_residual_load(model, factor, i, n_samples)) {
-            return 0;
-        }
+    hsep_real n_rows;
+    int taken = hsep_learned_numbers(source, &n_rows, 1);
+    for (hsep_word i = 0; taken && i <= n; i++) {
+        taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) &&
+                hsep_residual_load(model, factor, i, n_rows);
     }
-    return 1;
+    return taken;
 }
 
 /* Bytes of a file with this head. */
@@ -96,7 +91,7 @@ static double learned_size(const hsep_learned_head *head, hsep_residual_model *m
     double words = 4 * (double)head->n_settings + (double)head->n_learned + 1;
     for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
         const double n = (double)hsep_residual_n_features(model, i);
-        words += (n + 1) * (n + 2) / 2;
+        words += 1 + (n + 1) * (n + 2) / 2;
     }
     return (double)sizeof *head + words * (double)sizeof(double);
 }
@@ -110,7 +105,7 @@ HSEP_API int hsep_learned_take(
         return 0;
     }
     for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!learned_take_factor(source, model, i, (hsep_word)head->n_samples)) {
+        if (!learned_take_factor(source, model, i)) {
             return 0;
         }
     }

@@ -11,14 +11,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define HSEP_LEARNED_MAGIC "HSEPWG13"
+#define HSEP_LEARNED_MAGIC "HSEPWG14"
 
 typedef struct {
     char magic[8];
-    uint64_t n_settings, n_modes, n_samples, n_learned;
+    uint64_t n_settings, n_modes, n_learned;
 } hsep_learned_head;
 
-HSEP_ASSERT(learned_head, sizeof(hsep_learned_head) == 40);
+HSEP_ASSERT(learned_head, sizeof(hsep_learned_head) == 32);
 
 typedef struct {
     char name[24]; /* filled with 0 */

@@ -1,6 +1,7 @@
 #include "hsep_gram.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include "hsep_math.h"
@@ -31,7 +32,8 @@ HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
     hsep_gram got;
     memcpy(&got, block, sizeof got);
     (void)gram_lay_out(&got, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.waiting < HSEP_GRAM_TOGETHER;
+    return memcmp(&got, block, sizeof got) == 0 && got.waiting < HSEP_GRAM_TOGETHER &&
+           got.n_rows >= 0.0 && got.n_rows <= HSEP_PREDICTION_MAX;
 }
 
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self) { return hsep_at(self, self->rows) + (self->n + 1) * self->waiting; }
@@ -85,6 +87,7 @@ static void gram_add_waiting(hsep_gram *self)
 
 HSEP_API void hsep_gram_fold(hsep_gram *self)
 {
+    self->n_rows += 1.0;
     if (++self->waiting == HSEP_GRAM_TOGETHER) {
         gram_add_waiting(self);
     }
@@ -116,6 +119,7 @@ HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)
     const hsep_word count = (hsep_word)hsep_triangle(self->n + 1);
     gram_add_waiting(self);
     gram_add_waiting(other);
+    self->n_rows += weight * other->n_rows;
     hsep_axpy(hsep_at(self, self->sums), weight, hsep_at(other, other->sums), count);
     hsep_axpy(hsep_at(self, self->carries), weight, hsep_at(other, other->carries), count);
 }
@@ -124,6 +128,7 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
 {
     hsep_real *sums = hsep_at(self, self->sums);
     gram_add_waiting(self);
+    self->n_rows *= weight;
     for (hsep_word i = 0; i < 2 * (hsep_word)hsep_triangle(self->n + 1); i++) { /* carries are behind the sums */
         sums[i] *= weight;
     }

@@ -35,13 +35,14 @@
 typedef struct {
     hsep_word n;       /* features */
     hsep_word waiting; /* rows that are not added yet, fewer than HSEP_GRAM_TOGETHER */
+    hsep_real n_rows;  /* rows so far, weighted */
     /* Offsets in words from the beginning of the struct */
     hsep_word rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
     hsep_word sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
     hsep_word carries; /* and what rounding took from them */
 } hsep_gram;
 
-HSEP_ASSERT_WORDS(hsep_gram, 5);
+HSEP_ASSERT_WORDS(hsep_gram, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
 HSEP_API hsep_real hsep_gram_size(hsep_word n);
@@ -60,7 +61,7 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
- * rows of a factor are worth those it comes from. Fails, and returns 0, if an entry is not finite or a diagonal entry
+ * rows of a factor are worth those it comes from, whose number the caller sets. Fails, and returns 0, if an entry is not finite or a diagonal entry
  * of R is 0. Cost: that of hsep_gram_fold. */
 HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 

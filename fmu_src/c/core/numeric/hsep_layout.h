@@ -9,6 +9,8 @@
 
 #include "hsep_real.h"
 
+#include <string.h>
+
 /* Fail to compile unless a condition holds; name: unique among all files. */
 #define HSEP_ASSERT(name, condition) typedef char hsep_assert_##name[(condition) ? 1 : -1]
 
@@ -45,5 +47,10 @@ static inline const void *hsep_at_bytes(const void *bytes, hsep_word offset)
 {
     return (const char *)bytes + offset * sizeof(hsep_real);
 }
+
+/* Whether the struct of a block, in any alignment, is as its lay-out function leaves it, which changes nothing where it
+ * is sound; got: becomes a copy of it. */
+#define HSEP_LAID_OUT(got, block, lay_out) \
+    (memcpy(&(got), block, sizeof(got)), (void)(lay_out), memcmp(&(got), block, sizeof(got)) == 0)
 
 #endif

@@ -1,4 +1,4 @@
-/* Range of published predictions. Reentrant; allocates nothing. */
+/* Ranges of published predictions and of what is learned. Reentrant; allocates nothing. */
 #ifndef HSEP_RANGE_H
 #define HSEP_RANGE_H
 
@@ -17,6 +17,25 @@ static inline int hsep_within(const void *a, hsep_word n, hsep_real limit)
         hsep_real entry;
         memcpy(&entry, (const char *)a + i * sizeof entry, sizeof entry);
         within &= hsep_fabs(entry) <= limit; /* NaN is not */
+    }
+    return within;
+}
+
+/* Range of so many numbers of a record. */
+typedef struct {
+    hsep_real least, most;
+    hsep_word n;
+} hsep_range;
+
+/* Whether numbers, (n,), are in these ranges, one behind the other, which are those of all n. */
+static inline int hsep_in_ranges(const hsep_real numbers[], hsep_word n, const hsep_range *range)
+{
+    int within = 1;
+    for (hsep_word i = 0, end = range->n; i < n; i++) {
+        if (i == end) {
+            end += (++range)->n;
+        }
+        within &= numbers[i] >= range->least && numbers[i] <= range->most; /* NaN is not */
     }
     return within;
 }

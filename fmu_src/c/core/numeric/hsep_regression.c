@@ -8,10 +8,6 @@
 
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 
-/* Bound on what a weight makes of a diagonal entry of D: far below any penalty, and no square of a row times its
- * reciprocal overflows. */
-static const hsep_real regression_discounted_min = HSEP_TINY(1e-100);
-
 /* Set what follows from the number of features; return the bytes of the block. */
 static hsep_real regression_lay_out(hsep_regression *self, hsep_word n)
 {
@@ -164,16 +160,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
         }
         tile += HSEP_TILE_STRIDE * left;
     }
-    self->n_samples++;
-}
-
-HSEP_API void hsep_regression_discount(hsep_regression *self, hsep_real weight)
-{
-    hsep_real *inverse_d = hsep_at(self, self->inverse_d);
-    for (hsep_word i = 0; i < self->n; i++) {
-        inverse_d[i] = hsep_fmin(inverse_d[i] / weight, hsep_fmax(inverse_d[i], 1.0 / regression_discounted_min));
-    }
-    self->residual_sum *= weight;
+    self->n_rows += 1.0;
 }
 
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])

@@ -22,7 +22,7 @@
 typedef struct {
     hsep_word n;            /* features */
     hsep_word n_tiles;      /* tiles of 4 columns that n features and the target need */
-    hsep_word n_samples;    /* rows taken in */
+    hsep_real n_rows;       /* rows so far */
     hsep_real residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
     /* Offsets in words from the beginning of the struct */
     hsep_word inverse_d; /* (4 n_tiles,) 1/D */
@@ -52,9 +52,6 @@ HSEP_API void hsep_regression_fold(hsep_regression *self);
 
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
-
-/* Weigh all rows so far, and lambda with them, by a weight in the sum of squares, 0 <= weight <= 1. */
-HSEP_API void hsep_regression_discount(hsep_regression *self, hsep_real weight);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry

@@ -26,9 +26,7 @@
 #define HSEP_PREDICTOR_H
 
 #include "hsep.h"
-#include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_regression.h"
 #include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"

@@ -29,21 +29,8 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .trust = &parameters->trust,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .preview = parameters->preview,
+        .n = parameters->preview + parameters->settings.measurement_delay,
         .planned = parameters->planned};
-}
-
-static hsep_start_parameters predictor_start_parameters(const hsep_predictor_parameters *parameters)
-{
-    const hsep_predictor_settings *settings = &parameters->settings;
-    return (hsep_start_parameters){
-        .Np = settings->Np,
-        .late = settings->measurement_delay,
-        .n_modes = parameters->n_modes,
-        .dead_time = settings->dead_time,
-        .modes = parameters->modes,
-        .T_s = settings->T_s,
-        .input_hold = (hsep_hold)settings->input_hold};
 }
 
 /* Whether the state at the beginning of the run is corrected: with trust, alone. */
@@ -66,7 +53,6 @@ static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_pa
     const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
     hsep_real end = HSEP_WORDS(hsep_predictor);
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
-    const hsep_start_parameters start = predictor_start_parameters(parameters);
     self->Np = parameters->settings.Np;
     self->late = parameters->settings.measurement_delay;
     self->n = self->Np + self->late;
@@ -87,7 +73,7 @@ static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_pa
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
     self->model = hsep_take_block(&end, hsep_residual_size(&model));
-    self->motion = predictor_corrects_start(parameters) ? hsep_take_block(&end, hsep_start_size(&start)) : 0;
+    self->motion = predictor_corrects_start(parameters) ? hsep_take_block(&end, hsep_start_size(&model)) : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -115,8 +101,7 @@ HSEP_API void hsep_predictor_block_init(
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     hsep_residual_init(hsep_predictor_model(self), &model, start);
     if (self->motion) {
-        const hsep_start_parameters motion = predictor_start_parameters(parameters);
-        hsep_start_init((hsep_start *)hsep_at(self, self->motion), &motion);
+        hsep_start_init((hsep_start *)hsep_at(self, self->motion), &model);
     }
 }
 
@@ -126,14 +111,13 @@ HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
-    const hsep_start_parameters motion = predictor_start_parameters(parameters);
     const hsep_real sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
         hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np, got.n) &&
-        (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &motion)) &&
+        (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &model)) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
     const hsep_real residuals[2] = {got.residual, got.held};

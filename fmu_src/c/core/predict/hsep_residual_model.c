@@ -1,21 +1,12 @@
 #include "hsep_residual_model.h"
 
+#include "hsep_range.h"
+
 #include <stddef.h>
 #include <string.h>
 
 /* Parts in which the one that can be trusted predicts a window: its variances are dear. */
 static const hsep_word residual_parts = 25;
-
-HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
-{
-    return (hsep_trusted_parameters){
-        .settings = parameters->settings,
-        .trust = parameters->trust,
-        .modes = parameters->modes,
-        .n_modes = parameters->n_modes,
-        .n = parameters->preview + parameters->settings->measurement_delay,
-        .planned = parameters->planned};
-}
 
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
 {
@@ -35,14 +26,13 @@ static const hsep_trusted *residual_trusted(const hsep_residual_model *self)
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     hsep_real end = HSEP_WORDS(hsep_residual_model);
     self->Np = parameters->settings->Np;
     self->late = parameters->settings->measurement_delay;
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
     self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
-    self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
+    self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(parameters)) : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -53,10 +43,9 @@ HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters
 
 HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
-    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     (void)residual_lay_out(self, parameters);
     if (self->trusted) {
-        hsep_trusted_init(hsep_residual_trusted(self), &trusted, start);
+        hsep_trusted_init(hsep_residual_trusted(self), parameters, start);
     } else {
         hsep_paper_init(hsep_residual_paper(self), parameters->settings);
     }
@@ -64,40 +53,44 @@ HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_
 
 HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters)
 {
-    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     hsep_residual_model got;
-    memcpy(&got, block, sizeof got);
-    (void)residual_lay_out(&got, parameters); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.learning <= 1 &&
-           (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
+    return HSEP_LAID_OUT(got, block, residual_lay_out(&got, parameters)) && got.learning <= 1 &&
+           (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), parameters)
                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
 }
 
-HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self)
+/* Gram matrix of a factor of the one that can be trusted. */
+static hsep_gram *residual_gram(hsep_residual_model *self, hsep_word factor)
 {
-    return self->trusted ? HSEP_N_EVIDENCE : 1;
+    return hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(self), factor));
 }
+
+HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self) { return self->trusted ? HSEP_N_KINDS : 1; }
 
 HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor)
 {
-    return self->trusted ? hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor)->n
-                         : hsep_paper_regression(hsep_residual_paper(self))->n;
+    return self->trusted ? residual_gram(self, factor)->n : hsep_paper_regression(hsep_residual_paper(self))->n;
 }
 
 HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor)
 {
-    return self->trusted ? hsep_gram_row(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor))
+    return self->trusted ? hsep_gram_row(residual_gram(self, factor))
                          : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
 }
 
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_word n_samples)
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_real n_rows)
 {
+    int loaded = n_rows >= 0.0 && n_rows <= HSEP_PREDICTION_MAX;
     if (self->trusted) {
-        return hsep_gram_load(hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)factor), i);
+        hsep_gram *gram = residual_gram(self, factor);
+        loaded = loaded && hsep_gram_load(gram, i);
+        gram->n_rows = n_rows;
+    } else {
+        hsep_regression *regression = hsep_paper_regression(hsep_residual_paper(self));
+        loaded = loaded && hsep_regression_load(regression, i);
+        regression->n_rows = n_rows;
     }
-    hsep_regression *regression = hsep_paper_regression(hsep_residual_paper(self));
-    regression->n_samples = n_samples;
-    return hsep_regression_load(regression, i);
+    return loaded;
 }
 
 HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self)
@@ -105,9 +98,9 @@ HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self)
     return self->trusted ? hsep_trusted_n_learned(hsep_residual_trusted(self)) : 0;
 }
 
-HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self, hsep_word i)
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
 {
-    return self->trusted ? hsep_trusted_learned(hsep_residual_trusted(self), i) : NULL;
+    return self->trusted ? &hsep_residual_trusted(self)->learned.velocity_scale : NULL;
 }
 
 HSEP_API int hsep_residual_sound(hsep_residual_model *self)

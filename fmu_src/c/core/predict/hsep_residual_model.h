@@ -9,25 +9,9 @@
 #ifndef HSEP_RESIDUAL_MODEL_H
 #define HSEP_RESIDUAL_MODEL_H
 
-#include "hsep_api.h"
-#include "hsep_layout.h"
 #include "hsep_paper.h"
-#include "hsep_physics.h"
-#include "hsep_residual_window.h"
-#include "hsep_settings.h"
 #include "hsep_trusted.h"
 #include "hsep_uncertainty.h"
-
-#include "hsep_real.h"
-
-typedef struct {
-    const hsep_predictor_settings *settings;
-    const hsep_trust_settings *trust;
-    const hsep_mode *modes; /* (n_modes,) */
-    hsep_word n_modes;
-    hsep_word preview; /* samples from the command to the drive, >= Np */
-    int planned;       /* whether a compensator decides the commands */
-} hsep_residual_parameters;
 
 typedef struct {
     hsep_word Np, late, n; /* samples of a window, those not measured yet before it, both together */
@@ -53,22 +37,19 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
 HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
 
-/* Parameters of the one that can be trusted. */
-HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters);
-
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
  * one of them. The first one is that of the physics model's residual. */
 HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self);
 HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor);
 
-/* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_samples: rows that the
- * factor is from. */
+/* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_rows: rows that the
+ * factor is from, weighted. */
 HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor);
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_word n_samples);
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_real n_rows);
 
-/* Numbers learned besides them and whether they are in range; those of hsep_trusted_learned, none without. */
+/* Numbers learned besides them, the first of so many, and whether they are in range; none without trust. */
 HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self);
-HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self, hsep_word i);
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 HSEP_API int hsep_residual_sound(hsep_residual_model *self);
 
 /* Begin another run with what was learned. */

@@ -1,4 +1,4 @@
-/* Signals of a window that a residual model learns from and predicts.
+/* Signals of a window whose residual a model predicts, and that it learns from.
  *
  * They are kept newest first: of the n = Np + late samples that are predicted, sample k is at place n - 1 - k, and what
  * was before them is behind them; the first Np are measured when the window ends.
@@ -6,7 +6,17 @@
 #ifndef HSEP_RESIDUAL_WINDOW_H
 #define HSEP_RESIDUAL_WINDOW_H
 
-#include "hsep_real.h"
+#include "hsep.h"
+
+/* Parameters of a model. */
+typedef struct {
+    const hsep_predictor_settings *settings;
+    const hsep_trust_settings *trust;
+    const hsep_mode *modes; /* (n_modes,) */
+    hsep_word n_modes;
+    hsep_word n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
+    int planned; /* whether a compensator decides the commands */
+} hsep_residual_parameters;
 
 typedef struct {
     const hsep_real *command; /* (n,) m, commands relative to the start */

@@ -1,13 +1,13 @@
 #include "hsep_uncertainty.h"
 
-#include "hsep_predict_constants.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include "hsep_math.h"
 #include <string.h>
 
-static const hsep_real uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, HSEP_UNCERTAINTY_SHARES};
+static const hsep_real uncertainty_shares[] = {HSEP_UNCERTAINTY_SHARES};
+static const hsep_range uncertainty_ranges[] = {HSEP_UNCERTAINTY_RANGES};
 static const hsep_real uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -17,7 +17,7 @@ static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_word Np, hsep_
     self->Np = Np;
     self->n = n;
     self->e_h = hsep_take(&end, (hsep_real)n);
-    self->components = hsep_take(&end, (hsep_real)n * HSEP_N_COMPONENTS);
+    self->components = hsep_take(&end, (hsep_real)n * HSEP_UNCERTAINTY_N_COMPONENTS);
     self->std = hsep_take(&end, (hsep_real)n);
     return end * sizeof(hsep_real);
 }
@@ -37,40 +37,26 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_w
 {
     memset(self, 0, (size_t)hsep_uncertainty_size(Np, n));
     (void)uncertainty_lay_out(self, Np, n);
-    memcpy(self->theta, uncertainty_shares, sizeof self->theta);
     self->theta[0] = variance;
+    memcpy(self->theta + 1, uncertainty_shares, sizeof uncertainty_shares);
     self->factor = self->ratio = 1.0;
 }
 
 HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n)
 {
     hsep_uncertainty got;
-    memcpy(&got, block, sizeof got);
-    (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got);
+    return HSEP_LAID_OUT(got, block, uncertainty_lay_out(&got, Np, n)) && hsep_uncertainty_sound(&got);
 }
-
-HSEP_API hsep_real *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
 
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
 {
-    hsep_real learned[HSEP_N_UNCERTAINTY];
-    memcpy(learned, (const char *)self + sizeof self->Np, sizeof learned);
-    int sound = self->factor >= 1.0 / HSEP_UNCERTAINTY_FACTOR_MAX && self->factor <= HSEP_UNCERTAINTY_FACTOR_MAX &&
-                self->ratio >= 1.0 / HSEP_UNCERTAINTY_RATIO_MAX && self->ratio <= HSEP_UNCERTAINTY_RATIO_MAX;
-    for (int i = 0; i < HSEP_N_UNCERTAINTY; i++) {
-        const hsep_real share = i < HSEP_N_COMPONENTS ? uncertainty_shares[i] : 0.0;
-        const hsep_real least = HSEP_UNCERTAINTY_LEAST_SHARE * share;
-        const hsep_real most = share > 0.0 ? HSEP_UNCERTAINTY_MOST_SHARE * share : HSEP_PREDICTION_MAX;
-        sound = sound && learned[i] >= least && learned[i] <= most;
-    }
-    return sound;
+    return hsep_in_ranges(self->theta, HSEP_N_UNCERTAINTY, uncertainty_ranges);
 }
 
 /* Variance of the error with these components. */
 static hsep_real uncertainty_variance(const hsep_uncertainty *self, const hsep_real components[])
 {
-    return hsep_dot(self->theta, components, HSEP_N_COMPONENTS) +
+    return hsep_dot(self->theta, components, HSEP_UNCERTAINTY_N_COMPONENTS) +
            (HSEP_UNCERTAINTY_FLOOR * self->recent + HSEP_UNCERTAINTY_LEAST_VARIANCE);
 }
 
@@ -82,7 +68,7 @@ static hsep_real uncertainty_from_middle(const hsep_uncertainty *self, hsep_word
 
 /* Components of the variance at place j, as they are at once. */
 static void uncertainty_at(
-    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word j, hsep_real f[HSEP_N_COMPONENTS])
+    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word j, hsep_real f[HSEP_UNCERTAINTY_N_COMPONENTS])
 {
     const hsep_real *x_pb = signals->x_pb;
     const hsep_word n = self->n;
@@ -106,9 +92,9 @@ HSEP_API void hsep_uncertainty_predict(
     }
     for (hsep_word k = first; k < last; k++) { /* in time, from the last measured sample on */
         published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
-        hsep_real *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_N_COMPONENTS;
+        hsep_real *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_UNCERTAINTY_N_COMPONENTS;
         uncertainty_at(self, signals, n - 1 - k, f);
-        for (int i = 1; i < HSEP_N_COMPONENTS; i++) { /* all but the noise */
+        for (int i = 1; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) { /* all but the noise */
             felt[i] += gain * (f[i] - felt[i]);
             f[i] = felt[i];
         }
@@ -158,20 +144,17 @@ static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *s
 /* A step of expectation maximisation. seen, total: over the samples, the share of each component in the variance, with
  * and without the squared error. */
 static void uncertainty_step_by(
-    hsep_uncertainty *self, const hsep_real seen[HSEP_N_COMPONENTS], const hsep_real total[HSEP_N_COMPONENTS])
+    hsep_uncertainty *self, const hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS], const hsep_real total[HSEP_UNCERTAINTY_N_COMPONENTS])
 {
-    for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
-        const hsep_real windows = total[i] / (hsep_real)self->Np, share = uncertainty_shares[i];
+    for (int i = 0; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) {
+        const hsep_real windows = total[i] / (hsep_real)self->Np;
+        const hsep_real least = i > 0 ? uncertainty_ranges[i].least : HSEP_UNCERTAINTY_FLOOR * self->recent;
         self->evidence[i] = HSEP_UNCERTAINTY_MEMORY * self->evidence[i] + windows;
         const hsep_real change = hsep_fmax(total[i] > 0.0 ? seen[i] / total[i] : 1.0, HSEP_UNCERTAINTY_VANISHING);
         const hsep_real step =
             hsep_fmin(HSEP_UNCERTAINTY_STEP * windows / (self->evidence[i] + HSEP_UNCERTAINTY_FIRST_EVIDENCE), 1.0);
         const hsep_real theta = self->theta[i] * hsep_pow(change, step);
-        self->theta[i] =
-            share == 0.0
-                ? hsep_fmin(hsep_fmax(theta, HSEP_UNCERTAINTY_FLOOR * self->recent), HSEP_PREDICTION_MAX)
-                : hsep_fmin(
-                      hsep_fmax(theta, HSEP_UNCERTAINTY_LEAST_SHARE * share), HSEP_UNCERTAINTY_MOST_SHARE * share);
+        self->theta[i] = hsep_fmin(hsep_fmax(theta, least), uncertainty_ranges[i].most);
     }
 }
 
@@ -179,8 +162,8 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[]
 {
     const hsep_word newest = self->n - self->Np; /* place of the last one that is measured */
     const hsep_real *e_h = hsep_at(self, self->e_h) + newest, *std = hsep_at(self, self->std) + newest;
-    const hsep_real *f = hsep_at(self, self->components) + newest * HSEP_N_COMPONENTS;
-    hsep_real seen[HSEP_N_COMPONENTS] = {0.0}, total[HSEP_N_COMPONENTS] = {0.0};
+    const hsep_real *f = hsep_at(self, self->components) + newest * HSEP_UNCERTAINTY_N_COMPONENTS;
+    hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS] = {0.0}, total[HSEP_UNCERTAINTY_N_COMPONENTS] = {0.0};
     uncertainty_sums sums = {0};
     for (hsep_word j = 0; j < self->Np; j++) {
         if (accepted == NULL || accepted[j] > 0.0) {
@@ -191,12 +174,12 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[]
         return;
     }
     uncertainty_follow(self, &sums);
-    for (hsep_word j = 0; j < self->Np; j++, f += HSEP_N_COMPONENTS) {
+    for (hsep_word j = 0; j < self->Np; j++, f += HSEP_UNCERTAINTY_N_COMPONENTS) {
         if (accepted == NULL || accepted[j] > 0.0) {
             const hsep_real variance = uncertainty_variance(self, f);
             const hsep_real error = e[j] - e_h[j],
                             relative = hsep_fmin(error * error / variance, HSEP_UNCERTAINTY_OUTLYING);
-            for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
+            for (int i = 0; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) {
                 const hsep_real share = f[i] * self->theta[i] / variance;
                 total[i] += share;
                 seen[i] += share * relative;

@@ -15,28 +15,28 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
+#include "hsep_predict_constants.h"
 
 #include "hsep_real.h"
 
-#define HSEP_N_COMPONENTS 3
-#define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
+#define HSEP_N_UNCERTAINTY (2 * HSEP_UNCERTAINTY_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 
 typedef struct {
     hsep_word Np;
-    hsep_real theta[HSEP_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
-    hsep_real evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
+    hsep_real theta[HSEP_UNCERTAINTY_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
+    hsep_real evidence[HSEP_UNCERTAINTY_N_COMPONENTS]; /* windows that each stands on, faded */
     hsep_real factor;                      /* c in the middle of a window */
     hsep_real ratio;                       /* c at its end relative to that at its beginning */
     hsep_real recent;                      /* m2, recent mean square of the residual; 0 before the first window */
     hsep_word n;                           /* samples that are predicted */
-    hsep_real felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
+    hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
     /* Offsets in words from the beginning of the struct */
     hsep_word e_h;        /* (n,) m, residual of the window as published */
-    hsep_word components; /* (n, HSEP_N_COMPONENTS) m2 but for the first, which is 1 */
+    hsep_word components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */
     hsep_word std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n);
@@ -51,8 +51,7 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_w
 /* Whether a block, in any alignment, is one that hsep_uncertainty_init with these parameters began. */
 HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n);
 
-/* The numbers learned, (HSEP_N_UNCERTAINTY,), and whether they are in range. */
-HSEP_API hsep_real *hsep_uncertainty_learned(hsep_uncertainty *self);
+/* Whether the numbers learned, (HSEP_N_UNCERTAINTY,) from theta on, are in range. */
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 
 /* Signals that tell of a prediction's error. */

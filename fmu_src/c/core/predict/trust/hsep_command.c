@@ -1,14 +1,16 @@
 #include "hsep_command.h"
 
-#include "hsep_trust_constants.h"
+#include "hsep_predict_constants.h"
 
 #include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n)
+static hsep_real command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters)
 {
+    const hsep_predictor_settings *settings = parameters->settings;
+    const hsep_word n = parameters->n;
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
@@ -21,27 +23,25 @@ static hsep_real command_lay_out(hsep_command *self, const hsep_predictor_settin
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_command_size(const hsep_predictor_settings *settings, hsep_word n)
+HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters)
 {
-    return command_lay_out(&(hsep_command){0}, settings, n);
+    return command_lay_out(&(hsep_command){0}, parameters);
 }
 
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n)
+HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters)
 {
-    memset(self, 0, (size_t)hsep_command_size(settings, n));
-    (void)command_lay_out(self, settings, n);
+    memset(self, 0, (size_t)hsep_command_size(parameters));
+    (void)command_lay_out(self, parameters);
     for (hsep_word i = 0; i < self->count; i++) {
         const hsep_real age = i > 0 ? (hsep_real)(i - 1) / (hsep_real)self->p : 0.0;
         hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, age));
     }
 }
 
-HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, hsep_word n)
+HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters)
 {
     hsep_command got;
-    memcpy(&got, block, sizeof got);
-    (void)command_lay_out(&got, settings, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0;
+    return HSEP_LAID_OUT(got, block, command_lay_out(&got, parameters));
 }
 
 HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature)
@@ -50,12 +50,6 @@ HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word featur
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m)
-{
-    hsep_command_take_in(self, x_d, m);
-    hsep_command_fill(self, m, 0, m);
-}
-
-HSEP_API void hsep_command_take_in(hsep_command *self, const hsep_real x_d[], hsep_word m)
 {
     memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
 }

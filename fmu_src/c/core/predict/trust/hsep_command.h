@@ -11,7 +11,7 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_settings.h"
+#include "hsep_residual_window.h"
 
 #include "hsep_real.h"
 
@@ -30,24 +30,22 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_command, 8);
 
-/* Bytes of the block, counted as a number so that no size can overflow; n: samples of a prediction. */
-HSEP_API hsep_real hsep_command_size(const hsep_predictor_settings *settings, hsep_word n);
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters);
 
 /* Fill the block, at rest. */
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, hsep_word n);
+HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters);
 
 /* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
-HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, hsep_word n);
+HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
 HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature);
 
-/* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
- * others. */
+/* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m);
 
-/* The same in parts: begin, then fill the rows of samples first ... last - 1. */
-HSEP_API void hsep_command_take_in(hsep_command *self, const hsep_real x_d[], hsep_word m);
+/* Fill the rows of samples first ... last - 1 of these. */
 HSEP_API void hsep_command_fill(hsep_command *self, hsep_word m, hsep_word first, hsep_word last);
 
 /* Of these, the commands as many samples ago as the dead time has, (m,), m. */

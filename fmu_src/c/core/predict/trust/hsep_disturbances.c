@@ -1,8 +1,5 @@
 #include "hsep_disturbances.h"
 
-#include "hsep_predict_constants.h"
-#include "hsep_trust_constants.h"
-
 #include "hsep_math.h"
 #include <string.h>
 
@@ -12,22 +9,22 @@
 #define DISTURBANCES_SPREAD_4 (DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
 
 /* Velocities of the friction's change of sign, relative to the velocity scale. */
-static const hsep_real disturbances_spread[HSEP_DISTURBANCES_FRICTION] = {
+static const hsep_real disturbances_spread[HSEP_DISTURBANCES_N_FRICTION] = {
     HSEP_TRUST_FRICTION_LEAST, HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO,
     DISTURBANCES_SPREAD_2,     DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO,
     DISTURBANCES_SPREAD_4,     DISTURBANCES_SPREAD_4 * HSEP_TRUST_FRICTION_RATIO};
 
 static const hsep_real disturbances_turn = 6.283185307179586; /* rad */
 
-HSEP_API hsep_word hsep_disturbances_count(hsep_real period)
+HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters)
 {
-    return period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_DISTURBANCES_PERIODIC;
+    return parameters->trust->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_DISTURBANCES_N_LASTING;
 }
 
-HSEP_API hsep_word hsep_disturbances_n(hsep_word q, hsep_real period)
+HSEP_API hsep_word hsep_disturbances_n(const hsep_residual_parameters *parameters)
 {
-    return 2 + (q < HSEP_DISTURBANCES_DIFFERENCES ? q : HSEP_DISTURBANCES_DIFFERENCES) +
-           2 * hsep_disturbances_count(period);
+    const hsep_word q = parameters->settings->q, most = HSEP_DISTURBANCES_DIFFERENCES;
+    return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
 }
 
 HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature)
@@ -46,18 +43,17 @@ static hsep_physics *disturbances_tried(hsep_disturbances *self, hsep_word i)
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real disturbances_lay_out(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes,
-    int of_motion)
+static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_word count = hsep_disturbances_count(period);
-    const hsep_real filters = (hsep_real)count * hsep_physics_size(n_modes, settings->dead_time);
+    const hsep_predictor_settings *settings = parameters->settings;
+    const hsep_word count = hsep_disturbances_count(parameters);
+    const hsep_real filters = (hsep_real)count * hsep_physics_size(parameters->n_modes, settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_disturbances);
     self->count = count;
-    self->period = period;
-    self->n = hsep_disturbances_n(settings->q, period);
+    self->period = parameters->trust->period;
+    self->n = hsep_disturbances_n(parameters);
     self->n_differences = self->n - 2 - 2 * count;
-    self->of_motion = of_motion != 0;
+    self->of_motion = parameters->planned != 0;
     self->T_s = settings->T_s;
     self->filters = hsep_take_block(&end, filters);
     self->tried = hsep_take_block(&end, filters);
@@ -65,35 +61,32 @@ static hsep_real disturbances_lay_out(
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_disturbances_size(const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes)
+HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters)
 {
-    return disturbances_lay_out(&(hsep_disturbances){0}, settings, period, n_modes, 0);
+    return disturbances_lay_out(&(hsep_disturbances){0}, parameters);
 }
 
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, hsep_real period, const hsep_mode modes[],
-    hsep_word n_modes, int of_motion, hsep_real start)
+    hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
-    memset(self, 0, (size_t)hsep_disturbances_size(settings, period, n_modes));
-    (void)disturbances_lay_out(self, settings, period, n_modes, of_motion);
+    const hsep_predictor_settings *settings = parameters->settings;
+    memset(self, 0, (size_t)hsep_disturbances_size(parameters));
+    (void)disturbances_lay_out(self, parameters);
     self->origin = start;
     for (hsep_word i = 0; i < 2 * self->count; i++) { /* those that were tried behind them */
         hsep_physics_init(
-            disturbances_filter(self, i), modes, n_modes, settings->dead_time, settings->T_s,
+            disturbances_filter(self, i), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
             (hsep_hold)settings->input_hold);
     }
 }
 
-HSEP_API int hsep_disturbances_valid(
-    const void *block, const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes, int of_motion)
+HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters)
 {
     hsep_disturbances got;
-    memcpy(&got, block, sizeof got);
-    (void)disturbances_lay_out(&got, settings, period, n_modes, of_motion); /* changes nothing where it is sound */
-    int sound = memcmp(&got, block, sizeof got) == 0;
+    int sound = HSEP_LAID_OUT(got, block, disturbances_lay_out(&got, parameters));
     for (hsep_word i = 0; i < 2 * got.count; i++) {
         const void *filter = hsep_at_bytes(block, got.filters + i * got.filter_words);
-        sound = sound && hsep_physics_valid(filter, n_modes, settings->dead_time);
+        sound = sound && hsep_physics_valid(filter, parameters->n_modes, parameters->settings->dead_time);
     }
     return sound;
 }
@@ -180,8 +173,8 @@ static void disturbances_friction(
     hsep_disturbances *self, const hsep_real v_d[], hsep_word n, hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER] = {0.0};
-    for (hsep_word first = 0; first < HSEP_DISTURBANCES_FRICTION; first += HSEP_PHYSICS_ABREAST) {
-        const hsep_word left = HSEP_DISTURBANCES_FRICTION - first;
+    for (hsep_word first = 0; first < HSEP_DISTURBANCES_N_FRICTION; first += HSEP_PHYSICS_ABREAST) {
+        const hsep_word left = HSEP_DISTURBANCES_N_FRICTION - first;
         const hsep_word count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
         for (hsep_word i = 0; i < count; i++) {
             const hsep_real spread = disturbances_sign_velocity(velocity_scale, first + i);
@@ -199,7 +192,7 @@ HSEP_API void hsep_disturbances_command(
 {
     hsep_disturbed *now = &self->after;
     hsep_real v_d[DISTURBANCES_TOGETHER];
-    disturbances_rewind(self, 0, HSEP_DISTURBANCES_FRICTION);
+    disturbances_rewind(self, 0, HSEP_DISTURBANCES_N_FRICTION);
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
     for (hsep_word j = n; j > 0;) {
@@ -238,12 +231,6 @@ static hsep_real disturbances_angle(const hsep_disturbances *self, hsep_real x)
 }
 
 HSEP_API void hsep_disturbances_motion(
-    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_real rows[])
-{
-    hsep_disturbances_motion_of(self, x_pb, x, n, 0, n, rows);
-}
-
-HSEP_API void hsep_disturbances_motion_of(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
     hsep_real rows[])
 {
@@ -261,7 +248,7 @@ HSEP_API void hsep_disturbances_motion_of(
             const hsep_real v = disturbances_velocity(self, x_pb, x, n, j);
             *of_sample++ = x[j] * hsep_fabs(x[j]);
             *of_sample++ = v * hsep_fabs(v);
-            if (self->count > HSEP_DISTURBANCES_PERIODIC) {
+            if (self->count > HSEP_DISTURBANCES_N_LASTING) {
                 const hsep_real angle = disturbances_angle(self, x[j]);
                 *of_sample++ = hsep_sin(angle) - s;
                 *of_sample = hsep_cos(angle) - c;
@@ -290,7 +277,7 @@ HSEP_API void hsep_disturbances_slopes(
     for (hsep_word j = n; j-- > 0; slopes += self->count) {
         const hsep_real v_d = (x_d[j] - last) / self->T_s;
         last = x_d[j];
-        for (hsep_word i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
+        for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
             const hsep_real spread = disturbances_sign_velocity(velocity_scale, i);
             if (half > 0.0) {
                 slopes[i] = (hsep_tanh((v_d + half) / spread) - hsep_tanh((v_d - half) / spread)) / (2.0 * half);
@@ -301,10 +288,10 @@ HSEP_API void hsep_disturbances_slopes(
         }
         slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * hsep_fabs(x[j]);
         slopes[HSEP_DISTURBANCES_DAMPING] = 2.0 * hsep_fabs(disturbances_velocity(self, x_pb, x, n, j));
-        if (self->count > HSEP_DISTURBANCES_PERIODIC) {
+        if (self->count > HSEP_DISTURBANCES_N_LASTING) {
             const hsep_real angle = disturbances_angle(self, x[j]), turns = disturbances_turn / self->period;
-            slopes[HSEP_DISTURBANCES_PERIODIC] = turns * hsep_cos(angle);
-            slopes[HSEP_DISTURBANCES_PERIODIC + 1] = -turns * hsep_sin(angle);
+            slopes[HSEP_DISTURBANCES_N_LASTING] = turns * hsep_cos(angle);
+            slopes[HSEP_DISTURBANCES_N_LASTING + 1] = -turns * hsep_sin(angle);
         }
     }
 }

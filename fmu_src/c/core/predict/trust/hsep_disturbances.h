@@ -11,19 +11,16 @@
 #ifndef HSEP_DISTURBANCES_H
 #define HSEP_DISTURBANCES_H
 
-#include "hsep_api.h"
-#include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_settings.h"
+#include "hsep_predict_constants.h"
+#include "hsep_residual_window.h"
 
 #include "hsep_real.h"
 
-#define HSEP_DISTURBANCES_FRICTION 6 /* disturbances of friction, the first ones, */
-#define HSEP_DISTURBANCES_STIFFNESS 6
-#define HSEP_DISTURBANCES_DAMPING 7
-#define HSEP_DISTURBANCES_PERIODIC 8 /* sine and cosine, where there is a period */
-#define HSEP_DISTURBANCES_MAX 10
-#define HSEP_DISTURBANCES_PAST 4 /* predictions: differences up to the third need them */
+#define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_N_FRICTION /* place, behind friction */
+#define HSEP_DISTURBANCES_DAMPING (HSEP_DISTURBANCES_STIFFNESS + 1)
+#define HSEP_DISTURBANCES_MAX (HSEP_DISTURBANCES_N_LASTING + HSEP_DISTURBANCES_N_PERIODIC)
+#define HSEP_DISTURBANCES_PAST (HSEP_DISTURBANCES_DIFFERENCES + 1) /* predictions that differences need */
 
 /* What was before a sample. */
 typedef struct {
@@ -38,7 +35,8 @@ typedef struct {
     hsep_word n;             /* features */
     hsep_real period;        /* m, of a disturbance that repeats with the position; 0: none */
     hsep_real origin;        /* m, the start: what repeats does not know of it */
-    hsep_word of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb */
+    hsep_word of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb, which
+                              * behind a compensator turns with every change of the command, far from the motion */
     hsep_real T_s;           /* s */
     hsep_disturbed before;   /* the window that comes next */
     hsep_disturbed after;    /* the samples that were tried last */
@@ -50,27 +48,22 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_disturbed, 15);
 HSEP_ASSERT_WORDS(hsep_disturbances, 40);
 
-/* Disturbances with a period, or without one, 0. */
-HSEP_API hsep_word hsep_disturbances_count(hsep_real period);
-
-/* Features for the largest lag q, and a period or none, 0. */
-HSEP_API hsep_word hsep_disturbances_n(hsep_word q, hsep_real period);
+/* Disturbances, and features. */
+HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters);
+HSEP_API hsep_word hsep_disturbances_n(const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest. */
 HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature);
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
-HSEP_API hsep_real hsep_disturbances_size(const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes);
+HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters);
 
-/* Fill the block, at rest at start, m. modes: (n_modes,); of_motion: whether the damping is that of the position's own
- * velocity: behind a compensator x_pb turns with every change of the command, and is far from the motion. */
+/* Fill the block, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, hsep_real period, const hsep_mode modes[],
-    hsep_word n_modes, int of_motion, hsep_real start);
+    hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_disturbances_init with these parameters began. */
-HSEP_API int hsep_disturbances_valid(
-    const void *block, const hsep_predictor_settings *settings, hsep_real period, hsep_word n_modes, int of_motion);
+HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Begin again, at rest but for a motion that went on as the n samples begin, (n,) m each. */
 HSEP_API void hsep_disturbances_restart(
@@ -86,12 +79,9 @@ HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n, hsep_real velocity_scale,
     hsep_real rows[]);
 
-/* Fill stiffness, damping and what repeats of these samples in the rows, which act at the position x, (n,), m; may be
- * tried again. Those of samples first ... last - 1 alone, as x becomes known; first is 0, or where the last call
- * ended. */
+/* Fill stiffness, damping and what repeats of samples first ... last - 1 of these in the rows, which act at the position
+ * x, (n,), m; first is 0, or where the last call ended; may be tried again. */
 HSEP_API void hsep_disturbances_motion(
-    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_real rows[]);
-HSEP_API void hsep_disturbances_motion_of(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
     hsep_real rows[]);
 

@@ -3,11 +3,10 @@
 #include "hsep_cholesky.h"
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
-#include "hsep_trust_constants.h"
 #include "hsep_vector.h"
 
 #include "hsep_math.h"
-#include <string.h>
+#include <stddef.h>
 
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count)
@@ -51,7 +50,6 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 {
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
-    self->correlation = 1.0;
     for (hsep_word i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
             hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
@@ -61,9 +59,7 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape)
 {
     hsep_expert got;
-    memcpy(&got, block, sizeof got);
-    (void)expert_lay_out(&got, shape); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0;
+    return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape));
 }
 
 HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j)
@@ -72,24 +68,28 @@ HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j)
     return unshrunk == 0.0 ? hsep_at_const(self, self->kept)[j] : hsep_at_const(self, self->e_h)[j] / unshrunk;
 }
 
-HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *evidence)
+HSEP_API void hsep_expert_solve(
+    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
+    const hsep_real scales[], hsep_real first, hsep_real least)
 {
-    const hsep_real noise = self->noise_variance > 0.0 ? self->noise_variance : evidence->first;
-    const hsep_real of_other = evidence->other != NULL ? evidence->weight * hsep_gram_square(evidence->other) : 0.0;
+    const hsep_gram *of_run = hsep_evidence_of_run(evidence), *earlier = hsep_evidence_earlier(evidence);
+    const hsep_real n_rows = of_run->n_rows + weight * earlier->n_rows;
+    const hsep_real of_earlier = earlier->n_rows > 0.0 ? weight * hsep_gram_square(earlier) : 0.0;
     const hsep_real resolved =
-        hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_GRAM_RESOLUTION) * (hsep_gram_square(evidence->gram) + of_other);
+        hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_GRAM_RESOLUTION) * (hsep_gram_square(of_run) + of_earlier);
+    const hsep_real noise = errors->noise_variance > 0.0 ? errors->noise_variance : first;
     const hsep_word n = self->n_static + self->p;
     hsep_real *penalties = hsep_at(self, self->penalties);
-    self->variance = hsep_fmax(hsep_fmax(noise, evidence->least), resolved) * self->correlation;
-    memcpy(penalties, evidence->scales, (size_t)self->n_static * sizeof(hsep_real));
+    self->variance = hsep_fmax(hsep_fmax(noise, least), resolved) * errors->correlation;
+    memcpy(penalties, scales, (size_t)self->n_static * sizeof(hsep_real));
     memcpy(penalties + self->n_static, hsep_at(self, self->lag_scales), (size_t)self->p * sizeof(hsep_real));
     for (hsep_word i = 0; i < n; i++) {
         penalties[i] = self->variance / (penalties[i] * penalties[i]);
     }
     const hsep_real sum = hsep_gram_solve(
-        evidence->gram, evidence->other, evidence->weight, penalties, n, hsep_at(self, self->factor),
+        of_run, earlier->n_rows > 0.0 ? earlier : NULL, weight, penalties, n, hsep_at(self, self->factor),
         hsep_at(self, self->side_by_side), hsep_at(self, self->weights));
-    self->rows_variance = hsep_fmax(sum, resolved) / evidence->n_rows;
+    self->rows_variance = hsep_fmax(sum, resolved) / n_rows;
 }
 
 /* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
@@ -201,12 +201,9 @@ HSEP_API void hsep_expert_go_on(hsep_expert *self, const hsep_real rows[], hsep_
     hsep_expert_vary(self, rows, first, last);
 }
 
-HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], const hsep_real past[], hsep_real largest_square, hsep_real bound,
-    hsep_word varied)
+HSEP_API void hsep_expert_predict(hsep_expert *self, const hsep_real rows[], hsep_word varied)
 {
     hsep_real *kept = hsep_at(self, self->kept);
-    hsep_expert_begin(self, past, largest_square, bound);
     expert_free_run(self, rows, 0, self->n);
     if (varied > 0) {
         hsep_expert_vary(self, rows, 0, varied);
@@ -218,18 +215,19 @@ HSEP_API void hsep_expert_predict(
 }
 
 HSEP_API void hsep_expert_judge(
-    hsep_expert *self, const hsep_real measured[], const hsep_real accepted[], hsep_real given)
+    const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
+    hsep_real given)
 {
-    const hsep_real *unshrunk = hsep_at(self, self->unshrunk) + (self->n - self->Np); /* of the window */
+    const hsep_real *unshrunk = hsep_at_const(self, self->unshrunk) + (self->n - self->Np); /* of the window */
     hsep_real sum = 0.0, n = 0.0;
     for (hsep_word j = 0; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
         n += accepted[j];
     }
-    self->noise_variance = given > 0.0 ? given : self->rows_variance;
-    if (self->noise_variance > 0.0) {
-        const hsep_real seen = hsep_fmin(sum * sum / n / self->noise_variance, HSEP_EXPERT_DIVERGED);
-        self->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - self->correlation);
-        self->correlation = hsep_fmin(hsep_fmax(self->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
+    errors->noise_variance = given > 0.0 ? given : self->rows_variance;
+    if (errors->noise_variance > 0.0) {
+        const hsep_real seen = hsep_fmin(sum * sum / n / errors->noise_variance, HSEP_EXPERT_DIVERGED);
+        errors->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - errors->correlation);
+        errors->correlation = hsep_fmin(hsep_fmax(errors->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
     }
 }

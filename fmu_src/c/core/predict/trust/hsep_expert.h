@@ -12,7 +12,7 @@
 #define HSEP_EXPERT_H
 
 #include "hsep_api.h"
-#include "hsep_gram.h"
+#include "hsep_evidence.h"
 #include "hsep_layout.h"
 
 #include "hsep_real.h"
@@ -23,6 +23,12 @@ typedef struct {
     hsep_real largest;        /* m, largest magnitude */
 } hsep_residual_scale;
 
+/* What is known of the errors of an expert. */
+typedef struct {
+    hsep_real noise_variance; /* m2, of a row about the model; 0 until it is known */
+    hsep_real correlation;    /* rows that count as one: errors of neighbouring rows are alike */
+} hsep_expert_errors;
+
 typedef struct {
     hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
     hsep_word n_static, p; /* features without lags, lags */
@@ -30,8 +36,6 @@ typedef struct {
 
 typedef struct {
     hsep_word Np, n, n_static, p;
-    hsep_real noise_variance; /* m2, of a row about the model; 0 until it is known */
-    hsep_real correlation;    /* rows that count as one: errors of neighbouring rows are alike */
     hsep_real variance;       /* m2, of the noise that the penalties come from */
     hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
     hsep_real largest_square; /* m2, largest mean square of a window, and */
@@ -53,7 +57,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
 HSEP_ASSERT_WORDS(hsep_expert_shape, 4);
-HSEP_ASSERT_WORDS(hsep_expert, 22);
+HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
+HSEP_ASSERT_WORDS(hsep_expert, 20);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
 HSEP_API void hsep_residual_scale_follow(
@@ -68,30 +73,22 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 /* Whether a block, in any alignment, is one that hsep_expert_init with this shape began. */
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
 
-/* What the weights are solved with. */
-typedef struct {
-    const hsep_gram *gram;   /* of rows whose first features are those of the expert, */
-    const hsep_gram *other;  /* more of them, settled, or NULL, */
-    hsep_real weight;        /* and the weight of these */
-    hsep_real n_rows;        /* and their number, weighted */
-    const hsep_real *scales; /* (n_static,) prior standard deviations of the weights without lags */
-    hsep_real first, least;  /* m2, variance of the noise while it is not known, and the least one */
-} hsep_expert_evidence;
+/* Solve for the weights from all rows, those of earlier runs weighed by weight. scales: (n_static,) prior standard
+ * deviations of the weights without lags; first, least: m2, variance of the noise while it is not known, and the least
+ * one. Cost: that of hsep_gram_solve. */
+HSEP_API void hsep_expert_solve(
+    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
+    const hsep_real scales[], hsep_real first, hsep_real least);
 
-/* Solve for the weights from all rows. Cost: that of hsep_gram_solve. */
-HSEP_API void hsep_expert_solve(hsep_expert *self, const hsep_expert_evidence *evidence);
-
-/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; bound: m,
- * on the prediction; varied: samples whose variance is computed, the first ones, while those behind them are taken as
- * unknown; 0: what the variance leaves stays that of the last prediction. Cost: n (n_static + p) multiply-adds, and
- * that of hsep_expert_vary. */
-HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], const hsep_real past[], hsep_real largest_square, hsep_real bound,
-    hsep_word varied);
-
-/* Predict them part by part: begin, then go on with samples first ... last - 1, first being 0, or where the last call
- * ended; the result is the same as with varied = n. */
+/* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
+
+/* Predict n samples in free run. rows: (n, n_static), sample after sample; varied: samples whose variance is computed,
+ * the first ones, while those behind them are taken as unknown; 0: what the variance leaves stays that of the last
+ * prediction. Cost: n (n_static + p) multiply-adds, and that of hsep_expert_vary. */
+HSEP_API void hsep_expert_predict(hsep_expert *self, const hsep_real rows[], hsep_word varied);
+
+/* Predict samples first ... last - 1 alone; first is 0, or where the last call ended. */
 HSEP_API void hsep_expert_go_on(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
 /* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
@@ -101,7 +98,8 @@ HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_w
 /* Estimate noise and correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1
  * where it counts, which one does at least; given: m2, variance of the noise, if it is known; else 0. */
 HSEP_API void hsep_expert_judge(
-    hsep_expert *self, const hsep_real measured[], const hsep_real accepted[], hsep_real given);
+    const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
+    hsep_real given);
 
 /* What shrinking and bounds leave of the recursion at place j. */
 HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j);

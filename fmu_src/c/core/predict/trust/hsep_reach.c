@@ -1,27 +1,24 @@
 #include "hsep_reach.h"
 
-#include "hsep_trust_constants.h"
+#include "hsep_predict_constants.h"
 
 #include "hsep_math.h"
 
-HSEP_API hsep_reach_window
-hsep_reach_begin(hsep_reach *self, const hsep_real x_pb[], hsep_real before, hsep_word n, hsep_real largest)
+HSEP_API void hsep_reach_begin(hsep_reach *self, hsep_real largest, hsep_real fastest)
 {
-    for (hsep_word j = n; j-- > 0; before = x_pb[j]) {
-        const hsep_real change = hsep_fabs(x_pb[j] - before);
-        self->fastest = change > self->fastest ? change : self->fastest;
-    }
-    return (hsep_reach_window){.largest = largest, .known = largest > 0.0 && self->fastest > 0.0};
+    self->largest = largest;
+    self->fastest = fastest;
+    self->known = largest > 0.0 && fastest > 0.0;
 }
 
-HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, hsep_real e, hsep_real T_s)
+HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_real e, hsep_real T_s)
 {
-    const hsep_real size = hsep_fabs(e);
+    const hsep_real size = hsep_fabs(e), most = HSEP_TRUST_REACH_RESIDUALS * self->largest;
     self->n_missing++;
     if (!isfinite(e)) {
         return 0;
     }
-    if (window->known && size > HSEP_TRUST_REACH_RESIDUALS * window->largest + HSEP_TRUST_REACH_STEPS * self->fastest) {
+    if (self->known && size > most + HSEP_TRUST_REACH_STEPS * self->fastest) {
         self->n_beyond++;
     } else if (self->n_beyond > 0) {
         self->n_beyond--;
@@ -30,6 +27,6 @@ HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_reach_window *window, hsep_
         return 0;
     }
     self->n_missing = self->n_beyond = 0;
-    window->largest = size > window->largest ? size : window->largest;
+    self->largest = hsep_fmax(self->largest, size);
     return 1;
 }

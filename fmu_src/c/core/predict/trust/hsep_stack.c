@@ -1,9 +1,7 @@
 #include "hsep_stack.h"
 
-#include "hsep_predict_constants.h"
-#include "hsep_trust_constants.h"
-
 #include "hsep_math.h"
+
 #include <string.h>
 
 static const hsep_real stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
@@ -122,27 +120,27 @@ HSEP_API void hsep_stack_update(
     stack_minimise(H, l, self->weights);
 }
 
-HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self)
+HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self)
 {
     const hsep_real *weights = self->weights;
     return weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC] ? HSEP_COMMAND : HSEP_LAGGED;
 }
 
-HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_expert_place to)
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to)
 {
     memcpy(
-        self->gram + HSEP_N_EXPERTS * (int)to, self->gram + HSEP_N_EXPERTS * (int)expert,
+        self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert,
         HSEP_N_EXPERTS * sizeof(hsep_real));
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        self->gram[HSEP_N_EXPERTS * i + (int)to] = self->gram[HSEP_N_EXPERTS * i + (int)expert];
+    for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->gram[HSEP_N_EXPERTS * i + to] = self->gram[HSEP_N_EXPERTS * i + expert];
     }
     self->cross[to] = self->cross[expert];
 }
 
-HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_expert_place expert)
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_word expert)
 {
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        self->gram[HSEP_N_EXPERTS * i + (int)expert] = self->gram[HSEP_N_EXPERTS * (int)expert + i] = 0.0;
+    for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->gram[HSEP_N_EXPERTS * i + expert] = self->gram[HSEP_N_EXPERTS * expert + i] = 0.0;
     }
     self->cross[expert] = self->weights[expert] = 0.0;
 }

@@ -9,14 +9,7 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
-#include "hsep_real.h"
-
-/* Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
- * the one of these with lags that led, with little weight of earlier runs. */
-typedef enum { HSEP_HOLD = 0, HSEP_LAGGED, HSEP_STATIC, HSEP_COMMAND, HSEP_DOUBTING } hsep_expert_place;
-
-#define HSEP_N_EXPERTS 5
+#include "hsep_predict_constants.h"
 
 typedef struct {
     hsep_real weights[HSEP_N_EXPERTS];               /* pi */
@@ -25,8 +18,11 @@ typedef struct {
     hsep_real evidence[2];                           /* e' e so far, m2, and samples */
 } hsep_stack;
 
-HSEP_ASSERT_WORDS(hsep_stack, HSEP_N_EXPERTS *(HSEP_N_EXPERTS + 2) + 2);
+#define HSEP_STACK_WORDS (HSEP_N_EXPERTS * (HSEP_N_EXPERTS + 2) + 2)
 
+HSEP_ASSERT_WORDS(hsep_stack, HSEP_STACK_WORDS);
+
+/* Begin without evidence. */
 HSEP_API void hsep_stack_init(hsep_stack *self);
 
 /* Update the weights with a measured window. products: (HSEP_N_EXPERTS + 1,) by as many, m2: the scalar products over
@@ -36,12 +32,12 @@ HSEP_API void hsep_stack_update(
     hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
 
 /* HSEP_COMMAND, if it has more of the weights than HSEP_LAGGED and HSEP_STATIC together, else HSEP_LAGGED. */
-HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self);
+HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self);
 
 /* Give an expert the evidence of another, as if it had predicted the same so far. */
-HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_expert_place to);
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to);
 
 /* Forget an expert that predicts no more. */
-HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_expert_place expert);
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_word expert);
 
 #endif

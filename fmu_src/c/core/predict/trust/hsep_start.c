@@ -10,40 +10,42 @@
 static const hsep_real start_two_pi = 6.283185307179586;
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real start_lay_out(hsep_start *self, const hsep_start_parameters *parameters)
+static hsep_real start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_real Np = (hsep_real)parameters->Np, n = Np + (hsep_real)parameters->late;
-    const hsep_real n_states = 2.0 * (hsep_real)parameters->n_modes, all = n_states + (hsep_real)parameters->dead_time;
+    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    const hsep_real Np = (hsep_real)parameters->settings->Np, n = (hsep_real)parameters->n;
+    const hsep_real n_states = 2.0 * (hsep_real)n_modes, all = n_states + (hsep_real)dead_time;
     hsep_real end = HSEP_WORDS(hsep_start);
-    self->Np = parameters->Np;
-    self->n = parameters->Np + parameters->late;
-    self->n_states = 2 * parameters->n_modes;
-    self->dead_time = parameters->dead_time;
+    self->Np = parameters->settings->Np;
+    self->n = parameters->n;
+    self->n_states = 2 * n_modes;
+    self->dead_time = dead_time;
     self->states = hsep_take(&end, all);
     self->state = hsep_take(&end, all);
     self->response = hsep_take(&end, n + Np);
     self->responses = hsep_take(&end, n_states * n);
     self->weights = hsep_take(&end, n_states);
-    self->trial = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
+    self->trial = hsep_take_block(&end, hsep_physics_size(n_modes, dead_time));
     self->regression = hsep_take_block(&end, hsep_regression_size(self->n_states));
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_start_size(const hsep_start_parameters *parameters)
+HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters)
 {
     return start_lay_out(&(hsep_start){0}, parameters);
 }
 
-HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *parameters)
+HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters)
 {
+    const hsep_predictor_settings *settings = parameters->settings;
     memset(self, 0, (size_t)hsep_start_size(parameters));
     (void)start_lay_out(self, parameters);
     hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
-    const hsep_real late = (hsep_real)(parameters->dead_time + parameters->late); /* samples */
+    const hsep_real late = (hsep_real)(settings->dead_time + (self->n - self->Np)); /* samples */
     for (hsep_word i = 0; i < parameters->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = v t has the solution omega^2 z = v t - 2 zeta v / omega, in the state
          * (omega^2 z, omega z'). */
-        const hsep_real omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / parameters->T_s;
+        const hsep_real omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / settings->T_s;
         states[2 * i] = -late - 2.0 * parameters->modes[i].zeta * v / omega;
         states[2 * i + 1] = v / omega;
     }
@@ -51,18 +53,17 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *par
         within[i] = (hsep_real)i - late;
     }
     hsep_physics_init(
-        (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, parameters->dead_time,
-        parameters->T_s, parameters->input_hold);
+        (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, settings->dead_time,
+        settings->T_s, (hsep_hold)settings->input_hold);
     hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 
-HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters)
+HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters *parameters)
 {
     hsep_start got;
-    memcpy(&got, block, sizeof got);
-    (void)start_lay_out(&got, parameters); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->dead_time) &&
+    return HSEP_LAID_OUT(got, block, start_lay_out(&got, parameters)) &&
+           hsep_physics_valid(
+               hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->settings->dead_time) &&
            hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_states);
 }
 

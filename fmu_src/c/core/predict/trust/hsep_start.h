@@ -13,6 +13,7 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
+#include "hsep_residual_window.h"
 
 #include "hsep_real.h"
 
@@ -30,21 +31,13 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_start, 11);
 
-typedef struct {
-    hsep_word Np, late; /* samples of a window, and by which the measurement is late */
-    hsep_word n_modes, dead_time;
-    const hsep_mode *modes; /* (n_modes,) */
-    hsep_real T_s;          /* s */
-    hsep_hold input_hold;
-} hsep_start_parameters;
-
 /* Bytes of the block, counted as a number so that no size can overflow. */
-HSEP_API hsep_real hsep_start_size(const hsep_start_parameters *parameters);
+HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters);
 
-HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *parameters);
+HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters);
 
 /* Whether a block, in any alignment, is one that hsep_start_init with these parameters began. */
-HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters);
+HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */
 HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[]);

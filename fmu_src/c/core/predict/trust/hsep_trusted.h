@@ -15,36 +15,28 @@
 #ifndef HSEP_TRUSTED_H
 #define HSEP_TRUSTED_H
 
-#include "hsep_api.h"
 #include "hsep_command.h"
 #include "hsep_disturbances.h"
+#include "hsep_evidence.h"
 #include "hsep_expert.h"
-#include "hsep_gram.h"
-#include "hsep_layout.h"
-#include "hsep_physics.h"
 #include "hsep_reach.h"
-#include "hsep_settings.h"
 #include "hsep_stack.h"
 
-#include "hsep_real.h"
-
-typedef struct {
-    const hsep_predictor_settings *settings;
-    const hsep_trust_settings *trust;
-    const hsep_mode *modes; /* (n_modes,) */
-    hsep_word n_modes;
-    hsep_word
-        n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
-    int planned; /* whether a compensator decides the commands */
-} hsep_trusted_parameters;
-
-/* Rows that experts have learned: of the physics model's residual, and of the command's. */
-typedef enum { HSEP_OF_PHYSICS = 0, HSEP_OF_COMMAND } hsep_evidence;
-
-#define HSEP_N_EVIDENCE 2
+#define HSEP_N_KINDS (HSEP_OF_COMMAND + 1) /* of residuals: of the physics model, and of the command */
 
 /* Samples of a window that are learned at one: those catch up that were measured before it was predicted. */
 #define HSEP_TRUSTED_PACE 2
+
+/* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
+ * them are the largest magnitudes of the features without lags. */
+typedef struct {
+    hsep_real velocity_scale; /* m/s, of the friction features; 0 before any motion */
+    hsep_real largest_step;   /* m, largest change from sample to sample, of the command */
+    hsep_real fastest;        /* m, and of the physics model */
+    hsep_residual_scale scales[HSEP_N_KINDS];
+    hsep_expert_errors errors[HSEP_N_EXPERTS - HSEP_LAGGED]; /* of the experts from HSEP_LAGGED on */
+    hsep_stack stack;
+} hsep_learned;
 
 typedef struct {
     hsep_word Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
@@ -54,98 +46,81 @@ typedef struct {
     hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
     hsep_real given_variance;     /* m2, of the noise; 0: estimated */
     hsep_real kept;               /* weight of earlier rows, from window to window */
-    /* Learned */
-    hsep_real n_rows[HSEP_N_EVIDENCE];    /* of this run, weighted */
-    hsep_real n_earlier[HSEP_N_EVIDENCE]; /* of earlier runs, as long as they are doubted */
-    hsep_real velocity_scale;             /* m/s */
-    hsep_real largest_step;               /* m, largest change of the command from sample to sample */
-    hsep_residual_scale scale, scale_of_command;
-    hsep_stack stack;
+    hsep_word leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
+    hsep_reach reach;
+    hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
-    hsep_real hold;                      /* m, last residual, bounded */
     hsep_real forecast_scale;            /* m/s, velocity scale with it, */
     hsep_real forecast_step;             /* m, and largest change of the command */
     hsep_real bound;                     /* m, on what is predicted, */
     hsep_real growth;                    /* and by how much that of the command may be larger: as its largest step is */
     hsep_word predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
-    hsep_word
-        leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
-    hsep_reach reach;
-    hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is measured */
     hsep_word followed;   /* samples that were judged and, as far as they are believed, learned */
     hsep_word known;      /* samples up to the last one that is believed */
     hsep_real n_accepted; /* samples that are */
-    hsep_reach_window reach_of_window;
     /* Offsets in words from the beginning of the struct */
-    hsep_word largest;          /* (n_static,) largest magnitudes of the features without lags */
-    hsep_word forecast_largest; /* (n_static,) those with the window that is predicted */
+    hsep_word forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
     hsep_word scales;           /* (max(n_static, p of the command + 2),) prior standard deviations of weights, work */
     hsep_word x;                /* (n,) m, position */
     hsep_word measured;         /* (Np,) m, measured position, NaN where missing */
     hsep_word accepted;         /* (Np,) whether it is believed */
     hsep_word bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     hsep_word e_0;              /* (Np + p of the command,) m, residual of the command */
-    hsep_word stacked;          /* (2, n) m, what the command's expert and the doubting one, where it is of the command,
-                                * predict of that of the physics model */
+    hsep_word stacked;          /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
     hsep_word variance;         /* (n,) m2, of the mixture of the experts */
     hsep_word rows;             /* (n, n_static) features without lags, sample after sample */
     hsep_word disturbances, command;
-    hsep_word evidence[HSEP_N_EVIDENCE]; /* Gram matrices of this run's rows, */
-    hsep_word earlier[HSEP_N_EVIDENCE];  /* and of those of earlier runs */
-    hsep_word experts[HSEP_N_EXPERTS];   /* hold has none, 0 */
+    hsep_word evidence[HSEP_N_KINDS];
+    hsep_word experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
+    hsep_word largest;                 /* (n_static,) largest magnitudes of the features without lags */
+    hsep_learned learned;
 } hsep_trusted;
 
+HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_KINDS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
-    hsep_trusted, 39 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS +
-                      (sizeof(hsep_stack) + sizeof(hsep_reach) + sizeof(hsep_reach_window)) / sizeof(hsep_real));
-
-/* Features, those without lags first. */
-HSEP_API hsep_word hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
+    hsep_trusted, 32 + HSEP_N_KINDS + 2 * HSEP_N_EXPERTS +
+                      (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
-HSEP_API hsep_real hsep_trusted_size(const hsep_trusted_parameters *parameters);
+HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
 
 /* Fill the block, at rest at start, m, with nothing learned. */
-HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters, hsep_real start);
+HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment, is one that hsep_trusted_init with these parameters began. */
-HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters);
+HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameters *parameters);
 
-HSEP_API hsep_gram *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence);
-HSEP_API hsep_gram *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence);
-HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
-HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self);
+/* Parts of the block; of the experts not hold. */
+static inline hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self)
+{
+    return (hsep_disturbances *)hsep_at(self, self->disturbances);
+}
+static inline hsep_command *hsep_trusted_command(hsep_trusted *self)
+{
+    return (hsep_command *)hsep_at(self, self->command);
+}
+static inline hsep_evidence *hsep_trusted_evidence(hsep_trusted *self, hsep_word kind)
+{
+    return (hsep_evidence *)hsep_at(self, self->evidence[kind]);
+}
+static inline hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_word expert)
+{
+    return (hsep_expert *)hsep_at(self, self->experts[expert]);
+}
 
-/* An expert; not hold. */
-HSEP_API hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_expert_place expert);
-
-/* Whether an expert predicts the residual of the command. */
-HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, hsep_word expert);
-
-/* Let the doubting expert be the counterpart of HSEP_LAGGED or HSEP_COMMAND, with nothing learned. */
-HSEP_API void hsep_trusted_lead(hsep_trusted *self, hsep_expert_place expert);
-
-/* What an expert predicts of the sample at a place, m; 0 where it knows nothing. */
-HSEP_API hsep_real hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, hsep_word place);
-
-/* The numbers learned besides the factors, for a warm start before the first window: their count, and the place of one
- * of them. Their order is that of LEARNED in hybridsep/predict/trust/learned.py. */
-HSEP_API hsep_word hsep_trusted_n_learned(hsep_trusted *self);
-HSEP_API hsep_real *hsep_trusted_learned(hsep_trusted *self, hsep_word i);
-
-/* Whether these numbers are in range. */
-HSEP_API int hsep_trusted_sound(hsep_trusted *self);
+/* HSEP_OF_COMMAND if an expert predicts the residual of the command, else HSEP_OF_PHYSICS. */
+HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expert);
 
 /* Whether this run doubts earlier ones. */
-HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
+HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
 
-/* Forget all rows of some evidence; go on with all of them as with those of this run; weigh all so far by kept; begin
- * another run, of which all so far are earlier ones, at a bounded weight. */
-HSEP_API void hsep_trusted_forget(hsep_trusted *self, hsep_evidence evidence);
-HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence);
-HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, hsep_real kept);
-HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence);
+/* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
+HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);
+HSEP_API int hsep_trusted_sound(const hsep_trusted *self);
+
+/* Begin another run: what was learned is discounted and doubted, as a machine may have changed meanwhile. */
+HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
@@ -185,8 +160,5 @@ HSEP_API void hsep_trusted_follow(
  * the next window starts from it in any case. */
 HSEP_API void hsep_trusted_learn(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold);
-
-/* Discount what earlier runs have learned, and begin to doubt it: a machine may have changed meanwhile. */
-HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 #endif

@@ -1,33 +1,21 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
-#include "hsep_predict_constants.h"
-#include "hsep_trust_constants.h"
-
 #include "hsep_math.h"
-#include <stddef.h>
+
 #include <string.h>
 
-/* Take over what is known of the errors of another expert; NULL: nothing is. */
-static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hsep_expert *other)
+HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
-    hsep_expert *expert = hsep_trusted_expert(self, of);
-    expert->noise_variance = other != NULL ? other->noise_variance : 0.0;
-    expert->correlation = other != NULL ? other->correlation : 1.0;
-}
-
-HSEP_API void hsep_trusted_restart(hsep_trusted *self)
-{
-    hsep_trusted_begin_run(self, HSEP_OF_PHYSICS);
-    hsep_trusted_begin_run(self, HSEP_OF_COMMAND);
-    const hsep_expert_place leading = hsep_stack_leader(&self->stack);
-    hsep_trusted_lead(self, leading);
-    self->reach.n_missing = self->reach.n_beyond = 0;
-    self->followed = self->known = 0;
-    hsep_stack_forget(&self->stack, HSEP_DOUBTING);
-    if (hsep_trusted_doubts(self)) {
-        trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, leading));
-        hsep_stack_copy(&self->stack, leading, HSEP_DOUBTING);
+    const hsep_word Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
+    const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
+    hsep_real *past = hsep_at(self, self->e_0) + Np;
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
+    hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
+    hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
+    for (hsep_word i = 0; i < hsep_trusted_command(self)->p; i++) {
+        past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
 }
 
@@ -40,22 +28,29 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
 static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    if (self->forecast_scale != self->velocity_scale) {
-        hsep_trusted_forget(self, HSEP_OF_PHYSICS);
-        hsep_trusted_believe_earlier(self, HSEP_OF_COMMAND);
-        hsep_stack_forget(&self->stack, HSEP_DOUBTING);
+    hsep_command *command = hsep_trusted_command(self);
+    hsep_learned *learned = &self->learned;
+    hsep_real before = disturbances->before.x_pb[0];
+    if (self->forecast_scale != learned->velocity_scale) {
+        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
+        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+        hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
     }
-    self->velocity_scale = self->forecast_scale;
-    self->largest_step = self->forecast_step;
+    learned->velocity_scale = self->forecast_scale;
+    learned->largest_step = self->forecast_step;
+    for (hsep_word j = self->Np; j-- > 0; before = x_pb[j]) {
+        learned->fastest = hsep_fmax(learned->fastest, hsep_fabs(x_pb[j] - before));
+    }
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
         (size_t)self->n_static * sizeof(hsep_real));
-    self->reach_of_window =
-        hsep_reach_begin(&self->reach, x_pb, disturbances->before.x_pb[0], self->Np, self->scale.largest);
+    hsep_reach_begin(&self->reach, learned->scales[HSEP_OF_PHYSICS].largest, learned->fastest);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
-        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
+        hsep_real *rows = hsep_at(self, self->rows);
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, learned->velocity_scale, rows);
     }
-    hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
+    hsep_command_take(command, x_d, self->Np);
+    hsep_command_fill(command, self->Np, 0, self->Np);
     self->n_accepted = 0.0;
 }
 
@@ -65,7 +60,7 @@ static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const 
 {
     const hsep_word first = self->known, Np = self->Np;
     const hsep_real *late = hsep_command_late(hsep_trusted_command(self), Np);
-    hsep_real *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0);
+    hsep_real *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0), *rows = hsep_at(self, self->rows);
     for (hsep_word j = Np - last; j < Np - first; j++) {
         x[j] = x_pb[j] + e[j];
         e_0[j] = x[j] - late[j];
@@ -73,17 +68,17 @@ static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const 
     if (first > 0) { /* the velocity at the first of them */
         x[Np - first] = x_pb[Np - first] + e[Np - first];
     }
-    hsep_disturbances_motion_of(hsep_trusted_disturbances(self), x_pb, x, Np, first, last, hsep_at(self, self->rows));
+    hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, Np, first, last, rows);
     self->known = last;
 }
 
 /* Learn the row [features without lags | lags | residual] of sample k. Those with many lags that stand for samples
- * without a measurement are not. row: (n_static,); e: (Np + lags,), m. */
+ * without a measurement are not. rows: (Np, n_static); e: (Np + lags,), m. */
 static void trusted_fold(
-    hsep_trusted *self, hsep_evidence evidence, hsep_word k, const hsep_real row[], const hsep_real e[])
+    hsep_trusted *self, hsep_word kind, hsep_word k, const hsep_real rows[], const hsep_real e[])
 {
-    hsep_gram *gram = hsep_trusted_evidence(self, evidence);
-    const hsep_word p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
+    hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
+    const hsep_word p = kind == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
     const hsep_real *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
     hsep_real n_bridged = 0.0, *to = hsep_gram_row(gram);
     for (hsep_word i = 0; i < p; i++) {
@@ -92,17 +87,10 @@ static void trusted_fold(
     if (n_bridged > HSEP_TRUSTED_BRIDGED) {
         return;
     }
-    memcpy(to, row, (size_t)n_static * sizeof(hsep_real));
+    memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
     hsep_gram_fold(gram);
-    self->n_rows[evidence] += 1.0;
-}
-
-/* What of the rows so far counts on: of more than can be counted without rounding, half. */
-static hsep_real trusted_kept(const hsep_trusted *self, hsep_evidence evidence)
-{
-    return self->n_rows[evidence] < 0.25 * HSEP_EXACT ? self->kept : 0.5 * self->kept;
 }
 
 /* Judge the next sample, and take in those since the last one that is believed, if it is: their residuals are linear in
@@ -111,7 +99,7 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
 {
     const hsep_word k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
     const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_reach_judge(&self->reach, &self->reach_of_window, measured, self->T_s);
+    const int accepted = hsep_reach_judge(&self->reach, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
     if (!accepted) {
@@ -123,15 +111,18 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
         e[i] = slope * (hsep_real)(known - i) + e[known];
     }
     trusted_take_rows(self, x_pb, e, k + 1);
-    if (fold) {
-        hsep_command *command = hsep_trusted_command(self);
-        if (!(self->n_accepted > 0.0)) {
-            hsep_trusted_discount(self, HSEP_OF_PHYSICS, trusted_kept(self, HSEP_OF_PHYSICS));
-            hsep_trusted_discount(self, HSEP_OF_COMMAND, trusted_kept(self, HSEP_OF_COMMAND));
+    for (hsep_word i = 0; fold && i < HSEP_N_KINDS; i++) {
+        hsep_evidence *evidence = hsep_trusted_evidence(self, i);
+        const hsep_command *command = hsep_trusted_command(self);
+        if (!(self->n_accepted > 0.0)) { /* of more rows than can be counted without rounding, half */
+            const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.25 * HSEP_EXACT;
+            hsep_evidence_discount(evidence, countable ? self->kept : 0.5 * self->kept);
         }
-        trusted_fold(self, HSEP_OF_PHYSICS, k, hsep_at(self, self->rows) + k * self->n_static, e);
-        trusted_fold(
-            self, HSEP_OF_COMMAND, k, hsep_at(command, command->rows) + k * command->count, hsep_at(self, self->e_0));
+        if (i == HSEP_OF_COMMAND) {
+            trusted_fold(self, i, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
+        } else {
+            trusted_fold(self, i, k, hsep_at(self, self->rows), e);
+        }
     }
     self->n_accepted += 1.0;
 }
@@ -145,9 +136,8 @@ HSEP_API void hsep_trusted_follow(
     for (hsep_word i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
         trusted_follow_sample(self, x_pb, e, 1);
     }
-    if (last + 1 == self->Np) { /* the solution comes with the next row */
-        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
-        hsep_gram_settle(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+    for (hsep_word i = 0; last + 1 == self->Np && i < HSEP_N_KINDS; i++) { /* the solution comes with the next row */
+        hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
     }
 }
 
@@ -155,6 +145,7 @@ HSEP_API void hsep_trusted_follow(
 static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted);
+    const hsep_real *stacked = hsep_at(self, self->stacked) + (self->n - self->Np);
     const hsep_word first = self->late < self->Np ? self->late : 0;
     hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (hsep_word j = 0; j < self->Np - first; j++) {
@@ -163,7 +154,7 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
             continue;
         }
         for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
-            of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
+            of_sample[i] = stacked[i * self->n + j];
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
         for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
@@ -179,50 +170,36 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
         }
     }
     if (n > 0.0) {
-        hsep_stack_update(&self->stack, products, n, self->least_variance);
+        hsep_stack_update(&self->learned.stack, products, n, self->least_variance);
     }
 }
 
-/* Let all experts go on with this run alone, and judge them anew. */
-static void trusted_forget_earlier_runs(hsep_trusted *self)
+/* Judge the experts and their stack by the measurement of their window. */
+static void trusted_judge(hsep_trusted *self, const hsep_real e[])
 {
-    self->n_earlier[HSEP_OF_PHYSICS] = self->n_earlier[HSEP_OF_COMMAND] = 0.0;
-    trusted_set_noise(self, HSEP_STATIC, NULL);
-    trusted_set_noise(self, HSEP_LAGGED, NULL);
-    trusted_set_noise(self, (hsep_expert_place)self->leading, hsep_trusted_expert(self, HSEP_DOUBTING));
-    hsep_stack_init(&self->stack);
-}
-
-/* Judge the experts and their stack by the measurement of their window, of which count samples are learned. */
-static void trusted_judge(hsep_trusted *self, const hsep_real e[], hsep_real count)
-{
-    const hsep_real *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
+    const hsep_real *accepted = hsep_at(self, self->accepted);
+    const hsep_real *residuals[HSEP_N_KINDS] = {e, hsep_at(self, self->e_0)};
+    hsep_learned *learned = &self->learned;
+    hsep_expert_errors *errors = learned->errors;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
-                hsep_trusted_expert(self, (hsep_expert_place)i), hsep_trusted_is_of_command(self, i) ? e_0 : e,
+                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
                 accepted, self->given_variance);
         }
     }
-    trusted_judge_stack(self, e);
-    if (hsep_trusted_doubts(self) && self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
-        trusted_forget_earlier_runs(self);
+    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+        hsep_residual_scale_follow(&learned->scales[i], residuals[i], accepted, self->Np, self->n_accepted);
     }
-    hsep_residual_scale_follow(&self->scale, e, accepted, self->Np, count);
-    hsep_residual_scale_follow(&self->scale_of_command, e_0, accepted, self->Np, count);
-}
-
-HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
-{
-    const hsep_word Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
-    const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
-    hsep_real *past = hsep_at(self, self->e_0) + Np;
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
-    hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
-    hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
-    for (hsep_word i = 0; i < hsep_trusted_command(self)->p; i++) {
-        past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
+    trusted_judge_stack(self, e);
+    if (hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+        /* All experts go on with this run alone, and are judged anew. */
+        for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+            hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
+        }
+        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+        hsep_stack_init(&learned->stack);
     }
 }
 
@@ -247,7 +224,7 @@ HSEP_API void hsep_trusted_learn(
     self->n_rejected += self->Np - (hsep_word)self->n_accepted;
     hsep_disturbances_end(hsep_trusted_disturbances(self));
     if (fold && self->n_accepted > 0.0) {
-        trusted_judge(self, e, self->n_accepted);
+        trusted_judge(self, e);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
     memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(hsep_real));

@@ -8,27 +8,27 @@
 #define LINEARISED_DIFFERENCES 8                  /* most orders of differences of x_pb, it among them */
 #define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of an expert: of the disturbances, of their differences */
 
-static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
+static const hsep_word linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
 
 #define LINEARISED_OF_COMMAND 2
-static const hsep_expert_place linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
+static const hsep_word linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
 
-/* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. of_command: which one. */
-static hsep_real linearised_weight(const hsep_trusted *model, hsep_expert_place expert, int of_command)
+/* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. */
+static hsep_real linearised_weight(const hsep_trusted *model, hsep_word expert, hsep_word kind)
 {
-    const int of_kind = hsep_trusted_is_of_command(model, expert) == of_command;
-    return model->predicted[expert] && of_kind ? model->stack.weights[expert] : 0.0;
+    const int of_kind = hsep_trusted_kind_of(model, expert) == kind;
+    return model->predicted[expert] && of_kind ? model->learned.stack.weights[expert] : 0.0;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
+static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)parameters->settings->measurement_delay;
     const hsep_real filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->n;
     self->preview = self->n - parameters->settings->measurement_delay;
-    self->count = hsep_disturbances_count(parameters->trust->period);
+    self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
     self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
@@ -45,12 +45,12 @@ static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_trusted_pa
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_linearised_size(const hsep_trusted_parameters *parameters)
+HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters)
 {
     return linearised_lay_out(&(hsep_linearised){0}, parameters);
 }
 
-HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_parameters *parameters)
+HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* gains of no expert are 0 */
@@ -60,13 +60,11 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_par
         settings->T_s, (hsep_hold)settings->input_hold);
 }
 
-HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_parameters *parameters)
+HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parameters *parameters)
 {
     const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     hsep_linearised got;
-    memcpy(&got, block, sizeof got);
-    (void)linearised_lay_out(&got, parameters); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 &&
+    return HSEP_LAID_OUT(got, block, linearised_lay_out(&got, parameters)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
 }
 
@@ -87,10 +85,10 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
             const hsep_real *w = weights + part * self->count;
             hsep_real friction = 0.0;
             hsep_real of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
-            for (hsep_word i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
+            for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
                 friction += slopes[i] * w[i];
             }
-            for (hsep_word i = HSEP_DISTURBANCES_PERIODIC; i < self->count; i++) {
+            for (hsep_word i = HSEP_DISTURBANCES_N_LASTING; i < self->count; i++) {
                 of_position += w[i] * slopes[i];
             }
             gain[0] = friction;
@@ -138,7 +136,7 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
 
 /* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
 static void linearised_shrink(
-    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, hsep_real weight, hsep_real shrink[])
+    const hsep_linearised *self, hsep_trusted *model, hsep_word place, hsep_real weight, hsep_real shrink[])
 {
     const hsep_expert *expert = hsep_trusted_expert(model, place);
     for (hsep_word k = 0; weight > 0.0 && k < self->n; k++) {
@@ -174,8 +172,8 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
     hsep_real *base = hsep_at(self, self->base);
     memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
     for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_expert_place place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, 1);
+        const hsep_word place = linearised_of_command[i];
+        const hsep_real weight = linearised_weight(model, place, HSEP_OF_COMMAND);
         if (weight > 0.0) {
             linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * self->n);
             linearised_of_increments(
@@ -201,10 +199,10 @@ HSEP_API void hsep_linearised_at(
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
         const hsep_real *weights = hsep_at_const(expert, expert->weights);
-        if (hsep_trusted_is_of_command(model, linearised_experts[i])) {
+        if (hsep_trusted_kind_of(model, linearised_experts[i]) == HSEP_OF_COMMAND) {
             continue;
         }
-        const hsep_real weight = linearised_weight(model, linearised_experts[i], 0);
+        const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS);
         linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(
@@ -269,7 +267,7 @@ HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model,
                     *kept = hsep_at(self, self->kept) + (self->n - count);
     memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(hsep_real));
     for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
-        const int counts = linearised_weight(model, linearised_of_command[i], 1) > 0.0;
+        const int counts = linearised_weight(model, linearised_of_command[i], HSEP_OF_COMMAND) > 0.0;
         for (hsep_word u = 0; counts && u < count; u++) {
             column[u] += kept[u] * of_command[u];
         }
@@ -277,7 +275,7 @@ HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model,
     linearised_disturbance(self, count);
     linearised_filter(self, count);
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_weight(model, linearised_experts[i], 0) > 0.0) {
+        if (linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS) > 0.0) {
             linearised_run(self, hsep_trusted_expert(model, linearised_experts[i]), i, count, column);
         }
     }
