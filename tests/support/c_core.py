@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hybridsep.base.parameters import Parameter
+from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.fmu_table import FmuTable
@@ -31,7 +32,7 @@ from hybridsep.fmi.variables import (
     TRUST_SETTINGS,
 )
 from hybridsep.machines.machine import load_machine
-from hybridsep.predict.uncertainty import N_LEARNED, Uncertainty
+from hybridsep.predict.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -251,17 +252,17 @@ class CModel:
         self.warning = message.value.decode("utf-8") if status else ""
 
 
-def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:
+def write_weights(folder: Path, name: str, factor: Array, n_rows: int, **settings: float) -> None:
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
     values = {"trust": 0, "period": 0.0, **TABLES[name].parameters, **settings}
     modes = TABLES[name].modes
     names = (*PREDICTOR_SETTINGS, "trust", "period")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
-    content = b"HSEPWG13" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
+    errors = numbers_of(Uncertainty.init(values["lambda"]))
+    content = b"HSEPWG14" + struct.pack("<3Q", len(learned), len(modes), len(errors))
     content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
-    content += Uncertainty(values["lambda"], int(values["Np"])).learned().astype("<f8").tobytes()
-    content += np.concatenate([factor[i, i:] for i in range(len(factor))]).astype("<f8").tobytes()
+    content += np.concatenate([errors, [n_rows], *(factor[i, i:] for i in range(len(factor)))]).astype("<f8").tobytes()
     (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 
 

@@ -47,5 +47,5 @@ class CRegression:
         return float(self.block[3])
 
     @property
-    def n_samples(self) -> int:
-        return int(self.block.view(np.uint64)[2])
+    def n_rows(self) -> float:
+        return float(self.block[2])

@@ -23,8 +23,8 @@ from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Drive, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.paper.model import PaperModel
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.regression import RidgeRegression
 
 RUNAWAY = 1e5
 """Pole of the recursion that diverges: e_h grows by it with each sample."""
@@ -104,11 +104,10 @@ def runaway_predictor() -> HybridPredictor:
     machine = paper_machine("spring_mass_damper")
     predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
     weights = np.zeros(predictor.n_features)
-    assert isinstance(predictor.residual, PaperModel)
-    weights[0], weights[predictor.residual.layout.e_pb.start] = 1e-3, RUNAWAY
-    factor = 1e6 * np.eye(predictor.n_features + 1)
+    weights[0], weights[2 + predictor.settings.q] = 1e-3, RUNAWAY
+    factor = np.asfortranarray(1e6 * np.eye(predictor.n_features + 1))
     factor[:-1, -1] = factor[:-1, :-1] @ weights
-    predictor.regression.restore(factor, 1000)
+    predictor.take_over((), predictor.state.uncertainty, (RidgeRegression(factor, 1000.0),))
     return predictor
 
 

@@ -10,7 +10,7 @@ from predictor_cases import MODEL
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.model import TrustedModel
+from hybridsep.predict.trust.state import TrustedModel
 
 __all__ = ["FRICTION", "PERIOD", "TS", "cycles", "friction", "physics", "run", "trusted", "trusted_model"]
 

@@ -57,7 +57,7 @@ HSEP_API void hsep_compensator_block_init(
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
     if (self->trusted) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-            hsep_trusted_planner_init(hsep_compensator_trusted(self), &model, &parameters->planner, start);
+        hsep_trusted_planner_init(hsep_compensator_trusted(self), &model, &parameters->planner, start);
     }
     self->compensate = self->compensate_next = (hsep_word)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];

@@ -32,8 +32,8 @@ HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
     hsep_gram got;
     memcpy(&got, block, sizeof got);
     (void)gram_lay_out(&got, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.waiting < HSEP_GRAM_TOGETHER &&
-           got.n_rows >= 0.0 && got.n_rows <= HSEP_PREDICTION_MAX;
+    return memcmp(&got, block, sizeof got) == 0 && got.waiting < HSEP_GRAM_TOGETHER && got.n_rows >= 0.0 &&
+           got.n_rows <= HSEP_PREDICTION_MAX;
 }
 
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self) { return hsep_at(self, self->rows) + (self->n + 1) * self->waiting; }

@@ -14,7 +14,8 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     hsep_word n_modes;
-    hsep_word n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
+    hsep_word
+        n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
     int planned; /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 

@@ -68,7 +68,8 @@ static hsep_real uncertainty_from_middle(const hsep_uncertainty *self, hsep_word
 
 /* Components of the variance at place j, as they are at once. */
 static void uncertainty_at(
-    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word j, hsep_real f[HSEP_UNCERTAINTY_N_COMPONENTS])
+    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word j,
+    hsep_real f[HSEP_UNCERTAINTY_N_COMPONENTS])
 {
     const hsep_real *x_pb = signals->x_pb;
     const hsep_word n = self->n;
@@ -144,7 +145,8 @@ static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *s
 /* A step of expectation maximisation. seen, total: over the samples, the share of each component in the variance, with
  * and without the squared error. */
 static void uncertainty_step_by(
-    hsep_uncertainty *self, const hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS], const hsep_real total[HSEP_UNCERTAINTY_N_COMPONENTS])
+    hsep_uncertainty *self, const hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS],
+    const hsep_real total[HSEP_UNCERTAINTY_N_COMPONENTS])
 {
     for (int i = 0; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) {
         const hsep_real windows = total[i] / (hsep_real)self->Np;

@@ -128,9 +128,7 @@ HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self)
 
 HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to)
 {
-    memcpy(
-        self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert,
-        HSEP_N_EXPERTS * sizeof(hsep_real));
+    memcpy(self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert, HSEP_N_EXPERTS * sizeof(hsep_real));
     for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
         self->gram[HSEP_N_EXPERTS * i + to] = self->gram[HSEP_N_EXPERTS * i + expert];
     }

@@ -62,8 +62,7 @@ HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters 
 {
     hsep_start got;
     return HSEP_LAID_OUT(got, block, start_lay_out(&got, parameters)) &&
-           hsep_physics_valid(
-               hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->settings->dead_time) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->settings->dead_time) &&
            hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_states);
 }
 

@@ -46,7 +46,8 @@ typedef struct {
     hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
     hsep_real given_variance;     /* m2, of the noise; 0: estimated */
     hsep_real kept;               /* weight of earlier rows, from window to window */
-    hsep_word leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
+    hsep_word
+        leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
     hsep_reach reach;
     hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
@@ -67,9 +68,9 @@ typedef struct {
     hsep_word accepted;         /* (Np,) whether it is believed */
     hsep_word bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     hsep_word e_0;              /* (Np + p of the command,) m, residual of the command */
-    hsep_word stacked;          /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
-    hsep_word variance;         /* (n,) m2, of the mixture of the experts */
-    hsep_word rows;             /* (n, n_static) features without lags, sample after sample */
+    hsep_word stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
+    hsep_word variance; /* (n,) m2, of the mixture of the experts */
+    hsep_word rows;     /* (n, n_static) features without lags, sample after sample */
     hsep_word disturbances, command;
     hsep_word evidence[HSEP_N_KINDS];
     hsep_word experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
@@ -79,8 +80,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_KINDS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
-    hsep_trusted, 32 + HSEP_N_KINDS + 2 * HSEP_N_EXPERTS +
-                      (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    hsep_trusted,
+    32 + HSEP_N_KINDS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);

@@ -75,8 +75,8 @@ static void trusted_solved(hsep_trusted *self, int outgrown)
 {
     hsep_word *predicted = self->predicted, known[HSEP_N_KINDS];
     for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
-        known[i] = hsep_evidence_n_rows(hsep_trusted_evidence(self, i)) > 0.0 &&
-                   self->learned.scales[i].largest_square > 0.0;
+        known[i] =
+            hsep_evidence_n_rows(hsep_trusted_evidence(self, i)) > 0.0 && self->learned.scales[i].largest_square > 0.0;
     }
     predicted[HSEP_HOLD] = 1;
     predicted[HSEP_LAGGED] = predicted[HSEP_STATIC] = known[HSEP_OF_PHYSICS] && !outgrown;
@@ -118,8 +118,7 @@ static void trusted_begin(hsep_trusted *self, hsep_word expert, const hsep_real 
             hsep_trusted_expert(self, expert), hsep_at(self, self->e_0) + self->Np,
             growth * growth * scales[HSEP_OF_COMMAND].largest_square, HSEP_TRUST_BOUND_OF_COMMAND * most);
     } else {
-        hsep_expert_begin(
-            hsep_trusted_expert(self, expert), past, scales[HSEP_OF_PHYSICS].largest_square, self->bound);
+        hsep_expert_begin(hsep_trusted_expert(self, expert), past, scales[HSEP_OF_PHYSICS].largest_square, self->bound);
     }
 }
 

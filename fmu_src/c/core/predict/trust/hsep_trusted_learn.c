@@ -74,8 +74,7 @@ static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const 
 
 /* Learn the row [features without lags | lags | residual] of sample k. Those with many lags that stand for samples
  * without a measurement are not. rows: (Np, n_static); e: (Np + lags,), m. */
-static void trusted_fold(
-    hsep_trusted *self, hsep_word kind, hsep_word k, const hsep_real rows[], const hsep_real e[])
+static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const hsep_real rows[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
     const hsep_word p = kind == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;

@@ -1,0 +1,104 @@
+#include "hsep_paper.h"
+
+#include "hsep_math.h"
+#include "hsep_vector.h"
+
+#include <string.h>
+
+HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self)
+{
+    return (hsep_regression *)hsep_at(self, self->regression);
+}
+
+/* Set what follows from the settings; return the bytes of the block. */
+static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
+{
+    hsep_real end = HSEP_WORDS(hsep_paper);
+    self->p = settings->p;
+    self->q = settings->q;
+    self->n = settings->Np + settings->measurement_delay;
+    self->features = 2 + settings->q + settings->p;
+    self->weights = hsep_take(&end, (hsep_real)self->features);
+    self->regression = hsep_take_block(&end, hsep_regression_size(self->features));
+    return end * sizeof(hsep_real);
+}
+
+HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings)
+{
+    return paper_lay_out(&(hsep_paper){0}, settings);
+}
+
+HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings)
+{
+    memset(self, 0, (size_t)hsep_paper_size(settings));
+    (void)paper_lay_out(self, settings);
+    hsep_regression_init(hsep_paper_regression(self), self->features, settings->lambda);
+}
+
+HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *settings)
+{
+    hsep_paper got;
+    return HSEP_LAID_OUT(got, block, paper_lay_out(&got, settings)) &&
+           hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features);
+}
+
+HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias)
+{
+    const hsep_real *w = hsep_at_const(self, self->weights), *w_x = w + 1;
+    return (hsep_recursion){
+        .w_x = w_x, .w_e = w_x + (self->q + 1), .p = self->p, .q = self->q, .bias = with_bias ? w[0] : 0.0};
+}
+
+HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample)
+{
+    hsep_real *row = hsep_regression_row(hsep_paper_regression(self)), *lags = row + 2 + self->q;
+    row[0] = 1.0;
+    memcpy(row + 1, sample->x, (size_t)(self->q + 1) * sizeof(hsep_real));
+    memcpy(lags, sample->e + 1, (size_t)self->p * sizeof(hsep_real));
+    row[self->features] = sample->e[0]; /* its target e_pb(k) */
+    hsep_regression_fold(hsep_paper_regression(self));
+}
+
+HSEP_API void hsep_paper_begin(hsep_paper *self)
+{
+    hsep_regression_solve(hsep_paper_regression(self), hsep_at(self, self->weights));
+}
+
+HSEP_API void hsep_paper_predict(
+    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last)
+{
+    const hsep_recursion recursion = hsep_paper_recursion(self, 1);
+    hsep_recursion_run(&recursion, window->x_pb, window->e_h, self->n, first, last); /* Eq. (4) */
+}
+
+HSEP_API void hsep_recursion_run(
+    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_word n, hsep_word first, hsep_word last)
+{
+    for (hsep_word k = first; k < last; k++) {
+        const hsep_word j = n - 1 - k;
+        e[j] = self->bias + hsep_dot(self->w_x, x + j, self->q + 1) + hsep_dot(self->w_e, e + j + 1, self->p);
+    }
+}
+
+HSEP_API int hsep_recursion_stable(const hsep_recursion *self, hsep_real work[])
+{
+    hsep_real *a = work, *next = work + self->p;
+    for (hsep_word i = 0; i < self->p; i++) {
+        a[i] = -self->w_e[i];
+    }
+    for (hsep_word m = self->p; m-- > 0;) {
+        const hsep_real reflection = a[m];
+        if (!(hsep_fabs(reflection) < 1.0)) { /* NaN too */
+            return 0;
+        }
+        /* a_i := (a_i - kappa a_(m-i)) / (1 - kappa^2) */
+        const hsep_real inverse = 1.0 / ((1.0 - reflection) * (1.0 + reflection));
+        for (hsep_word i = 0; i < m; i++) {
+            next[i] = (a[i] - reflection * a[m - 1 - i]) * inverse;
+        }
+        hsep_real *swap = a;
+        a = next;
+        next = swap;
+    }
+    return 1;
+}

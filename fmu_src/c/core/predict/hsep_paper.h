@@ -1,0 +1,67 @@
+/* The paper's residual model: a ridge regression of e_pb on the features phi, eqs. (4) to (6).
+ *
+ *   phi(k) = [1 | x_pb(k) ... x_pb(k-q) | e_pb(k-1) ... e_pb(k-p)]
+ *
+ * Signals are kept newest first: sample k of n is at place n - 1 - k, its lag i at i places further.
+ * Every sample is a row, folded when it is measured. Memory is one block: the struct, then its arrays of numbers; no
+ * pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_PAPER_H
+#define HSEP_PAPER_H
+
+#include "hsep_regression.h"
+#include "hsep_residual_window.h"
+
+/* e(k) = bias + sum_i w_x,i x(k - i) + sum_i w_e,i e(k - i) */
+typedef struct {
+    const hsep_real *w_x; /* (q + 1,), lags 0 ... q */
+    const hsep_real *w_e; /* (p,), lags 1 ... p */
+    hsep_word p, q;
+    hsep_real bias; /* m */
+} hsep_recursion;
+
+typedef struct {
+    hsep_word p, q;     /* lags of e_pb and of x_pb */
+    hsep_word n;        /* samples of a prediction, with those that are late */
+    hsep_word features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word weights; /* (features,) w */
+    hsep_word regression;
+} hsep_paper;
+
+HSEP_ASSERT_WORDS(hsep_paper, 6);
+
+/* Bytes of the block, counted as a number so that no size can overflow. */
+HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
+
+/* Fill the block with nothing learned. */
+HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
+
+/* Whether a block, in any alignment, is one that hsep_paper_init with these settings began. */
+HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *settings);
+
+HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);
+
+/* Fold the row of a sample into the regression; eqs. (5) and (6). Cost: that of hsep_regression_fold. */
+HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample);
+
+/* Begin a window: the weights, eq. (6). Cost: n^2 / 2 multiply-adds. */
+HSEP_API void hsep_paper_begin(hsep_paper *self);
+
+/* Predict the residuals of samples first ... last - 1; eq. (4). */
+HSEP_API void hsep_paper_predict(
+    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
+
+/* The learned recursion, with its bias or without. */
+HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias);
+
+/* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past behind the window.
+ * Cost: p + q + 1 multiply-adds a sample. */
+HSEP_API void hsep_recursion_run(
+    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_word n, hsep_word first, hsep_word last);
+
+/* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
+ * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
+HSEP_API int hsep_recursion_stable(const hsep_recursion *self, hsep_real work[]);
+
+#endif

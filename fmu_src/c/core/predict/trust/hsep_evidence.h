@@ -1,0 +1,45 @@
+/* Rows that experts have learned: of this run and, as long as they are doubted, of earlier ones apart.
+ *
+ * Memory is one block, without pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_EVIDENCE_H
+#define HSEP_EVIDENCE_H
+
+#include "hsep_gram.h"
+
+typedef struct {
+    hsep_word of_run, earlier; /* offsets in words: Gram matrices; one whose n_rows are 0 has no rows */
+} hsep_evidence;
+
+HSEP_ASSERT_WORDS(hsep_evidence, 2);
+
+/* Bytes of the block, counted as a number so that no size can overflow; n: features. */
+HSEP_API hsep_real hsep_evidence_size(hsep_word n);
+
+/* Fill the block, without rows. */
+HSEP_API void hsep_evidence_init(hsep_evidence *self, hsep_word n);
+
+/* Whether a block, in any alignment, is one that hsep_evidence_init with n features began. */
+HSEP_API int hsep_evidence_valid(const void *block, hsep_word n);
+
+static inline hsep_gram *hsep_evidence_of_run(hsep_evidence *self) { return (hsep_gram *)hsep_at(self, self->of_run); }
+static inline hsep_gram *hsep_evidence_earlier(hsep_evidence *self)
+{
+    return (hsep_gram *)hsep_at(self, self->earlier);
+}
+
+/* Number of all rows, weighted. */
+HSEP_API hsep_real hsep_evidence_n_rows(hsep_evidence *self);
+
+/* Forget all rows; go on with all of them as with those of this run; with those of this run alone. */
+HSEP_API void hsep_evidence_forget(hsep_evidence *self);
+HSEP_API void hsep_evidence_believe_earlier(hsep_evidence *self);
+HSEP_API void hsep_evidence_forget_earlier(hsep_evidence *self);
+
+/* Weigh all rows so far by kept. */
+HSEP_API void hsep_evidence_discount(hsep_evidence *self, hsep_real kept);
+
+/* Begin another run: all rows so far are of earlier ones, and weigh at most as many of this one. */
+HSEP_API void hsep_evidence_begin_run(hsep_evidence *self, hsep_real most);
+
+#endif
