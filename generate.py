@@ -134,7 +134,7 @@ def constants_header() -> str:
     ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
     defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
     body = "\n\n".join(defines)
-    return f"""/* Constants of predictions and their errors, generated: what each means, and why, is in the file named. */
+    return f"""/* Constants of predictions and their errors, generated: what each means, and why, is in its file. */
 #ifndef HSEP_PREDICT_CONSTANTS_H
 #define HSEP_PREDICT_CONSTANTS_H
 

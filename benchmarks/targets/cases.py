@@ -76,7 +76,7 @@ def recorded(case: Case) -> tuple[Array, bytes]:
     predictor = controller if isinstance(controller, HybridPredictor) else controller.predictor
     weights = b""
     for _ in range(1 + case.warm):
-        if case.warm and predictor.regression.n_samples:
+        if case.warm and predictor.regression.n_rows:
             weights = weights_file(predictor)
         online, samples = LookAhead(controller, float(command[0])), []
         drive.reset(command[0])

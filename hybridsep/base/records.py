@@ -60,11 +60,10 @@ def numbers_of(record: Any) -> Array:
 def with_numbers(like: Record, numbers: Array) -> Record:
     """Return a record of the same shapes with the ``numbers`` of :func:`numbers_of`, which are as many."""
     parts = [leaf.value for leaf in leaves(like)]
-    ends = np.cumsum([np.size(part) for part in parts])
-    found = (
-        _of_kind(one.reshape(np.shape(part)), part) for one, part in zip(np.split(numbers, ends), parts, strict=False)
-    )
-    return _rebuilt(like, found)
+    found = np.split(numbers, np.cumsum([np.size(part) for part in parts])[:-1])
+    entries = zip(found, parts, strict=True)
+    record: Record = _rebuilt(like, (_of_kind(one.reshape(np.shape(part)), part) for one, part in entries))
+    return record
 
 
 def restored(like: Record, saved: Saved) -> Record:
@@ -82,7 +81,7 @@ def restored(like: Record, saved: Saved) -> Record:
         If a number is missing, out of its range, or not whole where ``like`` has a whole one.
     """
     found = (_of_kind(saved.array(leaf.path, *np.shape(leaf.value), finite=False), leaf.value) for leaf in leaves(like))
-    record = _rebuilt(like, found)
+    record: Record = _rebuilt(like, found)
     if (problem := unsound(record)) is not None:
         raise saved.error(problem)
     return record

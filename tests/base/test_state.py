@@ -140,9 +140,10 @@ def test_a_header_that_does_not_hold_together(header: bytes) -> None:
         {"input_hold": "soh"},
         {"modes": np.ones((1, 7))},
         {"modes": -np.ones((1, 4))},
-        {"factor": np.eye(2)},
-        {"e_pb": None},
-        {"n_samples": "many"},
+        {"residual.regression.factor": np.eye(2)},
+        {"residual.e_pb": None},
+        {"residual.regression.n_rows": np.array(-1.0)},
+        {"planned": 1},
     ],
     ids=str,
 )

@@ -1,4 +1,4 @@
-"""The layout of φ in the C core against the rows that the library learns."""
+"""The rows of φ that the C core learns, by its weights, against the library's."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import ctypes
 import c_core
 import numpy as np
 import pytest
+from c_library import PredictorPart
 from numpy.typing import NDArray
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.paper.features import FeatureLayout
 from hybridsep.predict.predictor import HybridPredictor
 
 Array = NDArray[np.float64]
@@ -19,44 +19,49 @@ Array = NDArray[np.float64]
 NP = 8
 
 
-class Features(ctypes.Structure):
-    """hsep_features."""
+class Sample(ctypes.Structure):
+    """hsep_residual_sample."""
 
-    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "n"))
+    _fields_ = (
+        ("i", ctypes.c_uint64),
+        ("relative", ctypes.c_double),
+        ("x", ctypes.c_void_p),
+        ("e", ctypes.c_void_p),
+        ("settled", ctypes.c_int),
+    )
 
 
-def layout(p: int, q: int) -> Features:
-    features = Features()
-    c_core.library("predictor").hsep_features_lay_out(ctypes.byref(features), ctypes.c_uint64(p), ctypes.c_uint64(q))
-    return features
+def weights_of_the_core(settings: PredictorSettings, x_pb: Array, e_pb: Array) -> Array:
+    """Return the weights, (2 + q + p,), after all samples, before which there was rest."""
+    library, given, n = c_core.library("predictor"), PredictorPart(), 2 + settings.q + settings.p
+    for name, _ in PredictorPart._fields_:
+        setattr(given, name, settings.to_fmi().get(name, 0))
+    library.hsep_paper_size.restype = ctypes.c_double
+    block = np.zeros(int(library.hsep_paper_size(ctypes.byref(given))) // 8)
+    paper = block.ctypes.data_as(ctypes.c_void_p)
+    library.hsep_paper_init(paper, ctypes.byref(given))
+    newest = [np.concatenate((signal[::-1], np.zeros(n))) for signal in (x_pb, e_pb)]
+    for k in range(len(x_pb)):
+        x, e = (signal.ctypes.data + 8 * (len(x_pb) - 1 - k) for signal in newest)
+        library.hsep_paper_learn(paper, ctypes.byref(Sample(x=x, e=e)))
+    library.hsep_paper_begin(paper)
+    first = int(block.view(np.uint64)[4])  # offset of the weights
+    return block[first : first + n]
 
 
 @pytest.mark.parametrize(("p", "q"), [(1, 0), (3, 2), (8, 7), (8, 0)])
-def test_a_row_of_the_library_has_the_slices_of_the_core(p: int, q: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_row_of_the_library_has_the_places_of_the_core(p: int, q: int) -> None:
+    # 1e-9 relative to the largest weight: λ is large, so that each weight is determined.
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    predictor = HybridPredictor(model, PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0), start=0.0)
-    learned: list[Array] = []
-    monkeypatch.setattr(predictor.regression, "update_stacked", lambda rows: learned.append(rows.copy()))
-    features = layout(p, q)
-    chance = np.random.default_rng(0)
+    settings = PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0)
+    predictor, chance = HybridPredictor(model, settings, start=0.0), np.random.default_rng(0)
     x_pb, e_pb = np.zeros(0), np.zeros(0)
-    for window in range(3):
+    for window in range(5):
         predicted = predictor.predict(1e-3 * np.sin(0.3 * np.arange(NP) + window))
-        measured = predicted.x_pb + chance.normal(0.0, 1e-6, NP)
+        measured = predicted.x_pb + chance.normal(0.0, 1e-4, NP)
         predictor.update(measured)
         x_pb = np.concatenate((x_pb, predicted.x_pb))
         e_pb = np.concatenate((e_pb, measured - predicted.x_pb))
-    assert (features.p, features.q, features.n) == (p, q, predictor.n_features)
-    assert learned[-1].shape == (NP, features.n + 1)
-    for k, row in enumerate(learned[-1], start=2 * NP):
-        assert row[0] == 1.0
-        assert row[features.x : features.e] == pytest.approx(x_pb[k - q : k + 1][::-1], abs=1e-15)
-        assert row[features.e : features.n] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
-        assert row[features.n] == pytest.approx(e_pb[k], abs=1e-15)
-
-
-@pytest.mark.parametrize(("p", "q"), [(1, 0), (50, 3), (50, 40)])
-def test_both_layouts_are_the_same(p: int, q: int) -> None:
-    core, library = layout(p, q), FeatureLayout(p, q)
-    assert (core.p, core.q, core.n) == (library.p, library.q, library.n)
-    assert (slice(core.x, core.e), slice(core.e, core.n)) == (library.x_pb, library.e_pb)
+    found = weights_of_the_core(settings, x_pb, e_pb)
+    assert len(set(np.round(np.abs(found), 12))) == len(found)  # each has a place of its own
+    np.testing.assert_allclose(found, predictor.weights, rtol=0, atol=1e-9 * np.abs(found).max())

@@ -23,9 +23,8 @@ def both(n: int, n_rows: int, seed: int) -> tuple[CGram, RidgeRegression, Array,
     rows = np.cumsum(rng.normal(size=(n_rows, n)), axis=0)  # neighbours alike, columns of many sizes
     rows *= 10.0 ** rng.uniform(-4, 2, n)
     target = rows @ (rng.normal(size=n) / np.abs(rows).max(axis=0)) + 0.1 * rng.normal(size=n_rows)
-    gram, library = CGram(n), RidgeRegression(n, NO_PENALTY)
+    gram, library = CGram(n), RidgeRegression.init(n, NO_PENALTY).update(rows, target)
     gram.fold(rows, target)
-    library.update(rows, target)
     return gram, library, rows, target
 
 
@@ -66,7 +65,7 @@ def test_rows_of_others_are_added_with_their_weight() -> None:
     gram, library, rows, _ = both(7, 30, 1)
     other, _, other_rows, other_target = both(7, 33, 2)
     penalties = np.abs(rows).max(axis=0) ** 2
-    library.update(0.1 * other_rows, 0.1 * other_target)
+    library = library.update(0.1 * other_rows, 0.1 * other_target)
     other.settle()
     assert_same(CSolution(gram, penalties, other, 0.01), library, penalties, rows)
     gram.add(other, 0.01)
@@ -114,9 +113,8 @@ def test_discounted_rows_weigh_as_in_the_library() -> None:
     gram, library, rows, target = both(9, 40, 5)
     for weight in (0.5, 1e-3, 1.0):
         gram.discount(weight)
-        library.discount(weight)
         gram.fold(rows[:7], target[:7])
-        library.update(rows[:7], target[:7])
+        library = library.discount(weight).update(rows[:7], target[:7])
         penalties = 1e-2 * np.abs(rows).max(axis=0) ** 2
         assert_same(CSolution(gram, penalties), library, penalties, rows)
 
@@ -126,8 +124,7 @@ def test_rows_may_be_forgotten_altogether() -> None:
     for weight in (1e-200, 1e-300, 0.0):
         gram.discount(weight)
     gram.fold(rows, target)
-    fresh = RidgeRegression(9, NO_PENALTY)
-    fresh.update(rows, target)
+    fresh = RidgeRegression.init(9, NO_PENALTY).update(rows, target)
     penalties = np.abs(rows).max(axis=0) ** 2
     assert_same(CSolution(gram, penalties), fresh, penalties, rows)
 

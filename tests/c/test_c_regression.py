@@ -25,11 +25,11 @@ def test_weights_of_random_rows_are_those_of_the_direct_solution(n: int, lam: fl
     rng = np.random.default_rng(n)
     rows = rng.normal(size=(200, n))
     target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=200)
-    regression, library = CRegression(n, lam), RidgeRegression(n, lam)
+    regression, library = CRegression(n, lam), RidgeRegression.init(n, lam)
     done = 0
     for m in (0, 1, 2, 30, 200):
         regression.fold(rows[done:m], target[done:m])
-        library.update(rows[done:m], target[done:m])
+        library = library.update(rows[done:m], target[done:m])
         done = m
         exact = oracle.ridge_extended(rows[:m], target[:m], lam).astype(float)
         scale = 1e-11 * max(float(np.linalg.norm(exact)), 1e-300)
@@ -81,12 +81,12 @@ def test_the_weights_keep_their_digits_over_a_million_samples() -> None:
 def test_a_loaded_factor_is_the_one_it_was() -> None:
     # 1e-9 relative between weights before and after, and after more rows.
     rows, target = staircase_rows(5, 2, 400)
-    library, regression = RidgeRegression(9, 1e-9), CRegression(9, 1.0)
-    library.update(rows[:300], target[:300])
+    library, regression = RidgeRegression.init(9, 1e-9), CRegression(9, 1.0)
+    library = library.update(rows[:300], target[:300])
     for i in range(10):
         assert regression.load(i, library.factor[i, i:]) == 1
     np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
-    library.update(rows[300:], target[300:])
+    library = library.update(rows[300:], target[300:])
     regression.fold(rows[300:], target[300:])
     np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
     assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-12)

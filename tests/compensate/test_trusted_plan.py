@@ -59,7 +59,8 @@ def learned(period: float = 0.0) -> bytes:
 
 def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
     """Return the model over commands of which the first ones are late."""
-    return PlanModel(trusted_model(sep.predictor), sep.predictor.state, x_d[:late], x_d[late:], x_d[late:])
+    physics = sep.predictor.state.physics
+    return PlanModel(trusted_model(sep.predictor), physics, x_d[:late], 0.0, x_d[late:], x_d[late:])
 
 
 @pytest.mark.slow
@@ -75,7 +76,7 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
 
     def x_h(command: Array) -> Array:
         found = model.predict(command)
-        return found.x_pb + found.e_h
+        return np.asarray(found.window.x_pb + found.e_h)
 
     for column, slope in zip(changes.T, found.T, strict=True):
         ahead, behind = (x_h(x_d + sign * size * column) for sign in (1.0, -1.0))

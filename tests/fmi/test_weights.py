@@ -20,10 +20,10 @@ import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
 from properties import share
-from trusted_cases import trusted_model
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
+from hybridsep.base.records import leaves, numbers_of
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
@@ -33,7 +33,6 @@ from hybridsep.machines.machine import load_machine
 from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.uncertainty import N_LEARNED
 
 MACHINE = paper_machine("spring_mass_damper")
 
@@ -113,7 +112,8 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
 def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    first = 40 + 32 * len(learned_settings(predictor)) + 8 * N_LEARNED  # of the triangle
+    n_numbers = len(numbers_of(predictor.state.uncertainty))
+    first = 32 + 32 * len(learned_settings(predictor)) + 8 * (n_numbers + 1)  # of the triangle
     zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
     infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
     longer = sealed(content[:-8] + bytes(8))
@@ -217,25 +217,26 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
     predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
     model, file = CModel("predictor", TRUST, tmp_path), tmp_path / WEIGHTS_FILE
-    first = 40 + 32 * len(learned_settings(predictor))
+    first = 32 + 32 * len(learned_settings(predictor))
     body = content[:-8]
-    trusted = trusted_model(predictor)
-    sizes = [one.size for one in trusted.learned().values()]
-    places = dict(zip(trusted.learned(), first + 8 * (np.cumsum(sizes) - sizes), strict=True))
-    n_numbers = sum(sizes) + N_LEARNED
-    errors = first + 8 * sum(sizes)
-    assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
-    rows, noise, correlations = (int(places[name]) for name in ("n_rows", "noise_variances", "correlations"))
-    fastest = int(places["motion"]) + 16
+    record = (predictor.residual.learned, predictor.state.uncertainty)
+    sizes = [np.size(leaf.value) for leaf in leaves(record)]
+    starts = first + 8 * (np.cumsum(sizes) - sizes)
+    places = {leaf.path: int(start) for leaf, start in zip(leaves(record), starts, strict=True)}
+    n_numbers = sum(sizes)
+    assert struct.unpack_from("<Q", body, 24) == (n_numbers,)
+    rows = first + 8 * n_numbers
+    noise, fastest, sound = places["0.errors.1.noise_variance"], places["0.fastest"], places["1.factor"]
+    correlations = [places[f"0.errors.{i}.correlation"] for i in range(4)]
     nonsense = [
         *(
             body[:i] + struct.pack("<d", wrong) + body[i + 8 :]
             for i in (rows, noise, fastest)
             for wrong in (-1.0, np.nan)
         ),
-        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
-        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),
-        *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
+        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in correlations),
+        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (places["1.theta"], sound)),
+        *(body[:24] + struct.pack("<Q", n) + body[32:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
         body[:first] + body[first + 8 :],
         body[:first] + bytes(8) + body[first:],
     ]
@@ -244,7 +245,7 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
             restore_weights(predictor, changed)
         file.write_bytes(changed)
         assert refusal(model.initialise)
-    assert predictor.regression.n_samples == trusted.n_rows == 0
+    assert predictor.regression.n_rows == 0.0
     file.write_bytes(content)
     model.initialise()
     restore_weights(predictor, content)

@@ -15,7 +15,8 @@ from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.model import COMMAND, DOUBTING, LAGGED
+from hybridsep.predict.trust.stack import COMMAND, DOUBTING, LAGGED
+from hybridsep.predict.trust.state import OF_PHYSICS
 
 NOISE = 1e-6  # m
 
@@ -70,28 +71,29 @@ def test_what_has_changed_is_relearned_as_cold(factor: float) -> None:
     assert rms((x - found)[2000:]) <= 1.01 * rms((x - cold)[2000:])
     model = trusted_model(warm)
     assert not model.doubts
-    assert model.stack.weights[DOUBTING] == 0.0
-    assert model.n_rows == len(x_d)
+    assert model.learned.stack.weights[DOUBTING] == 0.0
+    assert model.evidence[OF_PHYSICS].n_rows == len(x_d)
 
 
 def test_what_has_not_changed_keeps_what_was_learned() -> None:
     x_d = cycles(4 * PERIOD)
     x = physics(x_d) + friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
-    carried = trusted_model(warm).n_rows
+    carried = trusted_model(warm).evidence[OF_PHYSICS].n_rows
     found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
     assert rms(x - found) < 1.15 * NOISE < 0.5 * rms(x - cold)
-    assert trusted_model(warm).n_rows == pytest.approx(carried + len(x_d))
+    assert trusted_model(warm).evidence[OF_PHYSICS].n_rows == pytest.approx(carried + len(x_d))
 
 
 def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert_it_doubts() -> None:
     x_d = cycles(2 * PERIOD)
     model = trusted_model(learned(x_d, friction(x_d)))
     assert model.doubts
-    assert model.evidence.all(CONSTANTS.less).n_rows == pytest.approx(CONSTANTS.less * model.n_rows)
-    assert model.stack.gram[DOUBTING, DOUBTING] == model.stack.gram[LAGGED, LAGGED] > 0.0
-    assert model.stack.cross[DOUBTING] == model.stack.cross[LAGGED]
-    assert model.experts[DOUBTING].noise_variance == model.experts[LAGGED].noise_variance > 0.0
+    evidence = model.evidence[OF_PHYSICS]
+    assert evidence.all(CONSTANTS.less).n_rows == pytest.approx(CONSTANTS.less * evidence.n_rows)
+    assert model.learned.stack.gram[DOUBTING, DOUBTING] == model.learned.stack.gram[LAGGED, LAGGED] > 0.0
+    assert model.learned.stack.cross[DOUBTING] == model.learned.stack.cross[LAGGED]
+    assert model.learned.errors_of(DOUBTING).noise_variance == model.learned.errors_of(LAGGED).noise_variance > 0.0
 
 
 @pytest.mark.slow
@@ -103,8 +105,8 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     warm.restart()
     model = trusted_model(warm)
     assert model.leading == COMMAND
-    assert model.stack.gram[DOUBTING, DOUBTING] == model.stack.gram[COMMAND, COMMAND] > 0.0
-    assert model.experts[DOUBTING].noise_variance == model.experts[COMMAND].noise_variance > 0.0
+    assert model.learned.stack.gram[DOUBTING, DOUBTING] == model.learned.stack.gram[COMMAND, COMMAND] > 0.0
+    assert model.learned.errors_of(DOUBTING).noise_variance == model.learned.errors_of(COMMAND).noise_variance > 0.0
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
     assert not model.doubts
@@ -115,4 +117,4 @@ def test_a_cold_run_doubts_nothing() -> None:
     assert not trusted_model(predictor).doubts
     run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
     assert not trusted_model(predictor).doubts
-    assert trusted_model(predictor).experts[COMMAND].noise_variance > 0.0
+    assert trusted_model(predictor).learned.errors_of(COMMAND).noise_variance > 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,9 @@ def test_windows_are_predicted_from_the_last_measurement_on(delay: int, settings
     x_d, x_meas = drive()[0], late(delay)
     predictor, peer = new(delay, **settings), new(0, **settings)
     if settings["trust"]:  # only what is published is judged
-        trusted_model(peer).settings = predictor.settings
+        model = trusted_model(peer)
+        model = replace(model, fixed=replace(model.fixed, settings=predictor.settings))
+        peer.state = replace(peer.state, residual=model)
     commands = np.concatenate((np.full(delay, x_d[0]), x_d))
     for k in range(0, N, NP):
         found = predictor.predict(x_d[k : k + NP])

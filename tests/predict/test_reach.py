@@ -15,6 +15,7 @@ from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.reach import Reach, reached
+from hybridsep.predict.trust.state import OF_COMMAND, OF_PHYSICS
 
 Array = NDArray[np.float64]
 
@@ -30,11 +31,12 @@ def motion(n: int = 3000) -> tuple[Array, Array]:
 
 
 def believed(x: Array, x_pb: Array, *, scale: float = 1.0, Np: int = NP) -> NDArray[np.bool_]:
-    reach, before, largest, found = Reach(), 0.0, 0.0, []
+    reach, before, fastest, largest, found = Reach(), 0.0, 0.0, 0.0, []
     for i in range(0, len(x), Np):
         window = slice(i, i + Np)
         at, predicted = scale * x[window], scale * x_pb[window]
-        one, reach = reached(reach, at, predicted, before, largest, T_S, CONSTANTS)
+        fastest = max(fastest, float(np.abs(np.diff(predicted, prepend=before)).max()))
+        one, reach = reached(reach, at - predicted, largest, fastest, T_S, CONSTANTS)
         before, largest = predicted[-1], max(largest, float(np.abs(at - predicted)[one].max(initial=0.0)))
         found.append(one)
     return np.concatenate(found)
@@ -160,8 +162,8 @@ def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags
         predictor.update(np.where(np.arange(NP) // 8 == 11, np.nan, x[i : i + NP]))  # 8 missing, 4 more before the end
     learned = trusted_model(predictor)
     # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
-    assert learned.evidence.n_rows == 2 * (NP - 8) - (10 - 3 + 4)
-    assert learned.evidence_of_command.n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
+    assert learned.evidence[OF_PHYSICS].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
+    assert learned.evidence[OF_COMMAND].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
 
 
 def test_without_trust_a_missing_sample_is_an_error() -> None:

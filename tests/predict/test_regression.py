@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from properties import examples
 
 from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.records import arrays_of, restored
+from hybridsep.base.saved import Saved
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
@@ -56,14 +58,14 @@ def test_the_oracles_agree_with_sixty_digits(lam: float) -> None:
 )
 def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int], lam: float, seed: int) -> None:
     rows, target = problem(sum(batches), n, seed)
-    regression = RidgeRegression(n, lam)
+    regression = RidgeRegression.init(n, lam)
     first = 0
     for m in batches:
-        regression.update(rows[first : first + m], target[first : first + m])
+        regression = regression.update(rows[first : first + m], target[first : first + m])
         first += m
         exact = oracle.ridge_extended(rows[:first], target[:first], lam)
         np.testing.assert_allclose(regression.weights, exact.astype(float), rtol=1e-9, atol=1e-11)
-    assert regression.n_samples == first
+    assert regression.n_rows == first
     # Eq. (6): what is minimised, at its minimum
     w = exact.astype(float)
     minimum = np.sum((target - rows @ w) ** 2) + lam * np.sum(w**2)
@@ -74,17 +76,17 @@ def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int]
 @given(order=st.permutations(range(40)))
 def test_the_order_of_rows_does_not_matter(order: list[int]) -> None:
     rows, target = problem(40, 6)
-    forward, shuffled = RidgeRegression(6, 1e-3), RidgeRegression(6, 1e-3)
-    forward.update(rows, target)
+    forward, shuffled = RidgeRegression.init(6, 1e-3), RidgeRegression.init(6, 1e-3)
+    forward = forward.update(rows, target)
     for i in order:
-        shuffled.update(rows[i : i + 1], target[i : i + 1])
+        shuffled = shuffled.update(rows[i : i + 1], target[i : i + 1])
     np.testing.assert_allclose(shuffled.weights, forward.weights, rtol=1e-12, atol=1e-14)
 
 
 def test_the_factor_is_triangular_and_squares_to_the_normal_equations() -> None:
     rows, target = problem(25, 4)
-    regression = RidgeRegression(4, 0.5)
-    regression.update(rows, target)
+    regression = RidgeRegression.init(4, 0.5)
+    regression = regression.update(rows, target)
     factor = regression.factor
     np.testing.assert_array_equal(factor, np.triu(factor))
     stacked = np.column_stack((rows, target))
@@ -93,32 +95,31 @@ def test_the_factor_is_triangular_and_squares_to_the_normal_equations() -> None:
 
 
 def test_nothing_learned_means_zero() -> None:
-    regression = RidgeRegression(3, 1e-3)
+    regression = RidgeRegression.init(3, 1e-3)
     np.testing.assert_array_equal(regression.weights, 0.0)
     assert regression.residual_sum == 0.0
-    regression.update(np.empty((0, 3)), [])
+    regression = regression.update(np.empty((0, 3)), [])
     np.testing.assert_array_equal(regression.weights, 0.0)
-    assert regression.n_samples == 0
+    assert regression.n_rows == 0
 
 
 def test_weights_cannot_be_written() -> None:
-    regression = RidgeRegression(3, 1e-3)
+    regression = RidgeRegression.init(3, 1e-3)
     for _ in range(2):
         with pytest.raises(ValueError, match="read-only"):
             regression.weights[0] = 1.0
-        regression.update(*problem(5, 3))
+        regression = regression.update(*problem(5, 3))
 
 
 def test_state_restores_bit_for_bit() -> None:
     rows, target = problem(60, 7)
-    regression, copy = RidgeRegression(7, 1e-4), RidgeRegression(7, 1e-4)
-    regression.update(rows[:30], target[:30])
-    copy.restore(regression.factor, regression.n_samples)
-    for one in (regression, copy):
-        one.update(rows[30:], target[30:])
+    first = RidgeRegression.init(7, 1e-4).update(rows[:30], target[:30])
+    like = RidgeRegression.init(7, 1.0)
+    copy = restored(like, Saved("test", {}, arrays_of(first), {}))
+    regression, copy = (one.update(rows[30:], target[30:]) for one in (first, copy))
     np.testing.assert_array_equal(copy.weights, regression.weights)
     np.testing.assert_array_equal(copy.factor, regression.factor)
-    assert copy.n_samples == 60
+    assert copy.n_rows == 60
 
 
 @pytest.mark.parametrize(
@@ -133,19 +134,22 @@ def test_state_restores_bit_for_bit() -> None:
     ],
 )
 def test_bad_rows_are_refused_and_change_nothing(rows: Any, target: Any, message: str) -> None:
-    regression = RidgeRegression(3, 1e-3)
-    regression.update(*problem(10, 3))
-    before, n_before = regression.factor, regression.n_samples
+    regression = RidgeRegression.init(3, 1e-3)
+    regression = regression.update(*problem(10, 3))
+    before, n_before = regression.factor, regression.n_rows
     with pytest.raises(SignalError) as caught:
         regression.update(rows, target)
     assert str(caught.value) == message
     np.testing.assert_array_equal(regression.factor, before)
-    assert regression.n_samples == n_before == 10
+    assert regression.n_rows == n_before == 10
 
 
-def test_a_factor_of_another_size_is_refused() -> None:
-    with pytest.raises(SignalError, match=r"^the factor must have shape \(4, 4\), got \(6, 6\)$"):
-        RidgeRegression(3, 1e-3).restore(RidgeRegression(5, 1e-3).factor, 0)
+@pytest.mark.parametrize(("place", "number"), [((0, 0), 0.0), ((1, 0), 1e-9), ((0, 3), math.nan), ((2, 2), math.inf)])
+def test_a_factor_that_is_none_is_not_sound(place: tuple[int, int], number: float) -> None:
+    regression = RidgeRegression.init(3, 1e-3).update(*problem(5, 3))
+    assert regression.is_sound
+    regression.factor[place] = number
+    assert not regression.is_sound
 
 
 @pytest.mark.parametrize(
@@ -158,7 +162,7 @@ def test_a_factor_of_another_size_is_refused() -> None:
 )
 def test_parameters_out_of_range(n: int, lam: float, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        RidgeRegression(n, lam)
+        RidgeRegression.init(n, lam)
     assert str(caught.value) == message
 
 

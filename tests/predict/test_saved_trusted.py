@@ -97,104 +97,94 @@ def test_memory_does_not_grow() -> None:
     assert abs(len(predictor.to_bytes()) - size) <= 200  # the digits of some numbers, and the pending window
 
 
-def change_entry(tables: tuple[dict[str, Any], dict[str, Any]], name: str, value: Any) -> None:
-    """Change an entry of the one of two tables that has it; None: delete it."""
-    table = tables[0] if name in tables[0] else tables[1]
-    assert name in table
-    if value is None:
-        del table[name]
-    else:
-        table[name] = value
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("n_rows", np.array([-1.0, 1.0])),
-        ("n_rows", np.array([1e6, 1.0])),
-        ("n_rows", np.array([1.0, np.nan])),
-        ("n_samples", 1.5),
-        ("motion", np.array([-1.0, 1.0, 1.0])),
-        ("motion", np.array([1e-300, 1.0, 1.0])),
-        ("motion", np.array([1e150, 1.0, 1.0])),
-        ("motion", np.array([1.0, 1.0, -1.0])),
-        ("n_missing", -1),
-        ("n_beyond", 1.5),
-        ("factor", np.eye(9)),
-        ("factor", np.eye(200)),
-        ("factor", np.zeros((27, 27))),
-        ("factor_of_command", np.eye(14)),
-        ("factor_of_command", np.full((15, 15), np.nan)),
-        ("largest", -np.ones(20)),
-        ("largest", np.ones(19)),
-        ("scale", np.array([2.0, -1.0])),
-        ("scale", np.array([0.0, np.inf])),
-        ("scale_of_command", np.ones(3)),
-        ("noise_variances", np.array([-1e-12, 1.0, 1.0, 1.0])),
-        ("correlations", np.array([0.5, 1.0, 1.0, 1.0])),
-        ("correlations", np.ones(3)),
-        ("gram", np.full((5, 5), np.nan)),
-        ("gram", np.ones((4, 4))),
-        ("cross", np.ones(3)),
-        ("weights", np.array([0.5, 0.5, 0.5, 0.0, 0.0])),
-        ("weights", np.array([-0.5, 0.5, 0.5, 0.5, 0.0])),
-        ("evidence", np.array([-1.0, 1.0])),
-        ("filters", np.zeros((3, 8))),
-        ("filtered", np.full(8, np.inf)),
-        ("x_d", np.array([np.nan])),
-        ("last_x_pb", np.zeros(3)),
-        ("commands", np.zeros(6)),
-        ("past_of_command", np.zeros(5)),
-        ("bridged", np.zeros(5)),
-        ("past", np.zeros(5)),
-        ("past", None),
-        ("n_rows", None),
+        ("k", np.array(-1.0)),
+        ("k", np.array(1.5)),
+        ("start", np.array(1e5)),
+        ("physics", np.zeros(3)),
+        ("late", np.zeros(1)),
+        ("uncertainty.ratio", np.array(100.0)),
+        ("residual.leading", np.array(0.0)),
+        ("residual.evidence.0.this.n_rows", np.array(-1.0)),
+        ("residual.evidence.1.this.n_rows", np.array(np.nan)),
+        ("residual.evidence.0.this.factor", np.eye(9)),
+        ("residual.evidence.0.this.factor", np.eye(200)),
+        ("residual.evidence.0.this.factor", np.zeros((27, 27))),
+        ("residual.evidence.0.this.factor", np.ones((27, 27))),
+        ("residual.evidence.0.earlier.factor", np.eye(26)),
+        ("residual.evidence.0.earlier.factor", np.zeros((27, 27))),
+        ("residual.evidence.0.earlier.n_rows", np.array(-1.0)),
+        ("residual.evidence.1.earlier.n_rows", np.array(1e300)),
+        ("residual.evidence.1.this.factor", np.eye(14)),
+        ("residual.evidence.1.this.factor", np.full((75, 75), np.nan)),
+        ("residual.learned.velocity_scale", np.array(-1.0)),
+        ("residual.learned.velocity_scale", np.array(1e-300)),
+        ("residual.learned.velocity_scale", np.array(1e150)),
+        ("residual.learned.fastest", np.array(-1.0)),
+        ("residual.learned.largest", -np.ones(20)),
+        ("residual.learned.largest", np.ones(19)),
+        ("residual.learned.scales.0.largest", np.array(-1.0)),
+        ("residual.learned.scales.1.largest_square", np.array(np.inf)),
+        ("residual.learned.errors.0.noise_variance", np.array(-1e-12)),
+        ("residual.learned.errors.3.correlation", np.array(0.5)),
+        ("residual.learned.stack.gram", np.full((5, 5), np.nan)),
+        ("residual.learned.stack.gram", np.ones((4, 4))),
+        ("residual.learned.stack.cross", np.ones(3)),
+        ("residual.learned.stack.weights", np.array([0.5, 0.5, 0.5, 0.0, 0.0])),
+        ("residual.learned.stack.weights", np.array([-0.5, 0.5, 0.5, 0.5, 0.0])),
+        ("residual.learned.stack.evidence", np.array([-1.0, 1.0])),
+        ("residual.run.static.filters", np.zeros((3, 8))),
+        ("residual.run.static.filtered", np.full(8, np.inf)),
+        ("residual.run.static.x_d", np.array(np.nan)),
+        ("residual.run.static.x_pb", np.zeros(3)),
+        ("residual.run.commands", np.zeros(6)),
+        ("residual.run.past.0", np.zeros(5)),
+        ("residual.run.past.1", np.zeros(5)),
+        ("residual.run.past.1", None),
+        ("residual.run.bridged", np.zeros(5)),
+        ("residual.run.reach.n_missing", np.array(-1.0)),
+        ("residual.run.reach.n_beyond", np.array(1.5)),
+        ("residual.run.n_rejected", None),
+        ("pending_x_d", np.zeros(0)),
+        ("pending_x_pb", np.zeros(29)),
+        ("pending_scales", np.array([-1.0, 1.0])),
+        ("pending_largest", np.ones(19)),
     ],
     ids=str,
 )
-def test_an_inconsistent_model(name: str, value: Any) -> None:
-    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
-    own, inside, _ = unpack("trusted model", parts["trusted"])
-    change_entry((own, inside), name, value)
-    with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
-        HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)}))
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("earlier", np.eye(26)),
-        ("earlier", np.zeros((27, 27))),
-        ("earlier_of_command", np.eye(3)),
-        ("n_earlier", -1.0),
-        ("n_earlier_of_command", 1e300),
-    ],
-    ids=str,
-)
-def test_an_inconsistent_doubt_of_earlier_runs(name: str, value: Any) -> None:
-    meta, arrays, parts = unpack("predictor", in_mid_run(warm=True).to_bytes())
-    own, inside, _ = unpack("trusted model", parts["trusted"])
-    change_entry((own, inside), name, value)
-    with pytest.raises(StateError, match=r"^the saved trusted model is inconsistent: "):
-        HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)}))
+def test_an_inconsistent_state(name: str, value: Array | None) -> None:
+    meta, arrays, _ = unpack("predictor", in_mid_run(warm=True).to_bytes())
+    assert name in arrays
+    changed = {key: array if key != name else value for key, array in arrays.items()}
+    with pytest.raises(StateError, match=r"^the saved predictor is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, {k: v for k, v in changed.items() if v is not None}))
 
 
 def test_a_prediction_that_overflows_is_refused() -> None:
-    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
-    own, inside, _ = unpack("trusted model", parts["trusted"])
+    meta, arrays, _ = unpack("predictor", in_mid_run().to_bytes())
     # The leverage of the lags overflows: they are huge, and nothing is known of their weights.
-    inside["past"], inside["scale"] = np.full(6, 1e100), np.array([1e-200, 1e-100])
-    inside["factor"], inside["noise_variances"] = 1e-100 * np.eye(27), np.zeros(4)
-    forged = pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)})
+    arrays["residual.run.past.0"] = np.full(6, 1e100)
+    arrays["residual.learned.scales.0.largest_square"] = np.array(1e-200)
+    arrays["residual.learned.scales.0.largest"] = np.array(1e-100)
+    arrays["residual.evidence.0.this.factor"] = 1e-100 * np.eye(27)
+    for i in range(4):
+        arrays[f"residual.learned.errors.{i}.noise_variance"] = np.array(0.0)
     with pytest.raises(StateError, match="the prediction of the pending window must be finite"):
-        HybridPredictor.from_bytes(forged)
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays))
 
 
-@pytest.mark.parametrize("change", [{"trust": False}, {"q": 3}, {"p": 7}, {"p": 5}])
+@pytest.mark.parametrize("change", [{"trust": False}, {"q": 3}, {"p": 7}, {"p": 5}, {"p": 20, "q": 0}])
 def test_other_settings(change: dict[str, Any]) -> None:
-    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
+    meta, arrays, _ = unpack("predictor", in_mid_run().to_bytes())
     meta["settings"] |= change
-    with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
-        HybridPredictor.from_bytes(pack("predictor", meta, arrays, parts))
-    with pytest.raises(StateError, match="trusted is missing"):
-        HybridPredictor.from_bytes(pack("predictor", meta | {"settings": in_mid_run().settings.as_table()}, arrays))
+    with pytest.raises(StateError, match=r"^the saved predictor is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays))
+
+
+def test_sizes_that_a_state_has_not_are_refused_before_memory_is_taken_for_them() -> None:
+    meta, arrays, _ = unpack("predictor", in_mid_run().to_bytes())
+    meta["settings"] |= {"Np": 5000, "p": 5000}
+    with pytest.raises(StateError, match=r"p = 5000 and q = 2 must be those of its factors"):
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays))

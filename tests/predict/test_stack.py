@@ -14,7 +14,7 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.stack import Stack, simplex_minimum
 
-FIRST = (0.0, 0.5, 0.5)
+FIRST = np.array([0.0, 0.5, 0.5])
 NP = 50
 
 
@@ -62,15 +62,17 @@ def test_a_singular_problem_has_a_minimum() -> None:
 
 
 def new_stack() -> Stack:
-    return Stack(FIRST, CONSTANTS)
+    return Stack.init(FIRST)
 
 
-def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, seed: int = 0) -> None:
-    """Update with windows of a target of RMS 1 and experts off it by independent errors of given RMS."""
+def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, seed: int = 0) -> Stack:
+    """Return it with windows of a target of RMS 1 and experts off it by independent errors of given RMS."""
     rng = np.random.default_rng(seed)
     for _ in range(n_windows):
         target = rng.normal(size=NP)
-        stack.update(np.array([target + size * rng.normal(size=NP) for size in errors]), target, 0.0)
+        predicted = np.array([target + size * rng.normal(size=NP) for size in errors])
+        stack = stack.update(predicted, target, 0.0, FIRST)
+    return stack
 
 
 def test_its_weights_are_the_formula() -> None:
@@ -79,7 +81,7 @@ def test_its_weights_are_the_formula() -> None:
     windows = [(rng.normal(size=(3, NP)), rng.normal(size=NP)) for _ in range(2)]
     stack = new_stack()
     for predicted, measured in windows:
-        stack.update(predicted, measured, 0.0)
+        stack = stack.update(predicted, measured, 0.0, FIRST)
     fades = (CONSTANTS.gamma, 1.0)
     squares = [0.0] * 4
     for fade, (predicted, measured) in zip(fades, windows, strict=True):
@@ -105,30 +107,30 @@ def test_its_weights_are_the_formula() -> None:
 def test_the_better_expert_is_preferred_and_evidence_fades() -> None:
     stack = new_stack()
     np.testing.assert_array_equal(stack.weights, FIRST)
-    replayed(stack, (3.0, 0.02, 3.0), 60)
+    stack = replayed(stack, (3.0, 0.02, 3.0), 60)
     assert stack.weights[1] > 0.95
     # The other one is better from now on: after ten times the memory nothing is left of what was.
-    replayed(stack, (3.0, 3.0, 0.02), 200, seed=1)
+    stack = replayed(stack, (3.0, 3.0, 0.02), 200, seed=1)
     assert stack.weights[2] > 0.95
     assert stack.weights.sum() <= 1.0 + 1e-12
 
 
 def test_without_evidence_the_weights_are_the_first_ones() -> None:
     stack = new_stack()
-    stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0)
+    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-12)
 
 
 def test_physics_is_preferred_to_experts_that_know_nothing() -> None:
     stack, rng = new_stack(), np.random.default_rng(2)
     for _ in range(60):
-        stack.update(rng.normal(size=(3, NP)), rng.normal(size=NP), 0.0)
+        stack = stack.update(rng.normal(size=(3, NP)), rng.normal(size=NP), 0.0, FIRST)
     assert stack.weights.sum() < 0.1
 
 
 def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
     stack = new_stack()
-    stack.update(np.full((3, NP), 1e-3), np.full(NP, -1e-3), 1.0)
+    stack = stack.update(np.full((3, NP), 1e-3), np.full(NP, -1e-3), 1.0, FIRST)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-4)
 
 
@@ -138,19 +140,19 @@ def test_positions_in_another_unit_have_the_same_weights(scale: float, seed: int
     for _ in range(5):
         measured = rng.normal(size=NP)
         predicted = measured + rng.normal(size=(3, NP)) * np.array([[1.0], [0.3], [0.5]])
-        one.update(predicted, measured, 0.0)
-        other.update(scale * predicted, scale * measured, 0.0)
+        one = one.update(predicted, measured, 0.0, FIRST)
+        other = other.update(scale * predicted, scale * measured, 0.0, FIRST)
     np.testing.assert_allclose(other.weights, one.weights, atol=1e-9)
 
 
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
     stack = new_stack()
-    replayed(stack, (3.0, 0.1, 3.0), 30)
-    stack.copy(1, 0)
+    stack = replayed(stack, (3.0, 0.1, 3.0), 30)
+    stack = stack.copy(1, 0)
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
-    stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0)
+    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
     assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
-    stack.forget(0)
-    stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0)
+    stack = stack.forget(0)
+    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
     assert stack.weights[0] < 1e-9

@@ -6,8 +6,10 @@ import numpy as np
 import oracle
 import pytest
 
+from hybridsep.base.records import numbers_of
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.residual_window import ResidualWindow
 from hybridsep.predict.trust.disturbances import StaticFeatures
 
 TS, N = 1e-3, 800
@@ -20,9 +22,7 @@ LENGTHS = (100, 1, 7, 2, 300, 3, 387)
 
 def features(hold: str, dead_time: int, q: int, period: float = 0.0) -> StaticFeatures:
     model = ModalModel([Mode(*one) for one in MODES], dead_time)
-    static = StaticFeatures(model.discretise(TS, hold, block=100), q, period)
-    static.origin = ORIGIN
-    return static
+    return StaticFeatures(model.discretise(TS, hold, block=100), q, period)
 
 
 def signals() -> tuple[Array, Array]:
@@ -58,10 +58,9 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
     state, rows, first = static.rest(), [], 0
     for n in LENGTHS:
         window = slice(first, first + n)
-        before = [np.array(part) for part in state]
-        more, after = static.rows(state, x_d[window], x_pb[window], x[window], SCALE)
-        for part, then in zip(state, before, strict=True):  # the state is not changed
-            np.testing.assert_array_equal(part, then)
+        before = numbers_of(state)
+        more, after = static.rows(state, ResidualWindow(x_d[window], x_pb[window], ORIGIN), x[window], SCALE)
+        np.testing.assert_array_equal(numbers_of(state), before)  # the state is not changed
         rows.append(more)
         state, first = after, first + n
     assert first == N
@@ -83,7 +82,7 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
 def test_peak_velocity_looks_back_to_the_last_command() -> None:
     static = features("zoh", 0, 3)
     x_d, x = signals()
-    _, state = static.rows(static.rest(), x_d[:100], x_d[:100], x[:100], SCALE)
+    _, state = static.rows(static.rest(), ResidualWindow(x_d[:100], x_d[:100], ORIGIN), x[:100], SCALE)
     assert static.peak_velocity(static.rest(), np.array([2e-6, 1e-6])) == pytest.approx(2e-3)
     assert static.peak_velocity(state, x_d[99:100]) == 0.0
     assert static.peak_velocity(state, x_d[99:100] - 3e-6) == pytest.approx(3e-3)
@@ -92,6 +91,6 @@ def test_peak_velocity_looks_back_to_the_last_command() -> None:
 def test_at_rest_only_the_constant_is_left() -> None:
     static = features("foh", 2, 3)
     still = np.zeros(50)
-    rows, _ = static.rows(static.rest(), still, still, still, 0.0)
+    rows, _ = static.rows(static.rest(), ResidualWindow(still, still, ORIGIN), still, 0.0)
     np.testing.assert_array_equal(rows[:, 0], 1.0)
     np.testing.assert_array_equal(rows[:, 1:], 0.0)

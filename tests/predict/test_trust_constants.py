@@ -8,12 +8,14 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.model import COMMAND, DOUBTING, HOLD, LAGGED, STATIC
 from hybridsep.predict.trust.reach import Reach
+from hybridsep.predict.trust.stack import Stack
+from hybridsep.predict.trust.state import Learned
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "hybridsep/predict/trust").glob("*.py"))
@@ -21,6 +23,15 @@ CORE = sorted((ROOT / "fmu_src/c/core/predict/trust").glob("*.[ch]"))
 
 PLAIN = {0.0, 0.5, 1.0, 2.0}
 """Magnitudes that need no reason."""
+
+LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor", "window"}
+"""Constants are generated for C; its regression is below ``numeric``, its predictor below ``online``."""
+
+CORE_ALONE = {"predict_constants", "settings", "physics", "trusted"}
+"""Generated headers; the physics model, in the library below ``model``; the header of three files."""
+
+TRUSTED = {"state": "trusted_state", "forecast": "trusted_forecast", "learn": "trusted_learn"}
+"""Files of the residual model itself."""
 
 DECLARED = re.compile(r"\s*(static const|#define)")
 
@@ -82,19 +93,37 @@ def members(header: str, struct: str) -> list[str]:
     return re.findall(r"(\w+)(?:\[[^\]]*\])?(?=[,;])", found[1])
 
 
+def names(record: type[Any]) -> list[str]:
+    """Return the names of a record's fields."""
+    return [one.name for one in fields(record)]
+
+
+@pytest.mark.parametrize(
+    ("header", "struct", "record"),
+    [
+        ("hsep_stack.h", "hsep_stack", Stack),
+        ("hsep_expert.h", "hsep_expert_errors", ExpertErrors),
+        ("hsep_expert.h", "hsep_residual_scale", ResidualScale),
+    ],
+)
+def test_what_is_learned_has_the_same_names_in_the_same_order(header: str, struct: str, record: type[Any]) -> None:
+    assert members(header, struct) == names(record)
+
+
+def test_all_that_is_learned_has_the_same_order() -> None:
+    """The largest magnitudes of the features, whose number the settings decide, are behind the struct."""
+    *struct, largest = names(Learned)
+    assert members("hsep_trusted.h", "hsep_learned") == struct
+    assert largest == members("hsep_trusted.h", "hsep_trusted")[-2]
+
+
 def test_what_is_known_of_the_reach_has_the_same_names() -> None:
-    assert tuple(members("hsep_reach.h", "hsep_reach")) == Reach._fields
+    assert members("hsep_reach.h", "hsep_reach")[:2] == names(Reach)
 
 
-def test_stack_expert_and_scale_have_the_same_names() -> None:
-    assert {"weights", "gram", "cross", "evidence"} == set(members("hsep_stack.h", "hsep_stack"))
-    assert {"noise_variance", "correlation"} <= set(members("hsep_expert.h", "hsep_expert"))
-    assert {"largest_square", "largest"} == set(members("hsep_expert.h", "hsep_residual_scale"))
-
-
-def test_the_experts_have_the_same_names_and_places() -> None:
-    text = next(path for path in CORE if path.name == "hsep_stack.h").read_text(encoding="utf-8")
-    places = text[text.index("typedef enum") : text.index("hsep_expert_place;")]
-    found = re.findall(r"HSEP_(\w+)", places)
-    assert found == ["HOLD", "LAGGED", "STATIC", "COMMAND", "DOUBTING"]
-    assert (HOLD, LAGGED, STATIC, COMMAND, DOUBTING) == (0, 1, 2, 3, 4)
+@pytest.mark.parametrize("package", ["predict", "predict/trust"])
+def test_both_have_the_same_files(package: str) -> None:
+    """But for what one language alone needs."""
+    of_library = {path.stem for path in (ROOT / "hybridsep" / package).glob("*.py")} - LIBRARY_ALONE
+    of_core = {path.stem.removeprefix("hsep_") for path in (ROOT / "fmu_src/c/core" / package).glob("*.[ch]")}
+    assert {TRUSTED.get(name, name) for name in of_library} == of_core - CORE_ALONE

@@ -14,7 +14,8 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.model import COMMAND, LAGGED, STATIC
+from hybridsep.predict.trust.stack import COMMAND, LAGGED, STATIC
+from hybridsep.predict.trust.state import OF_PHYSICS
 
 NOISE = 1e-7  # m
 
@@ -59,9 +60,9 @@ def test_the_rounding_of_a_command_at_rest_is_outgrown() -> None:
     x = np.concatenate((np.zeros(500), x))
     predictor = trusted()
     run(predictor, x_d[:500], x[:500])
-    assert 0.0 < trusted_model(predictor).velocity_scale < 1e-8
+    assert 0.0 < trusted_model(predictor).learned.velocity_scale < 1e-8
     x_h = run(predictor, x_d[500:], x[500:])
-    assert trusted_model(predictor).velocity_scale > 1e-2
+    assert trusted_model(predictor).learned.velocity_scale > 1e-2
     assert rms((x[500:] - x_h)[PERIOD:]) < 10 * NOISE
 
 
@@ -156,11 +157,11 @@ def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
     x_d, x_pb, x = with_friction(300)
     predictor = trusted()
     run(predictor, x_d[:200], x[:200])
-    before, n_rows = predictor.regression.factor, predictor.regression.n_samples
+    before, n_rows = predictor.regression.factor, predictor.regression.n_rows
     predictor.predict(x_d[200:])
     predictor.update(x[200:], learn=False)
     np.testing.assert_array_equal(predictor.regression.factor, before)
-    assert (predictor.regression.n_samples, predictor.k) == (n_rows, 300)
+    assert (predictor.regression.n_rows, predictor.k) == (n_rows, 300)
     assert predictor.last_accepted_residual() == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
 
 
@@ -171,9 +172,9 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     x = physics(x_d) + 1e-5 + np.cumsum(1e-7 * rng.normal(size=3000))  # an offset that drifts, which a hold predicts
     predictor = trusted()
     run(predictor, x_d[:2900], x[:2900])
-    assert trusted_model(predictor).stack.weights[0] > 0.3
-    trusted_model(predictor).run.past[0] = 1.0
-    largest = trusted_model(predictor).scale.largest
+    assert trusted_model(predictor).learned.stack.weights[0] > 0.3
+    trusted_model(predictor).run.past[OF_PHYSICS][0] = 1.0
+    largest = trusted_model(predictor).learned.scales[OF_PHYSICS].largest
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * largest < 1e-4
 
 
@@ -195,12 +196,12 @@ def test_the_noise_that_is_given_is_that_of_the_experts() -> None:
     x_d, _, x = with_friction(1000, noise=1e-6)
     predictor = trusted(noise_std=3e-6)
     run(predictor, x_d, x)
-    experts = trusted_model(predictor).experts
-    assert [experts[i].noise_variance for i in (LAGGED, STATIC, COMMAND)] == [pytest.approx(9e-12)] * 3
+    learned = trusted_model(predictor).learned
+    assert [learned.errors_of(i).noise_variance for i in (LAGGED, STATIC, COMMAND)] == [pytest.approx(9e-12)] * 3
     estimated = trusted()
     run(estimated, x_d, x)
     for i in (LAGGED, STATIC):
-        assert math.sqrt(trusted_model(estimated).experts[i].noise_variance) == pytest.approx(1e-6, rel=0.3)
+        assert math.sqrt(trusted_model(estimated).learned.errors_of(i).noise_variance) == pytest.approx(1e-6, rel=0.3)
 
 
 def test_an_effect_that_is_given_bounds_what_features_explain() -> None:

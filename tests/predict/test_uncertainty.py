@@ -9,6 +9,7 @@ import pytest
 from trusted_cases import FRICTION, cycles, friction, physics, trusted
 
 from hybridsep.base.metrics import coverage
+from hybridsep.base.records import numbers_of, unsound, with_numbers
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import PREDICTION_MAX, Array
 from hybridsep.evaluate.backtest import backtest
@@ -27,20 +28,20 @@ ALL = np.ones(N, dtype=np.bool_)
 def window(uncertainty: Uncertainty, variance: Array | float = 0.0, e_h: Array | float = 0.0) -> PredictedError:
     """Return the predicted error of a window at rest, with the ``variance`` of the model and a residual ``e_h``."""
     x_pb = np.zeros(N)
-    return uncertainty.predict(x_pb, x_pb + e_h, variance)
+    return uncertainty.predict(x_pb, x_pb + e_h, variance, N)
 
 
 def moving(uncertainty: Uncertainty, speed: Array | float) -> PredictedError:
     """Return the predicted error of a window of a ``speed``, m per sample."""
     x_pb = np.cumsum(np.zeros(N) + speed)
-    return uncertainty.predict(x_pb, np.zeros(N), 0.0)
+    return uncertainty.predict(x_pb, np.zeros(N), 0.0, N)
 
 
 def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty | None = None) -> Uncertainty:
     """Return an uncertainty after ``n`` windows of white errors."""
-    learning = uncertainty or Uncertainty(1e-12, N)
+    learning = uncertainty or Uncertainty.init(1e-12)
     for errors in np.random.default_rng(seed).normal(0.0, std, (n, N)):
-        learning.learn(window(learning), errors, ALL)
+        learning = learning.learn(window(learning), errors, ALL, N)
     return learning
 
 
@@ -52,7 +53,7 @@ def test_white_noise_of_any_size_is_known_after_a_second(std: float) -> None:
 
 
 def test_before_the_first_window_it_is_the_assumed_noise_and_what_the_model_knows() -> None:
-    uncertainty = Uncertainty(4e-12, N)
+    uncertainty = Uncertainty.init(4e-12)
     np.testing.assert_allclose(window(uncertainty).std, 2e-6, rtol=0.1)
     np.testing.assert_allclose(window(uncertainty, variance=1e-8).std[N // 2 :], 1e-4 * np.sqrt(2.0), rtol=0.1)
 
@@ -63,11 +64,11 @@ def test_the_assumed_noise_is_the_given_one_or_larger_than_lambda(noise_std: flo
 
 
 def test_errors_in_motion_do_not_widen_the_interval_at_standstill() -> None:
-    rng, uncertainty = np.random.default_rng(1), Uncertainty(1e-12, N)
+    rng, uncertainty = np.random.default_rng(1), Uncertainty.init(1e-12)
     speed = np.where(np.arange(N) < 50, 0.0, 1e-3)
     for _ in range(80):
         predicted = moving(uncertainty, speed)
-        uncertainty.learn(predicted, rng.normal(0.0, np.where(speed > 0.0, 2e-5, 1e-6)), ALL)
+        uncertainty = uncertainty.learn(predicted, rng.normal(0.0, np.where(speed > 0.0, 2e-5, 1e-6)), ALL, N)
     std = moving(uncertainty, speed).std
     assert np.all((std[:50] > 0.7e-6) & (std[:50] < 2e-6))
     np.testing.assert_allclose(std[75:], 2e-5, rtol=0.25)
@@ -81,13 +82,13 @@ def test_larger_noise_is_followed() -> None:
 
 
 def test_heavy_tails_are_missed_alike_by_the_three_intervals() -> None:
-    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty(1e-12, N), []
+    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty.init(1e-12), []
     for k in range(400):
         predicted = window(uncertainty)
         errors = 1e-6 * rng.standard_t(3.5, N)
         if k >= 100:
             inside.append([coverage(errors, predicted.std, level) for level in LEVELS])
-        uncertainty.learn(predicted, errors, ALL)
+        uncertainty = uncertainty.learn(predicted, errors, ALL, N)
     shares = np.mean(inside, axis=0)
     assert shares.sum() == pytest.approx(sum(LEVELS), abs=0.02)
     np.testing.assert_allclose(shares, LEVELS, atol=0.055)
@@ -95,14 +96,14 @@ def test_heavy_tails_are_missed_alike_by_the_three_intervals() -> None:
 
 @pytest.mark.parametrize("growth", [0.2, 5.0])
 def test_an_error_that_grows_or_shrinks_over_the_window_is_covered_at_each_third(growth: float) -> None:
-    rng, uncertainty, inside = np.random.default_rng(4), Uncertainty(1e-12, N), []
+    rng, uncertainty, inside = np.random.default_rng(4), Uncertainty.init(1e-12), []
     std = 1e-6 * growth ** (np.arange(N) / N)
     for k in range(400):
         predicted = window(uncertainty)
         errors = rng.normal(0.0, std)
         if k >= 100:
             inside.append(np.abs(errors) <= 1.645 * predicted.std)
-        uncertainty.learn(predicted, errors, ALL)
+        uncertainty = uncertainty.learn(predicted, errors, ALL, N)
     shares = [part.mean() for part in np.array_split(np.mean(inside, axis=0), 3)]
     np.testing.assert_allclose(shares, 0.9, atol=0.04)
 
@@ -110,22 +111,22 @@ def test_an_error_that_grows_or_shrinks_over_the_window_is_covered_at_each_third
 def test_it_is_invariant_to_the_unit() -> None:
     found = []
     for unit in (1.0, 1e3, 1e-3):
-        uncertainty = Uncertainty(1e-12 * unit**2, N)
+        uncertainty = Uncertainty.init(1e-12 * unit**2)
         drawn = np.random.default_rng(5)
         for _ in range(20):
             speed, errors = 1e-3 * drawn.normal(size=N), 1e-5 * drawn.normal(size=N)
-            uncertainty.learn(moving(uncertainty, unit * speed), unit * errors, ALL)
+            uncertainty = uncertainty.learn(moving(uncertainty, unit * speed), unit * errors, ALL, N)
         found.append(moving(uncertainty, unit * 1e-3).std / unit)
     np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-6)
 
 
 def test_what_is_not_measured_is_not_learned() -> None:
     uncertainty = after_noise(1e-6, 5)
-    before = uncertainty.learned()
-    uncertainty.learn(window(uncertainty), np.ones(N), ~ALL)
-    uncertainty.learn(window(uncertainty), np.zeros(N), ALL)  # exactly the physics model
-    np.testing.assert_array_equal(uncertainty.learned(), before)
-    uncertainty.learn(window(uncertainty), np.where(np.arange(N) == 7, 1.0, 1e-6), np.arange(N) != 7)
+    before = numbers_of(uncertainty)
+    uncertainty = uncertainty.learn(window(uncertainty), np.ones(N), ~ALL, N)
+    uncertainty = uncertainty.learn(window(uncertainty), np.zeros(N), ALL, N)  # exactly the physics model
+    np.testing.assert_array_equal(numbers_of(uncertainty), before)
+    uncertainty = uncertainty.learn(window(uncertainty), np.where(np.arange(N) == 7, 1.0, 1e-6), np.arange(N) != 7, N)
     assert window(uncertainty).std.max() < 3e-6
 
 
@@ -134,28 +135,27 @@ def test_a_diverging_prediction_has_a_finite_deviation() -> None:
     for e_h in (np.inf, np.nan, 1e300, -np.inf):
         predicted = window(uncertainty, e_h=e_h)
         assert np.isfinite(predicted.std).all()
-        uncertainty.learn(predicted, np.ones(N), ALL)
-        assert Uncertainty.is_sound(uncertainty.learned())
+        uncertainty = uncertainty.learn(predicted, np.ones(N), ALL, N)
+        assert unsound(uncertainty) is None
     assert window(uncertainty, variance=PREDICTION_MAX).std.max() <= PREDICTION_MAX
 
 
 def test_saved_numbers_are_checked() -> None:
-    learned = after_noise(1e-6, 5).learned()
-    other = Uncertainty(1.0, N)
-    other.restore(learned)
-    np.testing.assert_array_equal(window(other).std, window(after_noise(1e-6, 5)).std)
-    assert Uncertainty.is_sound(learned)
+    learned = after_noise(1e-6, 5)
+    other = with_numbers(Uncertainty.init(1.0), numbers_of(learned))
+    np.testing.assert_array_equal(window(other).std, window(learned).std)
+    assert unsound(learned) is None
     for place, value in ((0, -1.0), (1, np.inf), (N_COMPONENTS - 1, 0.0), (N_COMPONENTS, -1e-3)):
-        assert not Uncertainty.is_sound(changed(learned, place, value))
+        assert unsound(changed(learned, place, value)) is not None
     for place, value in ((-3, 100.0), (-2, 0.01), (-1, np.nan), (-1, -1e-9)):
-        assert not Uncertainty.is_sound(changed(learned, place, value))
+        assert unsound(changed(learned, place, value)) is not None
 
 
-def changed(learned: Array, place: int, value: float) -> Array:
-    """Return the numbers with one of them changed."""
-    damaged: Array = learned.copy()
-    damaged[place] = value
-    return damaged
+def changed(learned: Uncertainty, place: int, value: float) -> Uncertainty:
+    """Return what is learned with one of its numbers changed."""
+    numbers = numbers_of(learned)
+    numbers[place] = value
+    return with_numbers(learned, numbers)
 
 
 def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:

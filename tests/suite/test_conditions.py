@@ -18,13 +18,13 @@ from library_stream import LookAheadStream
 from staircase_data import commanded
 from stream import OUTPUTS, PREDICTOR, PYTHON, STAGE_PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
-from trusted_cases import trusted_model
+from trusted_cases import change_learned, trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
-from hybridsep.predict.trust.model import COMMAND, LAGGED
+from hybridsep.predict.trust.stack import COMMAND, LAGGED, N_EXPERTS
 
 TRUST: dict[str, Value] = {"trust": True, "t_init": 0.0}
 DELAY = 5
@@ -61,7 +61,8 @@ def learned(model: str, leading: int = LAGGED) -> bytes:
     machine = machine_of(model)
     predictor = machine.new_predictor(replace(machine.predictor_settings, trust=True))
     backtest(predictor, *moved(model))
-    trusted_model(predictor).stack.weights = np.eye(5)[leading]
+    stack = trusted_model(predictor).learned.stack
+    change_learned(predictor, stack=replace(stack, weights=np.eye(N_EXPERTS)[leading]))
     return weights_file(predictor)
 
 

@@ -15,14 +15,14 @@ from library_models import trained_predictor
 from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters
-from trusted_cases import trusted_model
+from trusted_cases import change_learned, trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.trust.model import COMMAND
+from hybridsep.predict.trust.stack import COMMAND, N_EXPERTS, Stack
 
 Trained = Callable[[str], Path]
 
@@ -45,9 +45,9 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
 def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a compensator's predictor, saved, in which the command's expert led."""
     path, predictor = tmp_path_factory.mktemp("led") / "command.state", trained_predictor(COMPENSATOR)
-    model = trusted_model(predictor)
-    model.stack.weights, model.stack.gram = np.eye(5)[COMMAND], 1e-3 * model.stack.gram
-    model.stack.cross, model.stack.evidence = 1e-3 * model.stack.cross, 1e-3 * model.stack.evidence
+    stack = trusted_model(predictor).learned.stack
+    weights, less = np.eye(N_EXPERTS)[COMMAND], 1e-3
+    change_learned(predictor, stack=Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence))
     predictor.save(path)
     return path
 

@@ -7,7 +7,7 @@ import zlib
 
 __all__ = ["sealed", "spoiled"]
 
-_HEAD, _SETTING = 40, 32
+_HEAD, _SETTING = 32, 32
 """Bytes of the head, and of a setting: its name in 24, its value."""
 
 
@@ -25,7 +25,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         Of a good file, of a model with one mode at least.
     """
     body = content[:-8]
-    n_settings, n_modes, _, n_learned = struct.unpack_from("<4Q", body, 8)
+    n_settings, n_modes, n_learned = struct.unpack_from("<3Q", body, 8)
     settings = [body[_HEAD + _SETTING * i : _HEAD + _SETTING * (i + 1)] for i in range(n_settings)]
     behind = body[_HEAD + _SETTING * n_settings :]
     names = [setting[:24].rstrip(b"\0") for setting in settings]
@@ -40,7 +40,8 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
 
     first_mode = next(i for i, name in enumerate(names) if name.startswith(b"mode["))
     numbers = _HEAD + _SETTING * n_settings
-    factor = numbers + 8 * n_learned
+    n_rows = numbers + 8 * n_learned
+    factor = n_rows + 8
     damaged = {
         "nothing": b"",
         "no checksum": content[:-1],
@@ -49,9 +50,10 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "another version": sealed(b"HSEPWG00" + body[8:]),
         "settings that are cut": sealed(body[: _HEAD + 40]),
         "a name without an end": with_setting(0, b"x" * 24, 1.0),
-        "another number of numbers": with_head(3, n_learned + 1),
+        "another number of numbers": with_head(2, n_learned + 1),
         "numbers that are cut": sealed(body[: numbers + 8]),
         "no number": sealed(body[:numbers] + struct.pack("<d", float("nan")) + body[numbers + 8 :]),
+        "fewer rows than none": sealed(body[:n_rows] + struct.pack("<d", -1.0) + body[n_rows + 8 :]),
         "a factor that is cut": sealed(body[:-8]),
         "a factor with no number": sealed(body[:factor] + struct.pack("<d", float("inf")) + body[factor + 8 :]),
         "a factor without a diagonal": sealed(body[:factor] + bytes(8) + body[factor + 8 :]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,18 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.trust.state import TrustedModel
 
-__all__ = ["FRICTION", "PERIOD", "TS", "cycles", "friction", "physics", "run", "trusted", "trusted_model"]
+__all__ = [
+    "FRICTION",
+    "PERIOD",
+    "TS",
+    "change_learned",
+    "cycles",
+    "friction",
+    "physics",
+    "run",
+    "trusted",
+    "trusted_model",
+]
 
 TS = 1e-3  # s
 PERIOD = 1000
@@ -31,6 +43,13 @@ def trusted_model(predictor: HybridPredictor) -> TrustedModel:
     """Return the residual model of a predictor with trust."""
     assert isinstance(predictor.residual, TrustedModel)
     return predictor.residual
+
+
+def change_learned(predictor: HybridPredictor, **changes: Any) -> None:
+    """Change numbers that a predictor with trust has learned."""
+    model = trusted_model(predictor)
+    residual = replace(model, learned=replace(model.learned, **changes))
+    predictor.state = replace(predictor.state, residual=residual)
 
 
 def cycles(n: int, amplitude: float = 5e-3) -> Array:

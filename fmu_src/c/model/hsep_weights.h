@@ -1,11 +1,10 @@
 /* Warm start from weights that were learned before the simulation.
  *
- * The resource weights.bin, little-endian: "HSEPWG13"; the numbers of settings, of modes, of learned samples and of
- * what has been learned besides the factors, as uint64; each setting that shapes the features and the factor, its name
- * in 24 bytes and its value as a double; as doubles the numbers of a residual model that can be trusted, as
- * hsep_residual_learned has them, and those of hsep_uncertainty_learned; the upper triangle of each factor
- * [R z; 0 rho], of hsep_residual_load, by rows, (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all before as
- * uint64.
+ * The resource weights.bin, little-endian: "HSEPWG14"; the numbers of settings, of modes and of what has been learned
+ * besides the factors, as uint64; each setting that shapes the features and the factors, its name in 24 bytes and its
+ * value as a double; as doubles the numbers of hsep_residual_learned, and of hsep_uncertainty from theta on; for each
+ * factor [R z; 0 rho] of hsep_residual_load its weighted number of rows and its upper triangle by rows,
+ * (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all before as uint64.
  */
 #ifndef HSEP_WEIGHTS_H
 #define HSEP_WEIGHTS_H

@@ -1,4 +1,4 @@
-/* Constants of predictions and their errors, generated: what each means, and why, is in the file named. */
+/* Constants of predictions and their errors, generated: what each means, and why, is in its file. */
 #ifndef HSEP_PREDICT_CONSTANTS_H
 #define HSEP_PREDICT_CONSTANTS_H
 

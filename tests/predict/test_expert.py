@@ -6,24 +6,30 @@ import numpy as np
 import pytest
 
 from hybridsep.base.signals import Array
+from hybridsep.predict.regression import RidgeRegression
 from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.experts import Evidence, Expert, ExpertPrediction
+from hybridsep.predict.trust.expert import ExpertErrors, ExpertPrediction, SolvedExpert, solve
 
 N_STATIC, N = 3, 40
 SHARES = np.array([1.0, 0.5, 0.2])
 LAG_PRIORS = np.sqrt([1.0, CONSTANTS.last_lag**0.5])
 
 
-def learned(static: Array, lags: Array, target: Array) -> Evidence:
-    evidence = Evidence.none(N_STATIC + 2)
-    evidence.learn(static, lags, target)
-    return evidence
+def learned(static: Array, lags: Array, target: Array) -> RidgeRegression:
+    return RidgeRegression.init(N_STATIC + 2, 1e-40).update(np.hstack((static, lags)), target)
 
 
-def expert(p: int, noise_variance: float, correlation: float = 1.0) -> Expert:
-    found = Expert(SHARES, p, CONSTANTS)
-    found.noise_variance, found.correlation = noise_variance, correlation
-    return found
+def solved(
+    p: int,
+    evidence: RidgeRegression,
+    noise: float,
+    correlation: float = 1.0,
+    *,
+    scales: Array = SHARES,
+    first: float = 1.0,
+    least: float = 1e-9,
+) -> SolvedExpert:
+    return solve(evidence, ExpertErrors(noise, correlation), scales, p, first, least, CONSTANTS)
 
 
 def written_out(
@@ -45,9 +51,6 @@ def written_out(
     return free, free * largest_square / (largest_square + tau_2)
 
 
-ONES = np.ones(N_STATIC)
-
-
 @pytest.mark.parametrize("largest_square", [1e-3, 0.3, 100.0])
 @pytest.mark.parametrize("correlation", [1.0, 4.0])
 @pytest.mark.parametrize("p", [0, 2])
@@ -57,21 +60,19 @@ def test_prediction_is_the_formulas(p: int, k: int, correlation: float, largest_
     static, lags = rng.normal(size=(k, N_STATIC)), 0.3 * rng.normal(size=(k, 2))
     target = static @ [0.5, -0.3, 0.1] + lags @ [0.7, 0.1] + 0.05 * rng.normal(size=k)
     rows, past = rng.normal(size=(N, N_STATIC)), np.array([0.2, -0.1])
-    solved = expert(p, 0.05**2, correlation).solve(learned(static, lags, target), ONES, 1.0, 1.0, 1e-9)
-    found = solved.predict(rows, past, largest_square, 100.0)
+    one = solved(p, learned(static, lags, target), 0.05**2, correlation)
+    found = one.predict(rows, past, largest_square, 100.0)
     free, shrunk = written_out(static, lags, target, rows, past, correlation * 0.05**2, p, largest_square)
     np.testing.assert_allclose(found.unshrunk, free, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.e_h, shrunk, rtol=0, atol=1e-12)
     assert (np.abs(found.e_h) < np.abs(found.unshrunk)).all()
-    again = solved.predict(rows + 1.0, past, largest_square, 100.0, held=found)
+    again = one.predict(rows + 1.0, past, largest_square, 100.0, held=found)
     np.testing.assert_array_equal(again.kept, found.kept)
 
 
 def test_predictions_are_bounded() -> None:
     evidence = learned(np.ones((50, N_STATIC)), np.zeros((50, 2)), np.full(50, 9.0))
-    found = (
-        expert(0, 1e-6).solve(evidence, ONES, 1.0, 1.0, 1e-9).predict(np.ones((N, N_STATIC)), np.zeros(2), 81.0, 5.0)
-    )
+    found = solved(0, evidence, 1e-6).predict(np.ones((N, N_STATIC)), np.zeros(2), 81.0, 5.0)
     assert found.unshrunk[0] > 8.9
     np.testing.assert_allclose(found.e_h, 5.0, rtol=1e-5)
     np.testing.assert_allclose(found.shrink * found.unshrunk, found.e_h)
@@ -79,17 +80,17 @@ def test_predictions_are_bounded() -> None:
 
 def test_noise_that_is_not_known_is_the_first_one_and_none_is_below_the_least() -> None:
     evidence = learned(np.ones((50, N_STATIC)), np.zeros((50, 2)), np.ones(50))
-    assert expert(2, 0.0).solve(evidence, ONES, 1.0, 0.25, 1e-9).variance == 0.25
-    assert expert(2, 0.5).solve(evidence, ONES, 1.0, 0.25, 1e-9).variance == 0.5
-    assert expert(2, 0.5, 3.0).solve(evidence, ONES, 1.0, 0.25, 1.0).variance == 3.0
+    assert solved(2, evidence, 0.0, first=0.25).variance == 0.25
+    assert solved(2, evidence, 0.5, first=0.25).variance == 0.5
+    assert solved(2, evidence, 0.5, 3.0, first=0.25, least=1.0).variance == 3.0
 
 
 def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
     """Two features that were always equal turn against each other, as friction and an offset at a first reversal."""
     same = np.hstack((np.ones((500, 2)), np.zeros((500, 1))))
     evidence = learned(same, np.zeros((500, 2)), np.ones(500))
-    solved = expert(0, 1e-8).solve(evidence, ONES, 1.0, 1.0, 0.0)
-    seen, unseen = solved.predict(np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]), np.zeros(0), 1.0, 1.2).e_h
+    one = solved(0, evidence, 1e-8, least=0.0)
+    seen, unseen = one.predict(np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]), np.zeros(0), 1.0, 1.2).e_h
     assert seen == pytest.approx(1.0, abs=1e-6)
     # Weights 0.8 and 0.2; the variance of their difference is 4 · 1² · 0.5² / (1² + 0.5²) = 0.8.
     assert unseen == pytest.approx(0.6 / (1.0 + 0.8), rel=1e-6)
@@ -98,35 +99,31 @@ def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
 def test_a_recursion_that_diverges_predicts_nothing() -> None:
     lags = np.column_stack((np.logspace(-6, -2, 100), np.zeros(100)))
     evidence = learned(np.zeros((100, N_STATIC)), lags, 1e4 * lags[:, 0])  # a pole at 1e4
-    diverging = expert(2, 1e-6)
-    diverging.lag_scales = np.full(2, 1e6)
     rows, past = np.ones((200, N_STATIC)), np.array([1.0, 1.0])
-    found = diverging.solve(evidence, ONES, 1.0, 1.0, 0.0).predict(rows, past, 1.0, 1.2)
+    found = solved(2, evidence, 1e-6, least=0.0).predict(rows, past, 1.0, 1.2)
     assert np.isfinite(found.e_h).all()
     assert np.abs(found.unshrunk).max() <= 10.0 * 1.2
     assert np.abs(found.e_h[20:]).max() < 1e-4
 
 
-def judged(one: Expert, errors: Array, noise_variance: float) -> None:
+def judged(one: ExpertErrors, errors: Array, noise_variance: float, given: float = 0.0) -> ExpertErrors:
     nothing = np.zeros(len(errors))
     prediction = ExpertPrediction(nothing, nothing, nothing + 1.0, nothing, noise_variance)
-    one.judge(prediction, errors, np.ones(len(errors), dtype=np.bool_), 0.0)
+    return one.judge(prediction, errors, np.ones(len(errors), dtype=np.bool_), given, CONSTANTS)
 
 
 def test_correlation_follows_errors_that_are_alike() -> None:
-    rng = np.random.default_rng(0)
-    white, alike = expert(2, 1.0), expert(2, 1.0)
-    for one, common in ((white, 0.0), (alike, 1.0)):
-        for _ in range(300):
-            judged(one, rng.normal(size=100) + common * rng.normal(), 1.0)
+    rng, white, alike = np.random.default_rng(0), ExpertErrors(1.0), ExpertErrors(1.0)
+    for _ in range(300):
+        white = judged(white, rng.normal(size=100), 1.0)
+    for _ in range(300):
+        alike = judged(alike, rng.normal(size=100) + rng.normal(), 1.0)
     assert 1.0 <= white.correlation < 3.0
     assert 20.0 < alike.correlation <= CONSTANTS.correlation_max  # n · 1² / 1², and the noise
     for _ in range(100):
-        judged(alike, np.ones(100), 1e-12)
+        alike = judged(alike, np.ones(100), 1e-12)
     assert alike.correlation == CONSTANTS.correlation_max
 
 
 def test_a_given_noise_is_kept() -> None:
-    one, nothing = expert(2, 0.0), np.zeros(10)
-    one.judge(ExpertPrediction(nothing, nothing, nothing, nothing, 0.3), nothing, np.ones(10, dtype=np.bool_), 0.04)
-    assert one.noise_variance == 0.04
+    assert judged(ExpertErrors(), np.zeros(10), 0.3, given=0.04).noise_variance == 0.04
