@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from hybridsep.predict.trust.constants import CONSTANTS
+from hybridsep.predict.trust.expert import ExpertErrors, ResidualScale
 from hybridsep.predict.trust.reach import Reach
 from hybridsep.predict.trust.stack import Stack
 from hybridsep.predict.trust.state import Learned
