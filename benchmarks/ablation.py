@@ -31,13 +31,13 @@ from hybridsep.predict.trust.constants import CONSTANTS
 
 TRUST = "predict/trust/"
 STACK, START = TRUST + "hsep_stack.c", TRUST + "hsep_start.c"
-LEARNING, FORECAST, BLOCK = (TRUST + f"hsep_trusted{part}.c" for part in ("", "_forecast", "_block"))
+STATE, FORECAST = (TRUST + f"hsep_trusted_{part}.c" for part in ("state", "forecast"))
 
 
 def constants(**values: float) -> Changes:
     """Return the change of constants, by their names in the dataclass."""
     return {
-        TRUST + "hsep_trust_constants.h": [
+        "predict/hsep_predict_constants.h": [
             (f"HSEP_TRUST_{name.upper()} {getattr(CONSTANTS, name)!r}\n", f"HSEP_TRUST_{name.upper()} {value!r}\n")
             for name, value in values.items()
         ]
@@ -61,9 +61,9 @@ def without_component(i: int) -> Changes:
 
 NO_DOUBTING: Changes = {
     FORECAST: [
-        ("self->predicted[HSEP_DOUBTING] = self->predicted[self->leading]", "self->predicted[HSEP_DOUBTING] = 0"),
+        ("predicted[HSEP_DOUBTING] = predicted[self->leading]", "predicted[HSEP_DOUBTING] = 0"),
     ],
-    LEARNING: [("        hsep_stack_copy(&self->stack, leading, HSEP_DOUBTING);\n", "")],
+    STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);\n", "")],
     **constants(doubt=2.0),
 }
 
@@ -72,15 +72,11 @@ NO_STATIC = together(
     {
         FORECAST: [
             (
-                "self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;",
-                "self->predicted[HSEP_LAGGED] = known;",
+                "predicted[HSEP_LAGGED] = predicted[HSEP_STATIC] = known[HSEP_OF_PHYSICS] && !outgrown;",
+                "predicted[HSEP_LAGGED] = known[HSEP_OF_PHYSICS] && !outgrown;",
             ),
-            (
-                "(const hsep_expert_place[]){HSEP_LAGGED, HSEP_STATIC}, 2);",
-                "(const hsep_expert_place[]){HSEP_LAGGED}, 1);",
-            ),
-            ("    if (self->predicted[HSEP_STATIC]) {\n", "    if (self->predicted[HSEP_LAGGED]) {\n"),
-            ("*first = hsep_trusted_expert(self, HSEP_STATIC);", "*first = hsep_trusted_expert(self, HSEP_LAGGED);"),
+            ("    if (self->predicted[HSEP_STATIC]) {", "    if (self->predicted[HSEP_LAGGED]) {"),
+            ("hsep_trusted_expert(self, HSEP_STATIC);", "hsep_trusted_expert(self, HSEP_LAGGED);"),
         ]
     },
 )
@@ -91,7 +87,7 @@ VARIANTS: Mapping[str, Changes] = {
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(carried=3.0)),
     "earlier runs never forgotten": constants(doubt=2.0),
     "A's bound does not grow": {
-        FORECAST: [("    if (!(self->largest_step > 0.0 && hsep_stack_leader", "    if (!(0 && hsep_stack_leader")]
+        FORECAST: [("    if (!(learned->largest_step > 0.0 &&", "    if (!(0 &&")]
     },
     "features never begin anew": constants(outgrown=1e300),
     "rows are independent": constants(correlation_max=1.0),
@@ -112,7 +108,7 @@ VARIANTS: Mapping[str, Changes] = {
     },
     "stiffness acts at x_pb": {FORECAST: [("x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];", "x[j] = x_pb[j];")]},
     "A: 20 lags": constants(lags_of_command=20),
-    "runs begin at rest": {START: [("    if (known < HSEP_START_SAMPLES", "    if (1 || known < HSEP_START_SAMPLES")]},
+    "runs begin at rest": {START: [("    return known >= HSEP_START_SAMPLES * self->n_states;", "    return 0 && known > 0;")]},
     "L from the first": constants(first_lagged=1.0, first_static=0.0),
     "S from the first": constants(first_lagged=0.0, first_static=1.0),
     "kappa 0.3": constants(kappa=0.3),

@@ -36,21 +36,19 @@ static int replay_run(hsep_predictor *predictor, const replayed_run *run, hsep_p
 static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 {
     hsep_residual_model *to = hsep_predictor_model(predictor), *from = hsep_predictor_model(trained);
-    for (uint64_t i = 0; i < hsep_residual_n_learned(to); i++) {
-        *hsep_residual_learned(to, i) = *hsep_residual_learned(from, i);
-    }
-    for (uint64_t i = 0; hsep_residual_trusted(from) != NULL && i < HSEP_N_EVIDENCE; i++) {
-        hsep_gram *gram = hsep_trusted_evidence(hsep_residual_trusted(from), (hsep_evidence)i);
-        memcpy(
-            hsep_trusted_evidence(hsep_residual_trusted(to), (hsep_evidence)i), gram, (size_t)hsep_gram_size(gram->n));
+    memcpy(hsep_residual_learned(to), hsep_residual_learned(from), hsep_residual_n_learned(to) * sizeof(double));
+    for (uint64_t i = 0; hsep_residual_trusted(from) != NULL && i < HSEP_N_KINDS; i++) {
+        hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(from), i));
+        hsep_gram *learned = hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(to), i));
+        memcpy(learned, gram, (size_t)hsep_gram_size(gram->n));
     }
     if (hsep_residual_paper(from) != NULL) {
         hsep_regression *factor = hsep_paper_regression(hsep_residual_paper(from));
         memcpy(hsep_paper_regression(hsep_residual_paper(to)), factor, (size_t)hsep_regression_size(factor->n));
     }
     memcpy(
-        hsep_uncertainty_learned(hsep_predictor_uncertainty(predictor)),
-        hsep_uncertainty_learned(hsep_predictor_uncertainty(trained)), HSEP_N_UNCERTAINTY * sizeof(double));
+        hsep_predictor_uncertainty(predictor)->theta, hsep_predictor_uncertainty(trained)->theta,
+        HSEP_N_UNCERTAINTY * sizeof(double));
     hsep_residual_restart(to);
 }
 

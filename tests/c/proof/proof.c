@@ -8,11 +8,10 @@
 #include "hsep.h"
 
 #include "hsep_constraints.h"
-#include "hsep_features.h"
+#include "hsep_paper.h"
 #include "hsep_parameters.h"
 #include "hsep_planner.h"
 #include "hsep_ranges.h"
-#include "hsep_recursion.h"
 #include "hsep_stack.h"
 
 #include <limits.h>
@@ -49,7 +48,7 @@ static void fill(double *a, int n)
     }
 }
 
-/* The features and the recursion, eqs. (4) and (5): N samples with P and Q lags. */
+/* The recursion, eq. (4): N samples with P and Q lags. */
 #define N 4
 #define P 3
 #define Q 2
@@ -57,13 +56,11 @@ static void fill(double *a, int n)
 void prove_recursion(void)
 {
     double weights[1 + Q + 1 + P], x[N + Q - SHORT], e[N + P], work[2 * P];
-    hsep_features features;
-    hsep_features_lay_out(&features, P, Q);
-    fill(weights, (int)features.n);
+    fill(weights, 1 + Q + 1 + P);
     fill(x, N + Q - SHORT);
     fill(e, N + P);
     const hsep_recursion recursion = {
-        .w_x = weights + features.x, .w_e = weights + features.e, .p = P, .q = Q, .bias = weights[HSEP_BIAS]};
+        .w_x = weights + 1, .w_e = weights + 1 + Q + 1, .p = P, .q = Q, .bias = weights[0]};
     hsep_recursion_run(&recursion, x, e, N, 0, N);
     (void)hsep_recursion_stable(&recursion, work);
 }
@@ -80,8 +77,8 @@ void prove_stack(void)
         }
     }
     hsep_stack_update(&stack, products, Frama_C_double_interval(1.0, 1e4), 1e-18);
-    const hsep_expert_place leader = hsep_stack_leader(&stack);
-    const hsep_expert_place expert = (hsep_expert_place)(Frama_C_interval(0, HSEP_N_EXPERTS - 1) + SHORT);
+    const hsep_word leader = hsep_stack_leader(&stack);
+    const hsep_word expert = (hsep_word)(Frama_C_interval(0, HSEP_N_EXPERTS - 1) + SHORT);
     hsep_stack_copy(&stack, leader, HSEP_DOUBTING); /* another one */
     hsep_stack_forget(&stack, expert);
 }
