@@ -86,9 +86,7 @@ VARIANTS: Mapping[str, Changes] = {
     "no doubting expert D": NO_DOUBTING,
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(carried=3.0)),
     "earlier runs never forgotten": constants(doubt=2.0),
-    "A's bound does not grow": {
-        FORECAST: [("    if (!(learned->largest_step > 0.0 &&", "    if (!(0 &&")]
-    },
+    "A's bound does not grow": {FORECAST: [("    if (!(learned->largest_step > 0.0 &&", "    if (!(0 &&")]},
     "features never begin anew": constants(outgrown=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no first differences of disturbances": constants(difference_share=1e-6),
@@ -106,9 +104,11 @@ VARIANTS: Mapping[str, Changes] = {
             )
         ]
     },
-    "stiffness acts at x_pb": {FORECAST: [("x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];", "x[j] = x_pb[j];")]},
+    "stiffness acts at x_pb": {
+        FORECAST: [("x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];", "x[j] = x_pb[j];")]
+    },
     "A: 20 lags": constants(lags_of_command=20),
-    "runs begin at rest": {START: [("    return known >= HSEP_START_SAMPLES * self->n_states;", "    return 0 && known > 0;")]},
+    "runs begin at rest": {START: [("return known >= HSEP_START_SAMPLES", "return known < 0 * HSEP_START_SAMPLES")]},
     "L from the first": constants(first_lagged=1.0, first_static=0.0),
     "S from the first": constants(first_lagged=0.0, first_static=1.0),
     "kappa 0.3": constants(kappa=0.3),
