@@ -109,7 +109,7 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     assert model.learned.errors_of(DOUBTING).noise_variance == model.learned.errors_of(COMMAND).noise_variance > 0.0
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
-    assert not model.doubts
+    assert not trusted_model(warm).doubts
 
 
 def test_a_cold_run_doubts_nothing() -> None:

@@ -76,7 +76,7 @@ static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model
 static int learned_take_factor(hsep_learned_source *source, hsep_residual_model *model, hsep_word factor)
 {
     const hsep_word n = hsep_residual_n_features(model, factor);
-    hsep_real n_rows;
+    hsep_real n_rows = 0.0;
     int taken = hsep_learned_numbers(source, &n_rows, 1);
     for (hsep_word i = 0; taken && i <= n; i++) {
         taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) &&

@@ -65,7 +65,10 @@ static hsep_gram *residual_gram(hsep_residual_model *self, hsep_word factor)
     return hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(self), factor));
 }
 
-HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self) { return self->trusted ? HSEP_N_KINDS : 1; }
+HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self)
+{
+    return self->trusted ? HSEP_N_RESIDUALS : 1;
+}
 
 HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor)
 {

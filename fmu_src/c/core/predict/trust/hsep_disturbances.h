@@ -79,8 +79,8 @@ HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n, hsep_real velocity_scale,
     hsep_real rows[]);
 
-/* Fill stiffness, damping and what repeats of samples first ... last - 1 of these in the rows, which act at the position
- * x, (n,), m; first is 0, or where the last call ended; may be tried again. */
+/* Fill stiffness, damping and what repeats of samples first ... last - 1 of these in the rows, which act at the
+ * position x, (n,), m; first is 0, or where the last call ended; may be tried again. */
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
     hsep_real rows[]);

@@ -22,7 +22,7 @@
 #include "hsep_reach.h"
 #include "hsep_stack.h"
 
-#define HSEP_N_KINDS (HSEP_OF_COMMAND + 1) /* of residuals: of the physics model, and of the command */
+#define HSEP_N_RESIDUALS (HSEP_OF_COMMAND + 1) /* of residuals: of the physics model, and of the command */
 
 /* Samples of a window that are learned at one: those catch up that were measured before it was predicted. */
 #define HSEP_TRUSTED_PACE 2
@@ -33,7 +33,7 @@ typedef struct {
     hsep_real velocity_scale; /* m/s, of the friction features; 0 before any motion */
     hsep_real largest_step;   /* m, largest change from sample to sample, of the command */
     hsep_real fastest;        /* m, and of the physics model */
-    hsep_residual_scale scales[HSEP_N_KINDS];
+    hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_EXPERTS - HSEP_LAGGED]; /* of the experts from HSEP_LAGGED on */
     hsep_stack stack;
 } hsep_learned;
@@ -72,16 +72,16 @@ typedef struct {
     hsep_word variance; /* (n,) m2, of the mixture of the experts */
     hsep_word rows;     /* (n, n_static) features without lags, sample after sample */
     hsep_word disturbances, command;
-    hsep_word evidence[HSEP_N_KINDS];
+    hsep_word evidence[HSEP_N_RESIDUALS];
     hsep_word experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
     hsep_word largest;                 /* (n_static,) largest magnitudes of the features without lags */
     hsep_learned learned;
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_KINDS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
+HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    32 + HSEP_N_KINDS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    32 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);

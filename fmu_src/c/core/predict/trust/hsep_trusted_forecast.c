@@ -73,8 +73,8 @@ static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
 /* Solve for the weights of the experts that know something. */
 static void trusted_solved(hsep_trusted *self, int outgrown)
 {
-    hsep_word *predicted = self->predicted, known[HSEP_N_KINDS];
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    hsep_word *predicted = self->predicted, known[HSEP_N_RESIDUALS];
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         known[i] =
             hsep_evidence_n_rows(hsep_trusted_evidence(self, i)) > 0.0 && self->learned.scales[i].largest_square > 0.0;
     }

@@ -112,7 +112,7 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
         e[i] = slope * (hsep_real)(known - i) + e[known];
     }
     trusted_take_rows(self, x_pb, e, k + 1);
-    for (hsep_word i = 0; fold && i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
         hsep_evidence *evidence = hsep_trusted_evidence(self, i);
         const hsep_command *command = hsep_trusted_command(self);
         if (!(self->n_accepted > 0.0)) {
@@ -137,7 +137,8 @@ HSEP_API void hsep_trusted_follow(
     for (hsep_word i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
         trusted_follow_sample(self, x_pb, e, 1);
     }
-    for (hsep_word i = 0; last + 1 == self->Np && i < HSEP_N_KINDS; i++) { /* the solution comes with the next row */
+    for (hsep_word i = 0; last + 1 == self->Np && i < HSEP_N_RESIDUALS;
+         i++) { /* the solution comes with the next row */
         hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
     }
 }
@@ -179,7 +180,7 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 static void trusted_judge(hsep_trusted *self, const hsep_real e[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted);
-    const hsep_real *residuals[HSEP_N_KINDS] = {e, hsep_at(self, self->e_0)};
+    const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
     hsep_learned *learned = &self->learned;
     hsep_expert_errors *errors = learned->errors;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
@@ -189,13 +190,13 @@ static void trusted_judge(hsep_trusted *self, const hsep_real e[])
                 accepted, self->given_variance);
         }
     }
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_residual_scale_follow(&learned->scales[i], residuals[i], accepted, self->Np, self->n_accepted);
     }
     trusted_judge_stack(self, e);
     if (hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
         /* All experts go on with this run alone, and are judged anew. */
-        for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+        for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
             hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
         }
         errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};

@@ -68,7 +68,7 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(parameters));
     self->command = hsep_take_block(&end, hsep_command_size(parameters));
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         self->evidence[i] = hsep_take_block(&end, hsep_evidence_size(trusted_n_features(self, i)));
     }
     self->experts[HSEP_HOLD] = 0;
@@ -91,7 +91,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_residual_paramete
     hsep_stack_init(&self->learned.stack);
     hsep_disturbances_init(hsep_trusted_disturbances(self), parameters, start);
     hsep_command_init(hsep_trusted_command(self), parameters);
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_evidence_init(hsep_trusted_evidence(self, i), trusted_n_features(self, i));
     }
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
@@ -109,7 +109,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
                 got.known <= got.followed && got.reach.known <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         sound = sound && hsep_evidence_valid(hsep_at_bytes(block, got.evidence[i]), trusted_n_features(&got, i));
     }
     for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
@@ -146,7 +146,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
     hsep_learned *learned = &self->learned;
     hsep_expert_errors *doubting = &learned->errors[HSEP_DOUBTING - HSEP_LAGGED];
-    for (hsep_word i = 0; i < HSEP_N_KINDS; i++) {
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_evidence_begin_run(hsep_trusted_evidence(self, i), HSEP_TRUST_CARRIED * (hsep_real)self->Np);
     }
     self->leading = hsep_stack_leader(&learned->stack);
