@@ -208,7 +208,7 @@ def test_a_header_that_is_nested_too_deeply(opening: bytes) -> None:
 @pytest.mark.slow
 def test_a_number_of_thousands_of_digits() -> None:
     header, body = opened(predictor_state())
-    text = json.dumps(header).replace(f'"k": {header["meta"]["k"]}', '"k": ' + "9" * 5000).encode()
+    text = json.dumps(header).replace('"n_disturbances": 0', '"n_disturbances": ' + "9" * 5000).encode()
     with pytest.raises(StateError):
         HybridPredictor.from_bytes(sealed(text, body))
 

@@ -61,8 +61,8 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
- * rows of a factor are worth those it comes from, whose number the caller sets. Fails, and returns 0, if an entry is not
- * finite or a diagonal entry of R is 0. Cost: that of hsep_gram_fold. */
+ * rows of a factor are worth those it comes from, whose number the caller sets. Fails, and returns 0, if an entry is
+ * not finite or a diagonal entry of R is 0. Cost: that of hsep_gram_fold. */
 HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
