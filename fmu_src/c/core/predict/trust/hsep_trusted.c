@@ -102,7 +102,7 @@ static void trusted_fold(
 /* What of the rows so far counts on: of more than can be counted without rounding, half. */
 static hsep_real trusted_kept(const hsep_trusted *self, hsep_evidence evidence)
 {
-    return self->n_rows[evidence] < 0.25 * HSEP_EXACT ? self->kept : 0.5 * self->kept;
+    return self->n_rows[evidence] < 0.5 * HSEP_EXACT ? self->kept : 0.5 * self->kept;
 }
 
 /* Judge the next sample, and take in those since the last one that is believed, if it is: their residuals are linear in
