@@ -20,8 +20,8 @@
 /* Words that a struct takes, where the arrays behind it begin. */
 #define HSEP_WORDS(type) ((hsep_real)(sizeof(type) / sizeof(hsep_real)))
 
-/* Take count numbers at the cursor; return their offset. Counted as a number, so that no size can overflow: an offset
- * of 2^53 or more is 0, in a block whose size is refused. */
+/* Take count words at the cursor; return their offset. Counted as a number, so that no size can overflow: an offset of
+ * HSEP_EXACT or more is 0, in a block whose size is refused. */
 static inline hsep_word hsep_take(hsep_real *end, hsep_real count)
 {
     const hsep_real offset = *end;

@@ -5,8 +5,6 @@
 
 #include <string.h>
 
-#define TRUSTED_COUNTED (0.25 * HSEP_EXACT) /* rows: of more, half are forgotten before rounding ends their count */
-
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
     const hsep_word Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
@@ -115,8 +113,8 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
     for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
         hsep_evidence *evidence = hsep_trusted_evidence(self, i);
         const hsep_command *command = hsep_trusted_command(self);
-        if (!(self->n_accepted > 0.0)) {
-            const int countable = hsep_evidence_of_run(evidence)->n_rows < TRUSTED_COUNTED;
+        if (!(self->n_accepted > 0.0)) { /* of more rows than can be counted without rounding, half */
+            const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
             hsep_evidence_discount(evidence, countable ? self->kept : 0.5 * self->kept);
         }
         if (i == HSEP_OF_COMMAND) {
