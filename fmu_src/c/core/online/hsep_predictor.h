@@ -28,13 +28,12 @@
 #include "hsep.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
+#include "hsep_real.h"
 #include "hsep_regression.h"
 #include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
-
-#include "hsep_real.h"
 
 typedef struct {
     hsep_predictor_settings settings;

@@ -13,12 +13,11 @@
 #include "hsep_layout.h"
 #include "hsep_paper.h"
 #include "hsep_physics.h"
+#include "hsep_real.h"
 #include "hsep_residual_window.h"
 #include "hsep_settings.h"
 #include "hsep_trusted.h"
 #include "hsep_uncertainty.h"
-
-#include "hsep_real.h"
 
 typedef struct {
     const hsep_predictor_settings *settings;

@@ -1,10 +1,10 @@
 #include "hsep_uncertainty.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 static const hsep_real uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, HSEP_UNCERTAINTY_SHARES};

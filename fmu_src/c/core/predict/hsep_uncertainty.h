@@ -15,7 +15,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 #define HSEP_N_COMPONENTS 3

@@ -7,7 +7,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 #define HSEP_BIAS 0 /* place of the constant feature */

@@ -9,12 +9,11 @@
 #include "hsep_api.h"
 #include "hsep_features.h"
 #include "hsep_layout.h"
+#include "hsep_real.h"
 #include "hsep_recursion.h"
 #include "hsep_regression.h"
 #include "hsep_residual_window.h"
 #include "hsep_settings.h"
-
-#include "hsep_real.h"
 
 typedef struct {
     hsep_word n; /* samples of a prediction, with those that are late */

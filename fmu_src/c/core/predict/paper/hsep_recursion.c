@@ -1,8 +1,8 @@
 #include "hsep_recursion.h"
 
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 
 HSEP_API void hsep_recursion_run(

@@ -7,7 +7,6 @@
 #define HSEP_RECURSION_H
 
 #include "hsep_api.h"
-
 #include "hsep_real.h"
 
 typedef struct {

@@ -1,9 +1,9 @@
 #include "hsep_disturbances.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */

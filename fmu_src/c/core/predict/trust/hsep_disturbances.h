@@ -14,9 +14,8 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_settings.h"
-
 #include "hsep_real.h"
+#include "hsep_settings.h"
 
 #define HSEP_DISTURBANCES_FRICTION 6 /* disturbances of friction, the first ones, */
 #define HSEP_DISTURBANCES_STIFFNESS 6

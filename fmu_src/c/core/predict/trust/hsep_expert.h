@@ -14,7 +14,6 @@
 #include "hsep_api.h"
 #include "hsep_gram.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 /* Size of the residuals so far. */

@@ -1,8 +1,7 @@
 #include "hsep_reach.h"
 
-#include "hsep_trust_constants.h"
-
 #include "hsep_math.h"
+#include "hsep_trust_constants.h"
 
 HSEP_API hsep_reach_window
 hsep_reach_begin(hsep_reach *self, const hsep_real x_pb[], hsep_real before, hsep_word n, hsep_real largest)

@@ -1,9 +1,9 @@
 #include "hsep_stack.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 static const hsep_real stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};

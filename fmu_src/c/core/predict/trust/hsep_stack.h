@@ -9,7 +9,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 /* Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and

@@ -13,7 +13,6 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
-
 #include "hsep_real.h"
 
 typedef struct {

@@ -1,10 +1,10 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
@@ -99,7 +99,7 @@ static void trusted_fold(
     self->n_rows[evidence] += 1.0;
 }
 
-/* What of the rows so far counts on: of more than can be counted without rounding, half. */
+/* Weight of all rows so far in this window: half, where more could not be counted without rounding. */
 static hsep_real trusted_kept(const hsep_trusted *self, hsep_evidence evidence)
 {
     return self->n_rows[evidence] < 0.5 * HSEP_EXACT ? self->kept : 0.5 * self->kept;

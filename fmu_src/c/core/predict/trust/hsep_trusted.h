@@ -23,10 +23,9 @@
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_reach.h"
+#include "hsep_real.h"
 #include "hsep_settings.h"
 #include "hsep_stack.h"
-
-#include "hsep_real.h"
 
 typedef struct {
     const hsep_predictor_settings *settings;

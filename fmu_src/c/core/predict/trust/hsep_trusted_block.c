@@ -1,11 +1,11 @@
 /* Memory of a residual model that can be trusted: its layout, beginning and check, and what it has learned. */
 #include "hsep_trusted.h"
 
+#include "hsep_math.h"
 #include "hsep_range.h"
 #include "hsep_trust_constants.h"
 #include "hsep_trust_learned.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

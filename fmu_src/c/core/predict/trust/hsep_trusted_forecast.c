@@ -1,11 +1,11 @@
 /* Prediction by a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
 #include "hsep_trust_constants.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 
 /* Those of the command's. */

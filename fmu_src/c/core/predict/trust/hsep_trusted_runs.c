@@ -1,9 +1,9 @@
 /* Rows that a residual model that can be trusted has learned, of this run and of earlier ones. */
 #include "hsep_trusted.h"
 
+#include "hsep_math.h"
 #include "hsep_trust_constants.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 
