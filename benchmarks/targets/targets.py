@@ -16,6 +16,7 @@ from benchmarks.targets.cases import Case, header
 from hybridsep.base.signals import Array
 
 __all__ = [
+    "C_SOURCES",
     "FLOAT32",
     "HERE",
     "TARGETS",
@@ -24,6 +25,7 @@ __all__ = [
     "Target",
     "build",
     "core_sources",
+    "include_options",
     "program",
     "replay",
     "run",

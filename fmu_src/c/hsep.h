@@ -72,7 +72,7 @@ typedef enum {
     HSEP_WEIGHTS_OTHER = 2    /* cold: they were learned with other settings or modes */
 } hsep_began;
 
-/* Signal of a window that is out of range (1e100 m), because the learned recursion diverges. */
+/* Signal of a window that is out of range (1e100 m, in single precision 1e15 m): the learned recursion diverges. */
 typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_DIVERGES_X_DM } hsep_divergence;
 
 /* ------------------------------------------------------------------------------------------------ The predictor --

@@ -81,7 +81,7 @@ def identify(
     """
     from ..identify.figures import operation_figure, response_figure
     from ..identify.frequency_response import IdentifiedResponse
-    from ..identify.recording import Choices, Reading, identify_recording, read_recording
+    from ..identify.recording import Choices, FileReading, identify_recording, read_recording
     from ..logs.units import shown_in
     from ..machines.naming import checked_name, machine_name
     from ..reports.extent import partly_used
@@ -94,10 +94,10 @@ def identify(
     machine = checked_name(name) if name else machine_name(out or recording)
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
-    reading = Reading(kind, columns, unit, T_s, axis, measurement_delay, fix)
+    reading = FileReading(kind, columns, unit, T_s, axis, measurement_delay, fix)
     with progress_bar(as_json) as advance:
         read = read_recording(recording, reading)
-        if read.log is not None and read.reading.kind == "operation":
+        if read.log is not None and read.is_operation:
             show(read.log.remarks, read.findings)
         found = identify_recording(read, Choices(unit_gain, modes, hold, dead_time), advance)
     shown = shown_in("m") if read.log is None else read.log.shown
@@ -111,7 +111,7 @@ def identify(
         if read.changed:
             entries["sources"] = [f"identified from {recording.name}", *read.changed]
         _write_machine(found, machine, recording.name, entries, out)
-    if not as_json and read.log is not None and read.reading.kind == "operation" and (line := partly_used(read.log)):
+    if not as_json and read.log is not None and read.is_operation and (line := partly_used(read.log)):
         console.print(line)
     _print_identified(found, as_json, recording.name, shown)
     if not as_json:

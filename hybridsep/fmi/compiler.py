@@ -218,7 +218,7 @@ def compiler_for(target: str) -> Compiler:
 def compiled(
     jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
     on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
-    on_library: Callable[[tuple[str, str], bytes], object] = lambda _job, _content: None,
+    on_made: Callable[[tuple[str, str], bytes], object] = lambda _job, _content: None,
 ) -> dict[tuple[str, str], bytes]:
     """Compile and link ``all.c`` into stripped shared libraries, always as many as there are processors.
 
@@ -228,8 +228,8 @@ def compiled(
         (name of the library, key of :data:`TARGETS`) → its compiler, and its sources by file name.
     on_job : callable, optional
         Called with each key when its compilation begins.
-    on_library : callable, optional
-        Called with each key and its library when it is there, also where a later one fails or is interrupted.
+    on_made : callable, optional
+        Called with each key and its library when it is compiled, also where a later one fails or is interrupted.
 
     Raises
     ------
@@ -254,7 +254,7 @@ def compiled(
         def take(i: int) -> None:
             name, target = keys[i]
             made[keys[i]] = (commands[i][1] / f"{name}{TARGETS[target].suffix}").read_bytes()
-            on_library(keys[i], made[keys[i]])
+            on_made(keys[i], made[keys[i]])
 
         for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i]), take).items():
             if status != 0:

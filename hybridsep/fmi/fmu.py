@@ -13,15 +13,12 @@ from ..machines.machine import Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from .flavours import FMI_VERSIONS
-from .fmu_table import FmuTable
+from .fmu_table import SAMPLES_TRAJECTORY, FmuTable
 
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
 __all__ = ["Fmu", "table_of"]
-
-_SAMPLES_TRAJECTORY = 3
-"""The number under which ReferenceTrajectory plays the samples it was built with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +85,7 @@ def table_of(
     """
     parameters, modes = _starts(machine, model)
     if samples:
-        parameters["trajectory"] = _SAMPLES_TRAJECTORY
+        parameters["trajectory"] = SAMPLES_TRAJECTORY
     if warm:
         parameters["t_init"] = 0.0
     return FmuTable(model, name, parameters, modes, machine.unit, windows or model != "HybridPredictor")

@@ -14,7 +14,10 @@ from ..base.settings import PARAMETERS
 from .angular_units import angular_unit
 from .variables import MODELS, Value, Variable
 
-__all__ = ["FmuTable"]
+__all__ = ["SAMPLES_TRAJECTORY", "FmuTable"]
+
+SAMPLES_TRAJECTORY = len(PARAMETERS["trajectory"].choices) - 1
+"""The number under which a ReferenceTrajectory plays the samples it was built with: the last one."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class FmuTable:
         }
         if not self.windows:
             content["windows"] = False
-        return content if self.unit == "m" else {**content, "unit": self.unit}
+        return {**content, "unit": self.unit} if self.is_angular else content
 
     @property
     def kind(self) -> str:
@@ -89,8 +92,8 @@ class FmuTable:
         """
         if self.model != "ReferenceTrajectory":
             return self.variables
-        T_s, n = float(self.parameters["T_s"]), len(PARAMETERS["trajectory"].choices)
-        played = n if self.parameters["trajectory"] == n - 1 else n - 1
+        T_s = float(self.parameters["T_s"])
+        played = SAMPLES_TRAJECTORY + (self.parameters["trajectory"] == SAMPLES_TRAJECTORY)
         own: dict[str, dict[str, float]] = {
             "T_s": {"minimum": T_s, "maximum": T_s},
             "trajectory": {"maximum": played - 1},
@@ -111,6 +114,6 @@ class FmuTable:
 
 
 def _angular(variable: Variable) -> Variable:
-    """Return a variable of a rotary axis for that of a linear one."""
+    """Return a linear axis' variable with the units of a rotary one."""
     unit, display = angular_unit(variable.unit), angular_unit(variable.display_unit)
     return replace(variable, unit=unit, display_unit=display)

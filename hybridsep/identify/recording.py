@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +22,11 @@ from .response_files import has_response, read_response
 from .segments import in_time
 from .swept_sine import h1
 
-__all__ = ["Choices", "Reading", "Recording", "identify_recording", "read_recording"]
+__all__ = ["Choices", "FileReading", "RecordedFile", "identify_recording", "read_recording"]
 
 
 @dataclass(frozen=True)
-class Reading:
+class FileReading:
     """How a file is read.
 
     Attributes
@@ -38,7 +38,7 @@ class Reading:
     unit : str or None
         Unit of the positions, where the file does not say it.
     T_s : float, s, or None
-        Sampling interval; of a response that of the model, 1 ms if it is left out.
+        Sampling interval of a log; with a response the model's, 1 ms if it is left out.
     axis : str or None
         Of a file that holds several.
     measurement_delay : int
@@ -47,13 +47,13 @@ class Reading:
         Whether the fixes of all findings of a log are applied.
     """
 
-    kind: str = "auto"
-    columns: Mapping[str, str] = field(default_factory=dict)
-    unit: str | None = None
-    T_s: float | None = None
-    axis: str | None = None
-    measurement_delay: int = 0
-    fix: bool = False
+    kind: str
+    columns: Mapping[str, str]
+    unit: str | None
+    T_s: float | None
+    axis: str | None
+    measurement_delay: int
+    fix: bool
 
 
 @dataclass(frozen=True)
@@ -72,34 +72,39 @@ class Choices:
         Whole samples, with a response.
     """
 
-    unit_gain: bool | None = None
-    modes: int | None = None
-    hold: str = "zoh"
-    dead_time: int = 0
+    unit_gain: bool | None
+    modes: int | None
+    hold: str
+    dead_time: int
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedFile:
     """A file that was read.
 
     Attributes
     ----------
     path : Path
-    reading : Reading
-        With the kind that was found.
+    reading : FileReading
+        With the kind that the file is of, never ``auto``.
     log : Log or None
         Of operation or of a swept sine, repaired.
     findings : tuple of Finding
         Of the checks of a log of operation.
-    pieces : list of ((n,), (n,) arrays), m
+    pieces : tuple of ((n,), (n,) arrays), m
         Commands, and positions of the same instants, of each segment of the log.
     """
 
     path: Path
-    reading: Reading
+    reading: FileReading
     log: Log | None = None
     findings: tuple[Finding, ...] = ()
     pieces: tuple[tuple[Array, Array], ...] = ()
+
+    @property
+    def is_operation(self) -> bool:
+        """Whether it is a log of operation."""
+        return self.reading.kind == "operation"
 
     @property
     def changed(self) -> list[str]:
@@ -107,7 +112,7 @@ class Recording:
         return changes({self.path.name: self.findings})
 
 
-def read_recording(path: Path, reading: Reading) -> Recording:
+def read_recording(path: Path, reading: FileReading) -> RecordedFile:
     """Return a file as :func:`identify_recording` takes it; of a response and of Klipper's no more than its kind.
 
     Raises
@@ -120,15 +125,15 @@ def read_recording(path: Path, reading: Reading) -> Recording:
     if reading.kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {reading.kind!r}")
     kind = _found_kind(path, reading) if reading.kind == "auto" else reading.kind
-    for option, of_operation, given in (
+    for option, kinds, given in (
         ("--fix is for a log of operation", ("operation",), reading.fix),
         ("--measurement-delay is for a log", ("operation", "sweep"), reading.measurement_delay),
     ):
-        if given and kind not in of_operation:
+        if given and kind not in kinds:
             raise ParameterError(f"{option}, {path.name} is read as --kind {kind}")
-    known = Reading(**{**vars(reading), "kind": kind})
+    reading = replace(reading, kind=kind)
     if kind in ("klipper", "response"):
-        return Recording(path, known)
+        return RecordedFile(path, reading)
     sweeps = kind == "sweep"
     log = read_log(
         path,
@@ -150,11 +155,11 @@ def read_recording(path: Path, reading: Reading) -> Recording:
         (log,), found = take_in([log], fix=reading.fix)
         findings = found[path.name]
     pieces = (in_time(piece.x_d, piece.x_meas, reading.measurement_delay) for piece in log.segments())
-    return Recording(path, known, log, findings, tuple(piece for piece in pieces if len(piece[0])))
+    return RecordedFile(path, reading, log, findings, tuple(piece for piece in pieces if len(piece[0])))
 
 
 def identify_recording(
-    recording: Recording,
+    recording: RecordedFile,
     choices: Choices,
     progress: Callable[[str, float], object] = lambda _message, _done: None,
 ) -> IdentifiedModel | IdentifiedResponse:
@@ -173,7 +178,7 @@ def identify_recording(
     T_s = 1e-3 if reading.T_s is None else reading.T_s
     if reading.kind == "klipper":
         return identify_resonance(read_klipper(path), _klipper_axis(reading.axis), T_s=T_s)
-    if log is not None and reading.kind == "operation":
+    if log is not None and recording.is_operation:
         return identify_operation(
             pieces, log.T_s, unit_gain=choices.unit_gain, unit=log.unit, shown=log.shown, progress=progress
         )
@@ -198,7 +203,7 @@ def identify_recording(
     )
 
 
-def _found_kind(path: Path, reading: Reading) -> str:
+def _found_kind(path: Path, reading: FileReading) -> str:
     if is_klipper(path):
         return "klipper"
     return "response" if not reading.columns and has_response(path) else "operation"

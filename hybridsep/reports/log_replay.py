@@ -31,8 +31,6 @@ class LogReplay:
     scores : Scores
     first : Batch
         The first window.
-    Np : int
-        Samples of a window.
     batches : list of (t, rms_pb, rms_hold, rms_h), s and m
         Of each window, where they were asked for.
     peers : BacktestPeers or None
@@ -43,7 +41,6 @@ class LogReplay:
 
     scores: Scores
     first: Batch
-    Np: int
     batches: list[tuple[float, ...]]
     peers: BacktestPeers | None = None
     run: Run | None = None
@@ -65,7 +62,7 @@ class LogReplay:
         first = self.first
         n = int(np.count_nonzero(~np.isnan(first.x)))
         rest = self.scores.overall.rms_without(n, (first.rms_pb, first.rms_hold, first.rms_h))
-        more = {} if self.peers is None else self.peers.rms_from(self.Np)
+        more = {} if self.peers is None else self.peers.rms_from(len(first.x))
         return {**dict(zip(("pb", "hold", "h"), rest, strict=True)), **more}
 
 
@@ -110,10 +107,10 @@ def replay_log(
 
     if isinstance(opened, LogReader) and not whole:
         scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
-        return LogReplay(scores, first[0], predictor.Np, rows)
+        return LogReplay(scores, first[0], rows)
     log = opened if isinstance(opened, Log) else opened.read()
     found = backtest(predictor, log.x_d, log.x_meas, on_batch=on_batch)
     peers = backtest_peers(found, log.x_d, log.x_meas, predictor, lambda done: progress("ARX models", 0.8 + 0.2 * done))
     delay = predictor.settings.measurement_delay
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
-    return LogReplay(found, first[0], predictor.Np, rows, peers, run)
+    return LogReplay(found, first[0], rows, peers, run)

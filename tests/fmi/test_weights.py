@@ -7,7 +7,6 @@ import random
 import struct
 import sys
 import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
 from properties import share
+from spoiled_weights import sealed
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
@@ -123,11 +123,6 @@ def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     assert not predictor.weights.any()
     restore_weights(predictor, content)
     assert predictor.weights.any()
-
-
-def sealed(body: bytes) -> bytes:
-    """Append the checksum that makes any content pass for undamaged."""
-    return body + struct.pack("<Q", zlib.crc32(body))
 
 
 def mutations(content: bytes, count: int) -> Iterator[bytes]:

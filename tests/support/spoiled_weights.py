@@ -1,4 +1,4 @@
-"""Weights files that are whole by their checksum and yet are not what is asked for."""
+"""Weights files that must be refused, most of them with the checksum of their content."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _HEAD, _SETTING = 32, 32
 
 
 def sealed(body: bytes) -> bytes:
-    """Return a file with the checksum of its content."""
+    """Append the checksum that makes any content pass for undamaged."""
     return body + struct.pack("<Q", zlib.crc32(body))
 
 
@@ -45,6 +45,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
     damaged = {
         "nothing": b"",
         "no checksum": content[:-1],
+        "a byte that was changed": content[:200] + bytes([content[200] ^ 1]) + content[201:],
         "a checksum alone": sealed(b""),
         "a head that is cut": sealed(body[:20]),
         "another version": sealed(b"HSEPWG00" + body[8:]),

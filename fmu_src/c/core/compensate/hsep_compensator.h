@@ -27,9 +27,8 @@
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_trusted_planner.h"
-
 #include "hsep_real.h"
+#include "hsep_trusted_planner.h"
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */

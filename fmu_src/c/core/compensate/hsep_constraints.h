@@ -5,7 +5,6 @@
 
 #include "hsep_api.h"
 #include "hsep_plan.h"
-
 #include "hsep_real.h"
 
 /* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */

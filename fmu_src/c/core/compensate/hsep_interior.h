@@ -8,9 +8,8 @@
 #define HSEP_INTERIOR_H
 
 #include "hsep_api.h"
-#include "hsep_splines.h"
-
 #include "hsep_real.h"
+#include "hsep_splines.h"
 
 #define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 

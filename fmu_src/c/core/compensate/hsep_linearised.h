@@ -15,9 +15,8 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_trusted.h"
-
 #include "hsep_real.h"
+#include "hsep_trusted.h"
 
 #define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
 

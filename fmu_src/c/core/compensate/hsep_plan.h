@@ -3,9 +3,8 @@
 #define HSEP_PLAN_H
 
 #include "hsep_layout.h"
-#include "hsep_splines.h"
-
 #include "hsep_real.h"
+#include "hsep_splines.h"
 
 typedef struct {
     hsep_word Np;

@@ -2,8 +2,8 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_constraints.h"
-
 #include "hsep_math.h"
+
 #include <stddef.h>
 #include <string.h>
 

@@ -14,9 +14,8 @@
 #include "hsep_api.h"
 #include "hsep_interior.h"
 #include "hsep_plan.h"
-#include "hsep_splines.h"
-
 #include "hsep_real.h"
+#include "hsep_splines.h"
 
 /* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
  * takes more work. */

@@ -1,8 +1,8 @@
 #include "hsep_slacks.h"
 
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 static const hsep_real slacks_least = 0.3;     /* smallest initial slack, in shares */

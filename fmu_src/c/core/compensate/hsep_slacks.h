@@ -8,9 +8,8 @@
 #define HSEP_SLACKS_H
 
 #include "hsep_api.h"
-#include "hsep_splines.h"
-
 #include "hsep_real.h"
+#include "hsep_splines.h"
 
 /* One side of the bounds, all (4 preview,): slack s = B x - b and multiplier z, both > 0. */
 typedef struct {

@@ -11,7 +11,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 #define HSEP_ORDERS 4  /* orders of difference: 0, the change itself, to 3, its jerk */

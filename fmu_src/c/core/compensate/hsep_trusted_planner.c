@@ -1,9 +1,9 @@
 #include "hsep_trusted_planner.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

@@ -17,9 +17,8 @@
 #include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
-#include "hsep_trusted.h"
-
 #include "hsep_real.h"
+#include "hsep_trusted.h"
 
 #define HSEP_TRUSTED_STEPS 4      /* Newton steps of a plan at most, */
 #define HSEP_TRUSTED_TRIES 6      /* tries of each, */

@@ -1,8 +1,8 @@
 #include "hsep_parameters.h"
 
+#include "hsep_math.h"
 #include "hsep_ranges.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 static const hsep_real parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */

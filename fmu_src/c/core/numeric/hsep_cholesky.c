@@ -1,8 +1,8 @@
 #include "hsep_cholesky.h"
 
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 
 /* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. */

@@ -7,7 +7,6 @@
 #define HSEP_CHOLESKY_H
 
 #include "hsep_api.h"
-
 #include "hsep_real.h"
 
 /* Doubles of a triangle of n rows. */

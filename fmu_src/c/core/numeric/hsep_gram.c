@@ -1,10 +1,10 @@
 #include "hsep_gram.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_math.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

@@ -14,7 +14,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 /* Least pivot, m2, where a penalty underflows; that of the target, relative to its square; and what rounding leaves

@@ -1,8 +1,8 @@
 #include "hsep_regression.h"
 
+#include "hsep_math.h"
 #include "hsep_tiles.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

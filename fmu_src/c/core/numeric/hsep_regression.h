@@ -15,9 +15,8 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_tiles.h"
-
 #include "hsep_real.h"
+#include "hsep_tiles.h"
 
 typedef struct {
     hsep_word n;            /* features */

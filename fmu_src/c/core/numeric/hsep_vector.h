@@ -5,6 +5,7 @@
 #define HSEP_VECTOR_H
 
 #include "hsep_real.h"
+
 #include <string.h>
 
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)

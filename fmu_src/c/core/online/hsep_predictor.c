@@ -1,8 +1,8 @@
 #include "hsep_predictor.h"
 
+#include "hsep_math.h"
 #include "hsep_range.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

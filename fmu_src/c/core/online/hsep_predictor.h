@@ -27,12 +27,11 @@
 
 #include "hsep.h"
 #include "hsep_physics.h"
+#include "hsep_real.h"
 #include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
-
-#include "hsep_real.h"
 
 typedef struct {
     hsep_predictor_settings settings;

@@ -1,9 +1,9 @@
 /* Memory of a predictor: its layout, beginning and check. */
 #include "hsep_predictor.h"
 
+#include "hsep_math.h"
 #include "hsep_range.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

@@ -1,6 +1,7 @@
 #include "hsep_physics.h"
 
 #include "hsep_math.h"
+
 #include <string.h>
 
 #define PHYSICS_TERMS 20 /* of the series: 0.5^20 / 20! < 1e-24 */

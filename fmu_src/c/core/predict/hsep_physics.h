@@ -8,9 +8,9 @@
 
 #include "hsep.h"
 #include "hsep_layout.h"
+#include "hsep_real.h"
 
 #include <stddef.h>
-#include "hsep_real.h"
 
 /* A mode between two samples: s(k+1) = A s(k) + b u(k), its part of x_pb(k) is c s(k) + d u(k); s in m. */
 typedef struct {

@@ -1,9 +1,9 @@
 #include "hsep_uncertainty.h"
 
+#include "hsep_math.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <string.h>
 
 static const hsep_real uncertainty_shares[] = {HSEP_UNCERTAINTY_SHARES};

@@ -16,7 +16,6 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_predict_constants.h"
-
 #include "hsep_real.h"
 
 #define HSEP_N_UNCERTAINTY (2 * HSEP_UNCERTAINTY_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */

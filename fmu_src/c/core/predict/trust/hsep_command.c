@@ -1,8 +1,8 @@
 #include "hsep_command.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

@@ -11,9 +11,8 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_residual_window.h"
-
 #include "hsep_real.h"
+#include "hsep_residual_window.h"
 
 typedef struct {
     hsep_word n;         /* samples of a prediction */

@@ -1,6 +1,7 @@
 #include "hsep_disturbances.h"
 
 #include "hsep_math.h"
+
 #include <string.h>
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */

@@ -13,9 +13,8 @@
 
 #include "hsep_physics.h"
 #include "hsep_predict_constants.h"
-#include "hsep_residual_window.h"
-
 #include "hsep_real.h"
+#include "hsep_residual_window.h"
 
 #define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_N_FRICTION /* place, behind friction */
 #define HSEP_DISTURBANCES_DAMPING (HSEP_DISTURBANCES_STIFFNESS + 1)

@@ -1,11 +1,11 @@
 #include "hsep_expert.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 
 HSEP_API void hsep_residual_scale_follow(

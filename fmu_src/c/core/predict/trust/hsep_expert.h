@@ -14,7 +14,6 @@
 #include "hsep_api.h"
 #include "hsep_evidence.h"
 #include "hsep_layout.h"
-
 #include "hsep_real.h"
 
 /* Size of the residuals so far. */

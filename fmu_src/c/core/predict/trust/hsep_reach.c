@@ -1,8 +1,7 @@
 #include "hsep_reach.h"
 
-#include "hsep_predict_constants.h"
-
 #include "hsep_math.h"
+#include "hsep_predict_constants.h"
 
 HSEP_API void hsep_reach_begin(hsep_reach *self, hsep_real largest, hsep_real fastest)
 {

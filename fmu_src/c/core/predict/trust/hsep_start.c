@@ -1,9 +1,9 @@
 #include "hsep_start.h"
 
+#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
 
-#include "hsep_math.h"
 #include <stddef.h>
 #include <string.h>
 

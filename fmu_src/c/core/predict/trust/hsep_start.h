@@ -13,9 +13,8 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_residual_window.h"
-
 #include "hsep_real.h"
+#include "hsep_residual_window.h"
 
 typedef struct {
     hsep_word Np, n;             /* samples measured and predicted */
