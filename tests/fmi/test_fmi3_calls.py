@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from fmi2_library import ERROR, OK, repair_checksum
-from fmi3_library import ABSENT, VALUE_TYPES, Library3
+from fmi3_library import ABSENT, VALUE_TYPES, Library3, Logger
 
 STATES = ("instantiated", "Initialization Mode", "Step Mode", "terminated")
 ALWAYS, SETTABLE = set(STATES), set(STATES[:3])
@@ -97,6 +97,22 @@ def test_what_is_absent_is_refused_by_name_in_every_state(fmu: Library3, name: s
         )
         fmu.FreeInstance(instance)
     assert getattr(fmu, name)(None, *arguments) == ERROR
+
+
+@pytest.mark.parametrize(("kind", "n_callbacks"), [("ModelExchange", 0), ("ScheduledExecution", 3)])
+def test_an_instance_of_another_kind_is_refused_by_name(fmu: Library3, kind: str, n_callbacks: int) -> None:
+    heard: list[tuple[int, str]] = []
+
+    def log(environment: Any, status: int, category: bytes, message: bytes) -> None:
+        heard.append((status, message.decode()))
+
+    create: Any = getattr(fmu, f"Instantiate{kind}")
+    create.restype = c_void_p
+    arguments = (c_char_p(b"one"), c_char_p(fmu.guid.encode()), None, c_bool(), c_bool(), None)
+    for logger in (Logger(log), Logger()):
+        assert not create(*arguments, logger, *[None] * n_callbacks)
+    said = f"fmi3Instantiate{kind} is not supported: there is no {kind} in modelDescription.xml"
+    assert heard == [(ERROR, said)]
 
 
 def test_no_instance_is_refused_without_harm(fmu: Library3) -> None:

@@ -35,7 +35,7 @@ MEMORY_MAX = 300e6  # bytes, for a state of a few kilobytes
 TIME_MAX = 20.0  # s
 
 
-def sampled(look_ahead: LookAhead | LookAhead, count: int) -> None:
+def sampled(look_ahead: LookAhead, count: int) -> None:
     for k in range(count):
         look_ahead.sample(1e-3 * np.sin(0.1 * k), 1e-3 * np.sin(0.1 * k - 0.3) + 1e-9 * (k % 3))
 
@@ -58,7 +58,7 @@ def use_predictor(predictor: HybridPredictor) -> None:
     predictor.to_bytes()
 
 
-def use_look_ahead(look_ahead: LookAhead | LookAhead) -> None:
+def use_look_ahead(look_ahead: LookAhead) -> None:
     for _ in range(2):
         sampled(look_ahead, 12)
         names = ("x_d", "x_pb", "x_h", "x_h_std", "rms_pb", "rms_h", "rms_hold")

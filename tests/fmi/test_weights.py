@@ -19,7 +19,7 @@ import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
 from properties import share
-from spoiled_weights import sealed
+from spoiled_weights import sealed, spoiled
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
@@ -245,6 +245,23 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     model.initialise()
     restore_weights(predictor, content)
     assert weights_file(predictor) == content
+
+
+def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
+    content = weights_file(trained_with_trust())
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
+    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
+    from_file, in_memory = CModel("predictor", TRUST, tmp_path), CModel("predictor", TRUST)
+    damaged, other = spoiled(content)
+    for name, changed in (damaged | other).items():
+        with pytest.raises(StateError):
+            restore_weights(predictor, changed)
+        (tmp_path / WEIGHTS_FILE).write_bytes(changed)
+        in_memory.context.weights, in_memory.context.weights_size = changed, len(changed)
+        said = refusal(from_file.initialise)
+        assert "it is damaged or truncated" in said if name in damaged else "weights.bin" in said, name
+        assert said == refusal(in_memory.initialise), name
+    assert predictor.regression.n_rows == 0.0
 
 
 def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
