@@ -35,8 +35,8 @@ WINDOWS = 60
 LIMITS = {
     "predictor, cold": 0.7e6,
     "predictor, warm": 0.95e6,
-    "compensator, cold": 4.7e6,
-    "compensator, warm": 5.7e6,
+    "compensator, cold": 3.8e6,
+    "compensator, warm": 4.1e6,
 }
 """Instructions of the dearest sample."""
 

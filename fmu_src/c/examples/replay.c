@@ -72,7 +72,7 @@ static int read_line(FILE *file, char line[LINE_SIZE])
 static double *read_log(const char *path, size_t *n)
 {
     char line[LINE_SIZE];
-    column x_d, x;
+    column x_d = {0}, x = {0};
     double *log = NULL;
     size_t room = 0;
     FILE *file = fopen(path, "r");

@@ -114,26 +114,28 @@ static void compensator_publish(hsep_compensator *self, hsep_word last)
     hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
-/* Do parts of a plan with trust, as much work as is due; return whether it is made. */
-static int compensator_advance(hsep_compensator *self, hsep_word due)
+/* Do parts of a plan with trust, an equal share of what may be left for the samples before it is due,
+ * at least one of them; return whether it is made. */
+static int compensator_advance(hsep_compensator *self, hsep_word samples)
 {
     hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
     const hsep_trusted_task task = compensator_task(self);
-    hsep_word next = hsep_trusted_planner_next(trusted), done = 0;
-    while (next > 0 && next <= due - done) {
+    const hsep_real due = samples > 1 ? hsep_trusted_planner_left(trusted, &task) / (hsep_real)samples : INFINITY;
+    hsep_real next = hsep_trusted_planner_next(trusted, &task), done = 0.0;
+    while (next > 0.0 && (done + next <= due || done == 0.0)) {
         hsep_trusted_planner_advance(trusted, &task);
         done += next;
-        next = hsep_trusted_planner_next(trusted);
+        next = hsep_trusted_planner_next(trusted, &task);
     }
-    return next == 0;
+    return !(next > 0.0);
 }
 
-/* Solver steps of a bounded plan; return whether it is solved. */
+/* Half steps of the solver of a bounded plan; return whether it is solved. */
 static int compensator_step(hsep_compensator *self, hsep_word due)
 {
     int done = 0;
     for (hsep_word step = 0; !done && step < due; step++) {
-        done = hsep_planner_step(hsep_compensator_planner(self));
+        done = hsep_planner_advance(hsep_compensator_planner(self));
     }
     return done;
 }
@@ -143,9 +145,9 @@ static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_word pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
-    const hsep_word work = self->trusted ? HSEP_TRUSTED_WORK : HSEP_INTERIOR_STEPS;
-    const hsep_word due = i < pinned ? (work + pinned - 1) / pinned : (hsep_word)-1;
-    if (self->trusted ? compensator_advance(self, due) : compensator_step(self, due)) {
+    const hsep_word left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
+    const hsep_word due = left > 0 ? 2 * ((HSEP_INTERIOR_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
+    if (self->trusted ? compensator_advance(self, left) : compensator_step(self, due)) {
         self->solving = 0;
         self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
         compensator_publish(self, predictor->Np);

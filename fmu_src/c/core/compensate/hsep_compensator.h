@@ -4,14 +4,14 @@
  * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs are those of k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
- * while the command follows the last plan. With trust every plan is: HSEP_PINNED_WITH_TRUST samples, in each of them
- * HSEP_TRUSTED_WORK / HSEP_PINNED_WITH_TRUST steps of the solver or as much of other work.
+ * while the command follows the last plan. With trust every plan is, over HSEP_PINNED_WITH_TRUST samples: each of them
+ * takes an equal share of the work that may be left, counted in multiply-adds (hsep_trusted_planner_left).
  *
  * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
  * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the
- * hybrid plan fails, and a copy of the dead time. While a plan is being solved that of hsep_interior_step, three times
+ * hybrid plan fails, and a copy of the dead time. While a plan is being solved that of hsep_interior_advance, six times
  * in each of the 8 samples that follow; where so many are not pinned (Np < 16, or spacing > 8) more often, or
- * HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
+ * 2 HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
  *
  * With trust and a late measurement the plan is as dear, and late^2 / 2 multiply-adds for each expert come on top in
  * two of the samples of a window: nothing to speak of up to 100 samples, 2 ms of a desktop's core for 1000.

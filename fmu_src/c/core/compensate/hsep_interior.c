@@ -46,6 +46,8 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_word preview, hsep_word
         side->inverse = interior_take(block, &end, rows);
         side->r_c = interior_take(block, &end, rows);
         side->r_p = interior_take(block, &end, rows);
+        side->ds = interior_take(block, &end, rows);
+        side->dz = interior_take(block, &end, rows);
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
     return end * sizeof(hsep_real);
@@ -61,7 +63,8 @@ HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max)
 {
     hsep_interior got;
     memcpy(&got, block, sizeof got);
-    return got.first <= first_max && got.steps <= got.tolerance.steps && got.tolerance.steps <= HSEP_INTERIOR_STEPS;
+    return got.first <= first_max && got.steps <= got.tolerance.steps && got.begun <= 1 &&
+           got.tolerance.steps <= HSEP_INTERIOR_STEPS;
 }
 
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
@@ -110,7 +113,7 @@ HSEP_API void hsep_interior_begin(
 {
     self->tolerance = *tolerance;
     self->first = first;
-    self->steps = 0;
+    self->steps = self->begun = 0;
     self->sides = 0.0;
     interior_arrays a = interior_open(self, splines);
     a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
@@ -162,32 +165,42 @@ static void interior_direction(const interior_arrays *a, const hsep_splines *spl
     hsep_splines_rows(splines, a->dx, first, a->slacks.Adx);
 }
 
-HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
+/* Begin a step: residuals, and the factor of P + A' W A; return whether there is none, as the plan is solved. */
+static int interior_factor(
+    hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
 {
-    const interior_arrays a = interior_open(self, splines);
     hsep_real r_p;
     P = interior_free_rows(self, splines, P);
-    hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
-    const hsep_real mu = hsep_slacks_residuals(&a.slacks, &r_p);
-    const hsep_real r_d = interior_dual_residual(&a, splines, self->first, P);
+    hsep_splines_rows(splines, a->x, self->first, a->slacks.Ax);
+    const hsep_real mu = hsep_slacks_residuals(&a->slacks, &r_p);
+    const hsep_real r_d = interior_dual_residual(a, splines, self->first, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
         (mu < self->tolerance.mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < self->tolerance.dual_residual)) {
         return 1;
     }
     self->steps++;
-    memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(hsep_real));
-    hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor, a.slacks.work);
-    if (!hsep_cholesky_factor(a.factor, a.n, NULL)) {
-        return 1;
+    self->mu = mu;
+    memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
+    hsep_splines_gram(splines, a->slacks.Adx, self->first, a->factor, a->slacks.work);
+    return !hsep_cholesky_factor(a->factor, a->n, NULL);
+}
+
+HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
+{
+    const interior_arrays a = interior_open(self, splines);
+    if (!self->begun) {
+        self->begun = !interior_factor(self, &a, splines, P);
+        return !self->begun;
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    const hsep_real ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
+    const hsep_real mu = self->mu, ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
     hsep_slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
     interior_direction(&a, splines, self->first);
     const hsep_real alpha = hsep_slacks_move(&a.slacks);
     for (hsep_word j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];
     }
+    self->begun = 0;
     return 0;
 }

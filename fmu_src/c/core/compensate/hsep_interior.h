@@ -1,4 +1,5 @@
-/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), one step a call:
+/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), half a step a
+ * call:
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
  * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
@@ -25,14 +26,16 @@ typedef struct {
 typedef struct {
     hsep_tolerance tolerance;
     hsep_word first; /* the splines before it are fixed; x is (n - first,) */
-    hsep_word steps; /* done for this plan */
+    hsep_word steps; /* begun for this plan */
+    hsep_word begun; /* whether one is: its factor is there */
+    hsep_real mu;    /* m2, of its beginning */
     hsep_real cost;  /* m2, scale of the cost per bound */
     hsep_real sides; /* number of bounds, low and high ones */
     hsep_real rho;   /* 1/m2, proximal regularisation of the multipliers */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 8);
+HSEP_ASSERT_WORDS(hsep_interior, 10);
 
 HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n); /* bytes of the block, counted as a number */
 
@@ -55,9 +58,9 @@ HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
-/* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
- * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
- * plan beside it. */
-HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
+/* Do half a step, its factor or what follows from it; P as in hsep_interior_begin. Returns whether the plan is solved.
+ * Cost: n^3 / 6 multiply-adds for the factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
+ * plan beside both. */
+HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif

@@ -4,9 +4,16 @@
 
 #include <string.h>
 
-#define LINEARISED_CHANGES 3                      /* signals of a change: v_d, x, v */
-#define LINEARISED_DIFFERENCES 8                  /* most orders of differences of x_pb, it among them */
-#define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of an expert: of the disturbances, of their differences */
+#define LINEARISED_DIFFERENCES 8 /* most orders of differences of x_pb, it among them */
+#define LINEARISED_GAINS 5       /* of an expert: of v_d now and before, of x now and the two samples before */
+#define LINEARISED_BEFORE 2      /* samples at rest before a change */
+#define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
+
+/* Whole parts of a recursion, in samples. */
+static hsep_word linearised_padded(hsep_word count)
+{
+    return (count + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER * LINEARISED_TOGETHER;
+}
 
 static const hsep_word linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
 
@@ -24,24 +31,27 @@ static hsep_real linearised_weight(const hsep_trusted *model, hsep_word expert, 
 static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)parameters->settings->measurement_delay;
+    const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings->p;
     const hsep_real filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->n;
     self->preview = self->n - parameters->settings->measurement_delay;
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
-    self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
+    self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_LINEARISED_EXPERTS);
     self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
     self->kept = hsep_take(&end, n * LINEARISED_OF_COMMAND);
-    self->change = hsep_take(&end, preview * LINEARISED_CHANGES);
+    self->velocity = hsep_take(&end, preview + LINEARISED_BEFORE);
+    self->position = hsep_take(&end, preview + LINEARISED_BEFORE);
     self->base = hsep_take(&end, preview);
     self->of_command = hsep_take(&end, preview * LINEARISED_OF_COMMAND);
-    self->passed = hsep_take(&end, preview * HSEP_LINEARISED_EXPERTS);
-    self->run = hsep_take(&end, preview);
-    self->disturbance = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
-    self->drive = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
+    self->passed = hsep_take(&end, padded * HSEP_LINEARISED_EXPERTS);
+    self->run = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
+    self->lags = hsep_take(&end, HSEP_LANES_MOST * (lags + (LINEARISED_TOGETHER - 1)));
+    self->disturbance = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
+    self->drive = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
     self->physics = hsep_take_block(&end, filter);
-    self->filters = hsep_take_block(&end, HSEP_LINEARISED_EXPERTS * filter);
+    self->filters = hsep_take_block(&end, HSEP_PHYSICS_ABREAST * filter);
     return end * sizeof(hsep_real);
 }
 
@@ -53,7 +63,7 @@ HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *paramete
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* gains of no expert are 0 */
+    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* before a change there is rest */
     (void)linearised_lay_out(self, parameters);
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
@@ -74,14 +84,17 @@ static hsep_word linearised_first(const hsep_linearised *self, const hsep_truste
     return model->n_static - 2 * self->count;
 }
 
-/* What the slopes give of a change, by the weights of an expert. gain: its first one of those abreast. */
-static void linearised_gains(const hsep_linearised *self, const hsep_real weights[], hsep_real *gain)
+/* Gains of an expert, (n,) each: what friction, position and damping give of a change of v_d, x and v, and what the
+ * differences of these give, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
+static void linearised_gains(const hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[])
 {
     const hsep_real *slopes = hsep_at_const(self, self->slopes);
     const hsep_word n = self->n;
+    hsep_real *now = gains, *before = gains + n, *x_now = gains + 2 * n, *x_before = gains + 3 * n;
+    hsep_real *x_earlier = gains + 4 * n, last[3] = {0.0}; /* of the differences, at the sample before */
     for (hsep_word k = 0; k < n; k++, slopes += self->count) {
-        for (hsep_word part = 0; part < 2; part++, gain += LINEARISED_CHANGES * HSEP_PHYSICS_ABREAST) {
-            /* the disturbances, their differences */
+        hsep_real given[2][3];
+        for (hsep_word part = 0; part < 2; part++) {
             const hsep_real *w = weights + part * self->count;
             hsep_real friction = 0.0;
             hsep_real of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
@@ -91,10 +104,17 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
             for (hsep_word i = HSEP_DISTURBANCES_N_LASTING; i < self->count; i++) {
                 of_position += w[i] * slopes[i];
             }
-            gain[0] = friction;
-            gain[HSEP_PHYSICS_ABREAST] = of_position;
-            gain[2 * HSEP_PHYSICS_ABREAST] = w[HSEP_DISTURBANCES_DAMPING] * slopes[HSEP_DISTURBANCES_DAMPING];
+            given[part][0] = friction;
+            given[part][1] = of_position;
+            given[part][2] = w[HSEP_DISTURBANCES_DAMPING] * slopes[HSEP_DISTURBANCES_DAMPING] / T_s;
         }
+        /* g_d v_d + g_x x + g_v v + h_d v_d + h_x x + h_v v - (the last three, a sample before), v = (x - x-) / T_s */
+        now[k] = given[0][0] + given[1][0];
+        before[k] = -last[0];
+        x_now[k] = (given[0][1] + given[1][1]) + (given[0][2] + given[1][2]);
+        x_before[k] = -(given[0][2] + given[1][2]) - (last[1] + last[2]);
+        x_earlier[k] = last[2];
+        memcpy(last, given[1], sizeof last);
     }
 }
 
@@ -121,17 +141,18 @@ static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_wor
     return u >= dead_time && u - dead_time < change->n ? change->commands[u - dead_time] : 0.0;
 }
 
-/* A change as v_d, x and v. */
+/* A change as v_d and x. */
 static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, hsep_real T_s)
 {
-    hsep_real *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
-    for (hsep_word u = 0; u < self->preview; u++, signals += LINEARISED_CHANGES) {
+    hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE, last = 0.0;
+    for (hsep_word u = 0; u < self->preview; u++) {
         const hsep_real now = u < change->n ? change->commands[u] : 0.0;
-        signals[0] = (now - last_command) / T_s;
-        signals[1] = change->passed[u];
-        signals[2] = (change->passed[u] - last_passed) / T_s;
-        last_command = now, last_passed = change->passed[u];
+        velocity[u] = (now - last) / T_s;
+        last = now;
     }
+    memcpy(
+        hsep_at(self, self->position) + LINEARISED_BEFORE, change->passed, (size_t)self->preview * sizeof(hsep_real));
+    self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
 }
 
 /* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
@@ -204,79 +225,147 @@ HSEP_API void hsep_linearised_at(
         }
         const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS);
         linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
-        linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
+        linearised_gains(
+            self, weights + first, hsep_trusted_disturbances(model)->T_s,
+            hsep_at(self, self->gains) + i * LINEARISED_GAINS * n);
         linearised_pass(
-            weights + 1, first - 1, change->passed, self->preview, hsep_at(self, self->passed) + i * self->preview);
+            weights + 1, first - 1, change->passed, self->preview,
+            hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
     }
 }
 
-/* The disturbances that a change makes of each expert, in the last count samples. */
-static void linearised_disturbance(hsep_linearised *self, hsep_word count)
+/* The disturbances that a change makes of expert i where it begins at sample first, as column c of those abreast. */
+static void linearised_disturbance(hsep_linearised *self, hsep_word i, hsep_word first, hsep_word c)
 {
-    const hsep_word stride = LINEARISED_GAINS * HSEP_PHYSICS_ABREAST;
-    const hsep_real *gain = hsep_at(self, self->gains) + (self->n - count) * stride;
-    const hsep_real *change = hsep_at(self, self->change);
-    hsep_real *disturbance = hsep_at(self, self->disturbance), last[HSEP_PHYSICS_ABREAST] = {0.0};
-    for (hsep_word u = 0; u < count; u++, gain += stride, change += LINEARISED_CHANGES) {
-        const hsep_real *of_difference = gain + stride / 2, v_d = change[0], x = change[1], v = change[2];
-        for (hsep_word i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-            const hsep_real difference = of_difference[i] * v_d + of_difference[HSEP_PHYSICS_ABREAST + i] * x +
-                                         of_difference[2 * HSEP_PHYSICS_ABREAST + i] * v;
-            *disturbance++ =
-                (gain[i] * v_d + gain[HSEP_PHYSICS_ABREAST + i] * x + gain[2 * HSEP_PHYSICS_ABREAST + i] * v) +
-                (difference - last[i]);
-            last[i] = difference;
+    const hsep_word n = self->n, count = self->preview - first, moves = self->moves < count ? self->moves : count;
+    const hsep_real *gains = hsep_at(self, self->gains) + i * LINEARISED_GAINS * n + (n - count);
+    const hsep_real *x = hsep_at(self, self->position) + LINEARISED_BEFORE;
+    const hsep_real *v_d = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
+    const hsep_real *g0 = gains + 2 * n, *g1 = gains + 3 * n, *g2 = gains + 4 * n;
+    hsep_real *to = hsep_at(self, self->disturbance) + c;
+    hsep_word u = 0;
+    for (; u + HSEP_LANES <= count; u += HSEP_LANES) {
+        hsep_lanes_spread(
+            to + HSEP_PHYSICS_ABREAST * u, HSEP_PHYSICS_ABREAST,
+            *hsep_lanes_const(g0 + u) * *hsep_lanes_const(x + u) +
+                *hsep_lanes_const(g1 + u) * *hsep_lanes_const(x + u - 1) +
+                *hsep_lanes_const(g2 + u) * *hsep_lanes_const(x + u - 2));
+    }
+    for (; u < count; u++) {
+        to[HSEP_PHYSICS_ABREAST * u] = g0[u] * x[u] + g1[u] * x[u - 1] + g2[u] * x[u - 2];
+    }
+    for (u = 0; u < moves; u++) {
+        to[HSEP_PHYSICS_ABREAST * u] += gains[u] * v_d[u] + gains[n + u] * v_d[u - 1];
+    }
+}
+
+/* The disturbances of columns abreast behind G_pb, from rest. */
+static void linearised_filter(hsep_linearised *self, hsep_word count)
+{
+    const hsep_word words = self->filters - self->physics;
+    hsep_physics *filters[HSEP_PHYSICS_ABREAST];
+    for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
+        hsep_real *filter = hsep_at(self, self->filters + c * words);
+        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
+        filters[c] = (hsep_physics *)filter;
+    }
+    hsep_physics_abreast(
+        filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
+}
+
+/* The weights of the lags of an expert, each of them as often as a vector has lanes, and zeros behind them. */
+static void linearised_take_lags(hsep_linearised *self, const hsep_expert *expert)
+{
+    const hsep_real *weights = hsep_at_const(expert, expert->weights) + expert->n_static;
+    hsep_real *lags = hsep_at(self, self->lags);
+    for (hsep_word i = 0; i < expert->p + LINEARISED_TOGETHER - 1; i++) {
+        for (int l = 0; l < HSEP_LANES; l++) {
+            *lags++ = i < expert->p ? weights[i] : 0.0;
         }
     }
 }
 
-/* These behind G_pb, from rest. */
-static void linearised_filter(hsep_linearised *self, hsep_word count)
-{
-    const hsep_word words = self->filters - self->physics;
-    hsep_physics *filters[HSEP_LINEARISED_EXPERTS];
-    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        hsep_real *filter = hsep_at(self, self->filters + i * words);
-        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
-        filters[i] = (hsep_physics *)filter;
-    }
-    hsep_physics_abreast(
-        filters, HSEP_LINEARISED_EXPERTS, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
-}
-
-/* Run of the recursion of expert i from rest, driven by the filtered disturbance and what the features of x_pb give,
- * and its part of the change of x_h. */
+/* The recursion of an expert with p lags from rest for columns abreast, e(u) := drive(u) + own(u) + sum_i w_i e(u - i),
+ * some samples together: what was before them is loaded once for all. e, drive: (count, HSEP_PHYSICS_ABREAST); own:
+ * (count,), what the features of x_pb give. */
 static void linearised_run(
-    hsep_linearised *self, const hsep_expert *expert, hsep_word i, hsep_word count, hsep_real column[])
+    const hsep_real lags[], hsep_word p, const hsep_real drive[], const hsep_real own[], hsep_real e[], hsep_word count)
 {
-    const hsep_real *lag_weights = hsep_at_const(expert, expert->weights) + expert->n_static;
-    const hsep_real *own = hsep_at(self, self->passed) + i * self->preview, *drive = hsep_at(self, self->drive) + i;
-    const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
-    hsep_real *run = hsep_at(self, self->run);
-    for (hsep_word u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
-        hsep_real *e = run + (count - 1 - u);
-        *e = hsep_recur(*drive + own[u], lag_weights, e + 1, u < expert->p ? u : expert->p);
-        column[u] += shrink[u] * *e;
+    const hsep_lanes *w = hsep_lanes_const(lags);
+    for (hsep_word u = 0; u < count; u += LINEARISED_TOGETHER) {
+        const hsep_lanes *from = hsep_lanes_const(drive + HSEP_PHYSICS_ABREAST * u);
+        const hsep_word before = u < p ? u : p;
+        hsep_lanes *now = hsep_lanes_at(e + HSEP_PHYSICS_ABREAST * u), sums[LINEARISED_TOGETHER][HSEP_OF_FOUR];
+        for (int s = 0; s < LINEARISED_TOGETHER; s++) {
+            for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                sums[s][l] = from[s * HSEP_OF_FOUR + l] + own[u + (hsep_word)s];
+            }
+        }
+        for (hsep_word i = 0; i < before; i++) {
+            const hsep_lanes *past = now - HSEP_OF_FOUR * (i + 1);
+            for (int s = 0; s < LINEARISED_TOGETHER; s++) {
+                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                    sums[s][l] += w[i + (hsep_word)s] * past[l];
+                }
+            }
+        }
+        for (int s = 0; s < LINEARISED_TOGETHER; s++) { /* what they give each other */
+            for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                for (int i = s; i > 0; i--) {
+                    sums[s][l] += w[i - 1] * sums[s - i][l];
+                }
+                now[s * HSEP_OF_FOUR + l] = sums[s][l];
+            }
+        }
     }
 }
 
-HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_real column[])
+/* What of a change does not pass through the disturbances, where it begins at sample first. */
+static void linearised_begin_column(
+    const hsep_linearised *self, const hsep_trusted *model, hsep_word first, hsep_real column[])
 {
     const hsep_word count = self->preview - first;
-    const hsep_real *of_command = hsep_at(self, self->of_command),
-                    *kept = hsep_at(self, self->kept) + (self->n - count);
-    memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(hsep_real));
+    const hsep_real *of_command = hsep_at_const(self, self->of_command);
+    const hsep_real *kept = hsep_at_const(self, self->kept) + (self->n - count);
+    memcpy(column, hsep_at_const(self, self->base), (size_t)count * sizeof(hsep_real));
     for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
         const int counts = linearised_weight(model, linearised_of_command[i], HSEP_OF_COMMAND) > 0.0;
         for (hsep_word u = 0; counts && u < count; u++) {
             column[u] += kept[u] * of_command[u];
         }
     }
-    linearised_disturbance(self, count);
-    linearised_filter(self, count);
+}
+
+HSEP_API void hsep_linearised_columns(
+    hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_real *const columns[HSEP_PHYSICS_ABREAST])
+{
+    const hsep_word padded = linearised_padded(self->preview - first);
+    hsep_real *run = hsep_at(self, self->run);
+    for (hsep_word c = 0; c < count; c++) {
+        linearised_begin_column(self, model, first + c * spacing, columns[c]);
+    }
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS) > 0.0) {
-            linearised_run(self, hsep_trusted_expert(model, linearised_experts[i]), i, count, column);
+        const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
+        if (!(linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS) > 0.0)) {
+            continue;
+        }
+        const hsep_word words = HSEP_PHYSICS_ABREAST * padded; /* columns that are shorter, or none, end with zeros */
+        memset(hsep_at(self, self->disturbance), 0, (size_t)words * sizeof(hsep_real));
+        for (hsep_word c = 0; c < count; c++) {
+            linearised_disturbance(self, i, first + c * spacing, c);
+        }
+        linearised_filter(self, padded);
+        linearised_take_lags(self, expert);
+        linearised_run(
+            hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),
+            hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1), run, padded);
+        for (hsep_word c = 0; c < count; c++) {
+            const hsep_word length = self->preview - first - c * spacing;
+            const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
+            for (hsep_word u = 0; u < length; u++) {
+                columns[c][u] += shrink[u] * run[HSEP_PHYSICS_ABREAST * u + c];
+            }
         }
     }
 }

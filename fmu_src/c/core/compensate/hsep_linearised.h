@@ -24,25 +24,28 @@ typedef struct {
     hsep_word n;       /* samples of a prediction, */
     hsep_word preview; /* and its last ones, which a change may reach: all but what is late */
     hsep_word count;   /* disturbances */
-    /* Offsets in words from the beginning of the struct; oldest first, if not said; of experts: those of the physics
-     * model's residual, behind each other, of experts abreast: HSEP_PHYSICS_ABREAST numbers a sample */
+    hsep_word moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
+    /* Offsets in words from the beginning of the struct; oldest first; of experts: those of the physics model's
+     * residual, behind each other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
     hsep_word slopes;      /* (n, count) slopes of the disturbances, sample after sample */
-    hsep_word gains;       /* (n, 6) of experts abreast: what friction, position and damping give of changes of v_d, x
-                           * and v, the disturbances themselves and then their differences */
+    hsep_word gains;       /* (5, n) of experts: what disturbances and their differences give of v_d now and a sample
+                           * before, of x now and in the two samples before */
     hsep_word shrink;      /* (n,) of experts: part of each one in the stack, */
     hsep_word kept;        /* (2, n) and of those of the command */
-    hsep_word change;      /* (preview, 3) of a change: v_d, x and v, the latter two behind G_pb */
+    hsep_word velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
+    hsep_word position;    /* (2 + preview,) and it behind G_pb */
     hsep_word base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
     hsep_word of_command;  /* (2, preview) and what the experts of the command make of it */
-    hsep_word passed;      /* (preview,) of experts: what the features of x_pb give of it */
-    hsep_word run;         /* (preview,) work of a recursion, newest first */
-    hsep_word disturbance; /* (preview,) of experts abreast: disturbances that a change makes, */
+    hsep_word passed;      /* (preview + 3,) of experts: what the features of x_pb give of it */
+    hsep_word run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
+    hsep_word lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
+    hsep_word disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
     hsep_word drive;       /* and these behind G_pb */
     hsep_word physics;     /* G_pb at rest, */
-    hsep_word filters;     /* and of each expert */
+    hsep_word filters;     /* and of each column */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 16);
+HSEP_ASSERT_WORDS(hsep_linearised, 19);
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters);
@@ -67,8 +70,12 @@ HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
     const hsep_linearised_change *change, hsep_real reach);
 
-/* Change of x_h, (preview - first,), m, by that change of the commands where it begins at sample first of the preview.
- * Cost: for each expert of the physics model's residual 8 n_modes + p + 10 multiply-adds a sample. */
-HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_real column[]);
+/* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,).
+ * Cost: for each expert of the physics model's residual HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a
+ * sample. */
+HSEP_API void hsep_linearised_columns(
+    hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_real *const columns[HSEP_PHYSICS_ABREAST]);
 
 #endif

@@ -11,14 +11,20 @@ static const hsep_real planner_ridge = 1e-12; /* on the diagonal, relative to it
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
+HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
+{
+    const hsep_word half = parameters->Np / 2;
+    return (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
+}
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
 {
     const hsep_real preview = (hsep_real)parameters->preview;
-    const hsep_word n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
+    const hsep_word n = hsep_splines_count(parameters->preview, parameters->spacing);
     hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
-    self->n_pinned = (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
+    self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
     self->c = hsep_take(&end, HSEP_DECIDED + (hsep_real)n);
@@ -73,14 +79,14 @@ HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k)
     return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
 }
 
-/* The third differences of what is decided of delta. */
-static void planner_third(hsep_planner *self)
+/* The third differences of the first count splines of delta. */
+static void planner_third(hsep_planner *self, hsep_word count)
 {
     hsep_real *third = hsep_at(self, self->third);
     const hsep_word preview = hsep_planner_splines(self)->preview;
     hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
     for (hsep_word k = 0; k < preview; k++) {
-        d[3] = hsep_planner_decided(self, k);
+        d[3] = hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), count, k);
         third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
         d[0] = d[1], d[1] = d[2], d[2] = d[3];
     }
@@ -90,7 +96,10 @@ HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_
 
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
 
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_word first)
+{
+    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
+}
 
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 {
@@ -99,7 +108,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
-    planner_third(self);
+    planner_third(self, HSEP_DECIDED);
     hsep_constraints_total(self, x_d);
 }
 
@@ -108,10 +117,12 @@ HSEP_API void hsep_planner_let_turn(hsep_planner *self)
     memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_planner_regularise(hsep_planner *self)
+HSEP_API void hsep_planner_decide_pinned(hsep_planner *self) { planner_third(self, HSEP_DECIDED + self->n_pinned); }
+
+HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first)
 {
-    const hsep_word n = hsep_planner_splines(self)->n;
-    hsep_real *P = hsep_at(self, self->P);
+    const hsep_word n = hsep_planner_splines(self)->n - first;
+    hsep_real *P = hsep_planner_quadratic(self, first);
     hsep_real largest = 0.0;
     hsep_word place = 0;
     for (hsep_word i = 0; i < n; i++) {
@@ -130,24 +141,18 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *P = hsep_at(self, self->P);
     hsep_splines_filtered_gram(splines, filtered, P);
-    hsep_splines_difference_gram(splines, 3, self->jerk_weight, P);
-    hsep_planner_regularise(self);
+    hsep_splines_difference_gram(splines, 3, self->jerk_weight, splines->n, P);
+    hsep_planner_regularise(self, 0);
     hsep_splines_project(
         splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), hsep_planner_linear(self));
 }
 
-/* The rows of P from a spline on. */
-static hsep_real *planner_rows(hsep_planner *self, hsep_word first)
-{
-    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
-}
-
-/* v := v_2 - P_21 pinned: the linear term of the splines that are not pinned. */
-static void planner_pin(hsep_planner *self)
+HSEP_API void hsep_planner_pin(hsep_planner *self)
 {
     const hsep_word n = hsep_planner_splines(self)->n, first = self->n_pinned;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
     hsep_real *v = hsep_planner_linear(self);
+    /* v := v_2 - P_21 pinned */
     for (hsep_word i = 0; i < first; i++) {
         for (hsep_word j = first; j < n; j++) {
             v[j] -= P[j - i] * rest[i];
@@ -185,13 +190,10 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_word first = pinned ? self->n_pinned : 0, n = splines->n - first;
     hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + first, *factor = hsep_at(self, self->factor);
-    const hsep_real *row = planner_rows(self, first);
+    const hsep_real *row = hsep_planner_quadratic(self, first);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
 
-    if (pinned) {
-        planner_pin(self);
-    }
     memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
     if (!hsep_cholesky_factor(factor, n, NULL)) {
         return HSEP_PLAN_FAILED;
@@ -223,7 +225,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
         row += n - i;
     }
     if (!pinned) {
-        planner_pin(self);
+        hsep_planner_pin(self);
     }
     planner_bound(self, cost, tolerance);
     return HSEP_PLAN_BOUNDED;
@@ -234,11 +236,16 @@ HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self)
     return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
 }
 
-HSEP_API int hsep_planner_step(hsep_planner *self)
+HSEP_API int hsep_planner_within_step(const hsep_planner *self)
+{
+    return ((const hsep_interior *)hsep_at_const(self, self->interior))->begun != 0;
+}
+
+HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
-    if (!hsep_interior_step(interior, splines, hsep_at(self, self->P))) {
+    if (!hsep_interior_advance(interior, splines, hsep_at(self, self->P))) {
         return 0;
     }
     const hsep_problem problem = hsep_interior_problem(interior, splines);

@@ -35,7 +35,7 @@ typedef struct {
 typedef enum {
     HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
     HSEP_PLAN_DONE,
-    HSEP_PLAN_BOUNDED /* hsep_planner_step is to be called until it returns 1 */
+    HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns 1 */
 } hsep_plan_status;
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
@@ -43,6 +43,9 @@ HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
+
+/* Splines that a bounded plan leaves as they are. */
+HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
@@ -62,30 +65,39 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 /* Let plans of this window turn where no_reversal forbids it: their model follows the friction. */
 HSEP_API void hsep_planner_let_turn(hsep_planner *self);
 
+/* Count the pinned splines to what is decided, in hsep_planner_third. */
+HSEP_API void hsep_planner_decide_pinned(hsep_planner *self);
+
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
  * (preview,); target: x_d minus the model's response to x_d with what is decided of delta, m, (preview,). Cost:
  * n preview multiply-adds. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
-/* The cost 1/2 c' P c - v' c to be set otherwise: the triangle P of n rows, and v, (n,), m; hsep_planner_regularise
- * makes P definite. The third differences of what is decided, (preview,), m. */
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self);
+/* Make that cost one of the splines that are not pinned. */
+HSEP_API void hsep_planner_pin(hsep_planner *self);
+
+/* The cost 1/2 c' P c - v' c of the splines first ... n - 1, to be set otherwise: the triangle P of n - first rows, and
+ * v, (n - first,), m; hsep_planner_regularise makes P definite. The third differences of what is decided, (preview,),
+ * m. */
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_word first);
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
-HSEP_API void hsep_planner_regularise(hsep_planner *self);
+HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first);
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 
 /* Coefficients of the plan, (3 + n,), m; before one is made those of the rest of the last one. */
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
 
 /* Plan at this cost, which is used up. pinned: whether the first samples, hsep_planner_pinned, stay as they are in any
- * case; else in a bounded plan only, which is solved within the tolerance. Cost: n^3 / 6 multiply-adds. */
+ * case, and the cost is that of the others; else in a bounded plan only, which is solved within the tolerance. Cost:
+ * n^3 / 6 multiply-adds. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
-/* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
-HSEP_API int hsep_planner_step(hsep_planner *self);
+/* Do half a step of a bounded plan; return whether it is made. Cost: that of hsep_interior_advance. */
+HSEP_API int hsep_planner_advance(hsep_planner *self);
 
-/* Steps that the last bounded plan took. */
+/* Steps that the last bounded plan took so far; whether half of the last one is to be done. */
 HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self);
+HSEP_API int hsep_planner_within_step(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);

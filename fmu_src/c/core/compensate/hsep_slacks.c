@@ -90,7 +90,8 @@ HSEP_API void hsep_slacks_push(const hsep_slacks *self)
     }
 }
 
-/* Lengths of a step to where all values + length change stay >= 0: the largest -change / value is its inverse. */
+/* Steps ds and dz, and their lengths to where all values + length change stay >= 0: the largest -change / value is its
+ * inverse. */
 static hsep_lengths slacks_lengths(const hsep_slacks *self)
 {
     slacks_values primal, dual;
@@ -105,6 +106,8 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
                     const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
                     hsep_lanes ds, dz;
                     slacks_steps(self, i, at, &ds, &dz);
+                    *hsep_lanes_at(side->ds + at) = ds;
+                    *hsep_lanes_at(side->dz + at) = dz;
                     primal.of_four[l] = hsep_lanes_larger(-ds / *hsep_lanes_const(side->s + at), primal.of_four[l]);
                     dual.of_four[l] = hsep_lanes_larger(-dz / *hsep_lanes_const(side->z + at), dual.of_four[l]);
                 }
@@ -112,6 +115,8 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
             for (; r < self->range[order].end; r++) {
                 hsep_real ds, dz;
                 slacks_step(self, i, r, &ds, &dz);
+                side->ds[r] = ds;
+                side->dz[r] = dz;
                 primal.left = -ds / side->s[r] > primal.left ? -ds / side->s[r] : primal.left;
                 dual.left = -dz / side->z[r] > dual.left ? -dz / side->z[r] : dual.left;
             }
@@ -179,15 +184,13 @@ HSEP_API hsep_real hsep_slacks_predicted(const hsep_slacks *self)
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
                     const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
-                    hsep_lanes ds, dz;
-                    slacks_steps(self, i, at, &ds, &dz);
+                    const hsep_lanes ds = *hsep_lanes_const(side->ds + at), dz = *hsep_lanes_const(side->dz + at);
                     sum.of_four[l] += (*hsep_lanes_const(side->s + at) + alpha.primal * ds) *
                                       (*hsep_lanes_const(side->z + at) + alpha.dual * dz);
                 }
             }
             for (; r < self->range[order].end; r++) {
-                hsep_real ds, dz;
-                slacks_step(self, i, r, &ds, &dz);
+                const hsep_real ds = side->ds[r], dz = side->dz[r];
                 sum.left += (side->s[r] + alpha.primal * ds) * (side->z[r] + alpha.dual * dz);
             }
         }
@@ -202,15 +205,13 @@ HSEP_API void hsep_slacks_correct(const hsep_slacks *self, hsep_real sigma_mu)
             const hsep_side *side = &self->side[i];
             hsep_word r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
-                hsep_lanes ds, dz;
-                slacks_steps(self, i, r, &ds, &dz);
+                const hsep_lanes ds = *hsep_lanes_const(side->ds + r), dz = *hsep_lanes_const(side->dz + r);
                 *hsep_lanes_at(side->r_c + r) =
                     (sigma_mu - *hsep_lanes_const(side->s + r) * *hsep_lanes_const(side->z + r) - ds * dz) *
                     *hsep_lanes_const(side->inverse + r);
             }
             for (; r < self->range[order].end; r++) {
-                hsep_real ds, dz;
-                slacks_step(self, i, r, &ds, &dz);
+                const hsep_real ds = side->ds[r], dz = side->dz[r];
                 side->r_c[r] = (sigma_mu - side->s[r] * side->z[r] - ds * dz) * side->inverse[r];
             }
         }
@@ -227,8 +228,7 @@ HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self)
             const hsep_side *side = &self->side[i];
             hsep_word r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
-                hsep_lanes ds, dz;
-                slacks_steps(self, i, r, &ds, &dz);
+                const hsep_lanes ds = *hsep_lanes_const(side->ds + r), dz = *hsep_lanes_const(side->dz + r);
                 const hsep_lanes s = *hsep_lanes_const(side->s + r) + primal * ds;
                 const hsep_lanes z = *hsep_lanes_const(side->z + r) + dual * dz;
                 *hsep_lanes_at(side->s + r) = s;
@@ -236,8 +236,7 @@ HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self)
                 *hsep_lanes_at(side->inverse + r) = 1.0 / (s + self->rho * z);
             }
             for (; r < self->range[order].end; r++) {
-                hsep_real ds, dz;
-                slacks_step(self, i, r, &ds, &dz);
+                const hsep_real ds = side->ds[r], dz = side->dz[r];
                 side->s[r] += primal * ds;
                 side->z[r] += dual * dz;
                 side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);

@@ -18,6 +18,7 @@ typedef struct {
     hsep_real *inverse; /* 1 / (s + rho z) */
     hsep_real *r_c;     /* complementarity that a step aims at, times inverse */
     hsep_real *r_p;     /* primal residual B x - b - s */
+    hsep_real *ds, *dz; /* steps of s and z, once their lengths are known */
 } hsep_side;
 
 typedef struct {

@@ -294,30 +294,30 @@ static hsep_real splines_overlap(const hsep_splines *self, unsigned order, hsep_
     return sum;
 }
 
-/* Splines behind one that overlap it in the differences of an order, and it itself. */
-static hsep_word splines_neighbours(const hsep_splines *self, unsigned order)
+/* Splines behind one of n that overlap it in the differences of an order, and it itself. */
+static hsep_word splines_neighbours(const hsep_splines *self, unsigned order, hsep_word n)
 {
     const hsep_word count = (splines_length(self, order) - 2) / self->spacing + 1;
-    return count < self->n ? count : self->n;
+    return count < n ? count : n;
 }
 
 HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_real triangle[])
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[])
 {
-    for (hsep_word d = 0; d < splines_neighbours(self, order); d++) {
+    for (hsep_word d = 0; d < splines_neighbours(self, order, n); d++) {
         const hsep_real sum = splines_overlap(self, order, d);
-        for (hsep_word i = 0; i + d < self->n; i++) {
-            *splines_entry(triangle, self->n, i, i + d) += weight * sum;
+        for (hsep_word i = 0; i + d < n; i++) {
+            *splines_entry(triangle, n, i, i + d) += weight * sum;
         }
     }
 }
 
 HSEP_API void hsep_splines_difference_product(
-    const hsep_splines *self, unsigned order, hsep_real weight, const hsep_real c[], hsep_real y[])
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, const hsep_real c[], hsep_real y[])
 {
-    for (hsep_word d = 0; d < splines_neighbours(self, order); d++) {
+    for (hsep_word d = 0; d < splines_neighbours(self, order, n); d++) {
         const hsep_real sum = weight * splines_overlap(self, order, d);
-        for (hsep_word i = 0; i + d < self->n; i++) {
+        for (hsep_word i = 0; i + d < n; i++) {
             y[i] += sum * c[i + d];
             y[i + d] += d > 0 ? sum * c[i] : 0.0;
         }
@@ -325,17 +325,12 @@ HSEP_API void hsep_splines_difference_product(
 }
 
 HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_real v[])
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_word first, hsep_real v[])
 {
     const hsep_real *e = splines_differences(self, 3);
     const hsep_real unit = weight / self->share[3];
-    for (hsep_word j = 0; j < self->n; j++) {
-        const hsep_real *past = third + j * self->spacing;
-        hsep_real jerk = 0.0;
-        for (hsep_word k = 1; k < splines_length(self, 3); k++) {
-            jerk += e[k] * past[k];
-        }
-        v[j] -= unit * jerk;
+    for (hsep_word j = first; j < self->n; j++) {
+        v[j - first] -= unit * hsep_dot(e + 1, third + j * self->spacing + 1, splines_length(self, 3) - 1);
     }
 }
 
@@ -346,5 +341,5 @@ HSEP_API void hsep_splines_project(
     for (hsep_word j = 0; j < self->n; j++) {
         v[j] = hsep_dot(filtered, target + j * self->spacing, self->preview - j * self->spacing);
     }
-    hsep_splines_project_jerk(self, weight, third, v);
+    hsep_splines_project_jerk(self, weight, third, 0, v);
 }

@@ -70,22 +70,22 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
  * (preview,), by one spacing. Each diagonal is a running sum: cost n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
-/* The triangle of n rows += weight D' D with the differences D of an order of the splines, m. */
+/* The triangle of n rows += weight D' D with the differences D of an order of n splines behind each other, m. */
 HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_real triangle[]);
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[]);
 
 /* What weight D' D, of hsep_splines_difference_gram, makes of coefficients: y, (n,), += weight D' D c. */
 HSEP_API void hsep_splines_difference_product(
-    const hsep_splines *self, unsigned order, hsep_real weight, const hsep_real c[], hsep_real y[]);
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, const hsep_real c[], hsep_real y[]);
 
 /* v, (n,), := W' target - weight D' third with the third differences D, target and third (preview,). */
 HSEP_API void hsep_splines_project(
     const hsep_splines *self, const hsep_real filtered[], const hsep_real target[], hsep_real weight,
     const hsep_real third[], hsep_real v[]);
 
-/* v, (n,), -= weight D' third. */
+/* v, (n - first,), -= weight D' third, of the splines first ... n - 1. */
 HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_real v[]);
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_word first, hsep_real v[]);
 
 /* The spline itself, b, (4 spacing,). */
 HSEP_API const hsep_real *hsep_splines_shape(const hsep_splines *self);

@@ -92,6 +92,7 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
         trusted_planner_copy(self, hsep_at(self, self->best), rest);
         trusted_planner_copy(self, c, rest);
         hsep_planner_let_turn(task->planner);
+        hsep_planner_decide_pinned(task->planner);
     }
 }
 
@@ -106,6 +107,7 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
     }
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_aim(task->planner, task->spline, target);
+    hsep_planner_pin(task->planner);
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
     if (status == HSEP_PLAN_DONE) {
         trusted_planner_continue(self, task);
@@ -148,8 +150,7 @@ HSEP_API void hsep_trusted_planner_begin(
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_word all = self->preview + self->late, left = all - self->varied;
-    const hsep_word part = (all - 1) / HSEP_TRUSTED_VARIANCES + 1;
-    const hsep_word last = self->varied + (left < part ? left : part);
+    const hsep_word last = self->varied + (left < HSEP_TRUSTED_VARIED ? left : HSEP_TRUSTED_VARIED);
     hsep_trusted_vary(task->model, self->varied, last);
     self->varied = last;
     self->stage = last < all ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
@@ -171,7 +172,7 @@ static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
     }
     self->steps++;
-    self->columns = 0;
+    self->columns = self->n_pinned;
     self->tries = 0;
     self->stage = HSEP_TRUSTED_COLUMN;
 }
@@ -179,43 +180,58 @@ static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_
 /* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
 static hsep_real *trusted_planner_column_of(hsep_trusted_planner *self, hsep_word j, hsep_word spacing)
 {
-    return hsep_at(self, self->W) + (j * self->preview - spacing * (j * (j - 1) / 2));
+    const hsep_word first = self->n_pinned, i = j - first;
+    return hsep_at(self, self->W) + (i * (self->preview - spacing * first) - spacing * (i * (i - 1) / 2));
 }
 
-/* Changes of x_h by some of the splines, as much work as in each of the parts. */
+/* Changes of x_h by the next splines, as many as are computed side by side. */
 static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const hsep_word spacing = hsep_planner_splines(task->planner)->spacing, first = self->columns;
+    const hsep_word left = self->n - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
     const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED;
-    const hsep_word n = self->n, spacing = splines->spacing;
-    const hsep_word all = n * self->preview - spacing * (n * (n - 1) / 2);
-    hsep_real *target = hsep_at(self, self->target);
-    for (hsep_word done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
-        const hsep_word j = self->columns++, first = j * spacing, length = self->preview - first;
-        hsep_real *column = trusted_planner_column_of(self, j, spacing);
-        hsep_linearised_column((hsep_linearised *)hsep_at(self, self->linearised), task->model, first, column);
-        hsep_axpy(target + first, at[j], column, length);
-        done += length;
+    hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
+    for (hsep_word c = 0; c < count; c++) {
+        columns[c] = trusted_planner_column_of(self, first + c, spacing);
     }
-    self->stage = self->columns < n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
+    hsep_linearised_columns(
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, first * spacing, spacing, count, columns);
+    for (hsep_word j = first; j < first + count; j++) {
+        hsep_axpy(target + j * spacing, at[j], columns[j - first], self->preview - j * spacing);
+    }
+    self->columns += count;
+    self->stage = self->columns < self->n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
 }
 
-/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term. */
+/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term, of the splines that are not pinned:
+ * what the others do to x_h is in where it is linearised. */
 static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_word n = self->n, preview = self->preview, spacing = splines->spacing;
+    const hsep_word n = self->n, preview = self->preview, spacing = splines->spacing, first = self->n_pinned;
     hsep_real *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
-    for (hsep_word i = 0; i < n; i++) {
+    for (hsep_word i = first; i < n; i++) {
         const hsep_real *left = trusted_planner_column_of(self, i, spacing);
-        for (hsep_word j = i; j < n; j++) { /* column j begins (j - i) spacing later */
+        hsep_word j = i; /* column j begins (j - i) spacing later */
+        for (; j + 4 <= n; j += 4, P += 4) {
+            const hsep_real *rights[4]; /* from where the last of them begins */
+            for (hsep_word c = 0; c < 4; c++) {
+                rights[c] = trusted_planner_column_of(self, j + c, spacing) + (3 - c) * spacing;
+            }
+            hsep_dot_four(left + (j + 3 - i) * spacing, rights, preview - (j + 3) * spacing, P);
+            for (hsep_word c = 0; c < 3; c++) {
+                const hsep_word before = (3 - c) * spacing;
+                P[c] += hsep_dot(left + (j + c - i) * spacing, rights[c] - before, before);
+            }
+        }
+        for (; j < n; j++) {
             const hsep_real *right = trusted_planner_column_of(self, j, spacing);
             *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
         }
-        v[i] = hsep_dot(left, target + i * spacing, preview - i * spacing);
+        v[i - first] = hsep_dot(left, target + i * spacing, preview - i * spacing);
     }
-    hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, hsep_at(self, self->P));
-    hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), v);
+    hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, n - first, hsep_at(self, self->P));
+    hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), first, v);
     self->stage = HSEP_TRUSTED_TRY;
 }
 
@@ -223,13 +239,16 @@ static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trus
 static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED;
-    hsep_real *P = hsep_planner_quadratic(task->planner), *v = hsep_planner_linear(task->planner);
-    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(self->n) * sizeof(hsep_real));
-    memcpy(v, hsep_at(self, self->v), (size_t)self->n * sizeof(hsep_real));
-    hsep_splines_difference_gram(splines, 1, self->penalty, P);
-    hsep_splines_difference_product(splines, 1, self->penalty, at, v);
-    hsep_planner_regularise(task->planner);
+    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED + self->n_pinned;
+    const hsep_word free = self->n - self->n_pinned;
+    hsep_real *P = hsep_planner_quadratic(task->planner, self->n_pinned), *v = hsep_planner_linear(task->planner);
+    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(free) * sizeof(hsep_real));
+    memcpy(v, hsep_at(self, self->v), (size_t)free * sizeof(hsep_real));
+    if (self->penalty > 0.0) {
+        hsep_splines_difference_gram(splines, 1, self->penalty, free, P);
+        hsep_splines_difference_product(splines, 1, self->penalty, free, at, v);
+    }
+    hsep_planner_regularise(task->planner, self->n_pinned);
     self->tries++;
     self->tries_in_all++;
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
@@ -298,20 +317,6 @@ static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trust
         self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
 }
 
-HSEP_API hsep_word hsep_trusted_planner_next(const hsep_trusted_planner *self)
-{
-    switch ((hsep_trusted_stage)self->stage) {
-    case HSEP_TRUSTED_DONE:
-        return 0;
-    case HSEP_TRUSTED_BEGIN:
-    case HSEP_TRUSTED_PRODUCT:
-    case HSEP_TRUSTED_PREDICT: /* with its variance */
-        return 2;
-    default:
-        return 1;
-    }
-}
-
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner);
@@ -325,7 +330,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         trusted_planner_physics(self, task);
         break;
     case HSEP_TRUSTED_PHYSICS:
-        if (hsep_planner_step(task->planner)) {
+        if (hsep_planner_advance(task->planner)) {
             trusted_planner_continue(self, task);
         }
         break;
@@ -346,7 +351,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         trusted_planner_try(self, task);
         break;
     case HSEP_TRUSTED_BOUNDED:
-        if (hsep_planner_step(task->planner)) {
+        if (hsep_planner_advance(task->planner)) {
             self->solver_steps += hsep_planner_steps(task->planner);
             self->stage = HSEP_TRUSTED_JUDGE;
         }

@@ -7,7 +7,8 @@
  * which shows that the trusted model is wrong, the physics model plans the rest of the run.
  *
  * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
- * that is. All of it is at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * that is, hsep_trusted_planner_left how much all that is left may be, both counted in multiply-adds from the sizes, so
+ * that samples which share it have equal parts. Memory is one block, without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_TRUSTED_PLANNER_H
 #define HSEP_TRUSTED_PLANNER_H
@@ -20,19 +21,12 @@
 #include "hsep_real.h"
 #include "hsep_trusted.h"
 
-#define HSEP_TRUSTED_STEPS 4      /* Newton steps of a plan at most, */
-#define HSEP_TRUSTED_TRIES 6      /* tries of each, */
-#define HSEP_TRUSTED_TOGETHER 8   /* tries of all, */
-#define HSEP_TRUSTED_SOLVER 34    /* solver steps after which no bounded try is begun, */
-#define HSEP_TRUSTED_SOLVED 10    /* and those of one programme at most */
-#define HSEP_TRUSTED_COLUMNS 7    /* parts in which the changes of x_h by the splines are computed */
-#define HSEP_TRUSTED_VARIANCES 13 /* parts in which the variances over the preview are computed */
-
-/* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries
- * with their programmes, predictions; and 8 because a part is not divided between samples. */
-#define HSEP_TRUSTED_WORK \
-    ((2 + HSEP_TRUSTED_SOLVED) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
-     (HSEP_TRUSTED_SOLVER - 1 + HSEP_TRUSTED_SOLVED) + (HSEP_TRUSTED_VARIANCES + 1 + 1 + 2) + 8)
+#define HSEP_TRUSTED_STEPS 4    /* Newton steps of a plan at most, */
+#define HSEP_TRUSTED_TRIES 6    /* tries of each, */
+#define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
+#define HSEP_TRUSTED_SOLVER 34  /* solver steps after which no bounded try is begun, */
+#define HSEP_TRUSTED_SOLVED 10  /* and those of one programme at most */
+#define HSEP_TRUSTED_VARIED 8   /* samples whose variances are computed in a part */
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
@@ -53,12 +47,12 @@ typedef enum {
 typedef struct {
     hsep_word preview, p, Np;
     hsep_word late;         /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_word n;            /* splines of a plan */
+    hsep_word n, n_pinned;  /* splines of a plan, and those of them that stay as they were */
     hsep_word stage;        /* hsep_trusted_stage */
     hsep_word follows;      /* whether the trusted model may plan */
     hsep_word steps;        /* Newton steps begun */
     hsep_word varied;       /* samples whose variance under the rest of the last plan is computed */
-    hsep_word columns;      /* splines whose change of x_h is computed */
+    hsep_word columns;      /* splines that are pinned, or whose change of x_h is computed */
     hsep_word tries;        /* of this step, and */
     hsep_word tries_in_all; /* of all */
     hsep_word solver_steps; /* of all bounded tries */
@@ -75,15 +69,16 @@ typedef struct {
     hsep_word x_pb;       /* (preview + late,) m, their prediction by the physics model, */
     hsep_word e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
     hsep_word target;     /* (preview,) m, work */
-    hsep_word W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
-    hsep_word P;          /* triangle of n rows: W' W + jerk_weight D' D */
-    hsep_word v;          /* (n,) m, linear term of it */
+    hsep_word W;          /* changes of x_h by the splines that are not pinned: of spline j from sample j spacing on,
+                          * behind each other */
+    hsep_word P;          /* triangle of n - n_pinned rows: W' W + jerk_weight D' D */
+    hsep_word v;          /* (n - n_pinned,) m, linear term of it */
     hsep_word linearised;
     hsep_word physics; /* G_pb at the beginning of the window, */
     hsep_word trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 31);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 32);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -121,8 +116,11 @@ typedef struct {
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, hsep_word best);
 
-/* Work of the part that is next, in steps of the interior-point solver; 0: the plan is made and predicted. */
-HSEP_API hsep_word hsep_trusted_planner_next(const hsep_trusted_planner *self);
+/* Multiply-adds of the part that is next; 0: the plan is made and predicted. */
+HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, const hsep_trusted_task *task);
+
+/* Multiply-adds that it and all that follow take at most. */
+HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, const hsep_trusted_task *task);
 
 /* Do that part. */
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);

@@ -13,13 +13,16 @@ static hsep_real trusted_planner_lay_out(
     const hsep_word n = hsep_splines_count(planner->preview, planner->spacing);
     const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const hsep_real columns = (hsep_real)n, coefficients = HSEP_DECIDED + columns;
+    const hsep_word n_pinned = hsep_planner_n_pinned(planner), free = n - n_pinned;
+    const hsep_real columns = (hsep_real)free, coefficients = HSEP_DECIDED + (hsep_real)n;
+    const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;
     self->late = parameters->settings->measurement_delay;
     self->p = parameters->settings->p;
     self->Np = planner->Np;
     self->n = n;
+    self->n_pinned = n_pinned;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
@@ -27,8 +30,8 @@ static hsep_real trusted_planner_lay_out(
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (hsep_real)self->p);
     self->target = hsep_take(&end, preview);
-    self->W = hsep_take(&end, columns * preview - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
-    self->P = hsep_take(&end, hsep_triangle(n));
+    self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
+    self->P = hsep_take(&end, hsep_triangle(free));
     self->v = hsep_take(&end, columns);
     self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
     self->physics = hsep_take_block(&end, filter);

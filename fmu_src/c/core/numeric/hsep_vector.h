@@ -17,6 +17,8 @@ typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(hsep_real)), a
 typedef hsep_real hsep_lanes;
 #endif
 
+#define HSEP_LANES_MOST 2 /* whatever the compiler has: blocks are the same */
+
 /* Vectors that hold four numbers. */
 #define HSEP_OF_FOUR (4 / HSEP_LANES)
 
@@ -32,6 +34,28 @@ static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
     return (hsep_lanes)((larger & (hsep_bits)a) | (~larger & (hsep_bits)b));
 #else
     return a > b ? a : b;
+#endif
+}
+
+/* Sum of the entries of a vector. */
+static inline hsep_real hsep_lanes_sum(hsep_lanes a)
+{
+#if HSEP_LANES == 2
+    return a[0] + a[1];
+#else
+    return a;
+#endif
+}
+
+/* Entries of a vector to places stride apart. */
+static inline void hsep_lanes_spread(hsep_real to[], hsep_word stride, hsep_lanes a)
+{
+#if HSEP_LANES == 2
+    to[0] = a[0];
+    to[stride] = a[1];
+#else
+    (void)stride;
+    to[0] = a;
 #endif
 }
 
@@ -53,6 +77,27 @@ static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_
         s[0] += a[i] * b[i];
     }
     return (s[0] + s[1]) + (s[2] + s[3]);
+}
+
+/* sums_c := sum_i a_i b_c,i of four arrays side by side, all (n,): a is loaded once for all. */
+static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4], hsep_word n, hsep_real sums[4])
+{
+    const hsep_real *b0 = b[0], *b1 = b[1], *b2 = b[2], *b3 = b[3];
+    hsep_lanes s0 = {0.0}, s1 = {0.0}, s2 = {0.0}, s3 = {0.0};
+    hsep_word i = 0;
+    for (; i + HSEP_LANES <= n; i += HSEP_LANES) {
+        const hsep_lanes x = *hsep_lanes_const(a + i);
+        s0 += x * *hsep_lanes_const(b0 + i);
+        s1 += x * *hsep_lanes_const(b1 + i);
+        s2 += x * *hsep_lanes_const(b2 + i);
+        s3 += x * *hsep_lanes_const(b3 + i);
+    }
+    sums[0] = hsep_lanes_sum(s0), sums[1] = hsep_lanes_sum(s1);
+    sums[2] = hsep_lanes_sum(s2), sums[3] = hsep_lanes_sum(s3);
+    for (; i < n; i++) {
+        sums[0] += a[i] * b0[i], sums[1] += a[i] * b1[i];
+        sums[2] += a[i] * b2[i], sums[3] += a[i] * b3[i];
+    }
 }
 
 /* start + sum_i w_i e_i, both (n,), e a recursion's own values, newest first: the newest, which are only just computed,
