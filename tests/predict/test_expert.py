@@ -29,7 +29,7 @@ def solved(
     first: float = 1.0,
     least: float = 1e-9,
 ) -> SolvedExpert:
-    return solve(evidence, ExpertErrors(noise, correlation), scales, p, first, least, CONSTANTS)
+    return solve(evidence, ExpertErrors(noise, correlation), scales, p, first, least)
 
 
 def written_out(
@@ -109,7 +109,7 @@ def test_a_recursion_that_diverges_predicts_nothing() -> None:
 def judged(one: ExpertErrors, errors: Array, noise_variance: float, given: float = 0.0) -> ExpertErrors:
     nothing = np.zeros(len(errors))
     prediction = ExpertPrediction(nothing, nothing, nothing + 1.0, nothing, noise_variance)
-    return one.judge(prediction, errors, np.ones(len(errors), dtype=np.bool_), given, CONSTANTS)
+    return one.judge(prediction, errors, np.ones(len(errors), dtype=np.bool_), given)
 
 
 def test_correlation_follows_errors_that_are_alike() -> None:

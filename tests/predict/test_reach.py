@@ -36,7 +36,7 @@ def believed(x: Array, x_pb: Array, *, scale: float = 1.0, Np: int = NP) -> NDAr
         window = slice(i, i + Np)
         at, predicted = scale * x[window], scale * x_pb[window]
         fastest = max(fastest, float(np.abs(np.diff(predicted, prepend=before)).max()))
-        one, reach = reached(reach, at - predicted, largest, fastest, T_S, CONSTANTS)
+        one, reach = reached(reach, at - predicted, largest, fastest, T_S)
         before, largest = predicted[-1], max(largest, float(np.abs(at - predicted)[one].max(initial=0.0)))
         found.append(one)
     return np.concatenate(found)

@@ -14,7 +14,7 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.stack import Stack, simplex_minimum
 
-FIRST = np.array([0.0, 0.5, 0.5])
+FIRST = np.array([0.0, 0.5, 0.5, 0.0, 0.0])
 NP = 50
 
 
@@ -61,8 +61,9 @@ def test_a_singular_problem_has_a_minimum() -> None:
     np.testing.assert_array_equal(simplex_minimum(np.zeros((2, 2)), np.array([-1.0, -1.0])), 0.0)
 
 
-def new_stack() -> Stack:
-    return Stack.init(FIRST)
+def experts(three: Array) -> Array:
+    """Return the predictions of all experts, of which the last two predict 0."""
+    return np.concatenate((three, np.zeros((2, three.shape[1]))))
 
 
 def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, seed: int = 0) -> Stack:
@@ -71,19 +72,19 @@ def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, s
     for _ in range(n_windows):
         target = rng.normal(size=NP)
         predicted = np.array([target + size * rng.normal(size=NP) for size in errors])
-        stack = stack.update(predicted, target, 0.0, FIRST)
+        stack = stack.update(experts(predicted), target, 0.0)
     return stack
 
 
 def test_its_weights_are_the_formula() -> None:
     """Two windows by a general solver of the whole problem, with ``s²`` of the best expert."""
     rng = np.random.default_rng(5)
-    windows = [(rng.normal(size=(3, NP)), rng.normal(size=NP)) for _ in range(2)]
-    stack = new_stack()
+    windows = [(experts(rng.normal(size=(3, NP))), rng.normal(size=NP)) for _ in range(2)]
+    stack = Stack.init()
     for predicted, measured in windows:
-        stack = stack.update(predicted, measured, 0.0, FIRST)
+        stack = stack.update(predicted, measured, 0.0)
     fades = (CONSTANTS.gamma, 1.0)
-    squares = [0.0] * 4
+    squares = [0.0] * 6
     for fade, (predicted, measured) in zip(fades, windows, strict=True):
         for i, one in enumerate((*predicted, np.zeros(NP))):
             squares[i] += fade * float(np.sum((measured - one) ** 2))
@@ -95,9 +96,9 @@ def test_its_weights_are_the_formula() -> None:
 
     found = minimize(
         cost,
-        np.full(3, 0.2),
+        np.full(5, 0.1),
         method="SLSQP",
-        bounds=[(0.0, 1.0)] * 3,
+        bounds=[(0.0, 1.0)] * 5,
         constraints={"type": "ineq", "fun": lambda pi: 1.0 - pi.sum()},
         options={"ftol": 1e-14},
     )
@@ -105,7 +106,7 @@ def test_its_weights_are_the_formula() -> None:
 
 
 def test_the_better_expert_is_preferred_and_evidence_fades() -> None:
-    stack = new_stack()
+    stack = Stack.init()
     np.testing.assert_array_equal(stack.weights, FIRST)
     stack = replayed(stack, (3.0, 0.02, 3.0), 60)
     assert stack.weights[1] > 0.95
@@ -116,43 +117,43 @@ def test_the_better_expert_is_preferred_and_evidence_fades() -> None:
 
 
 def test_without_evidence_the_weights_are_the_first_ones() -> None:
-    stack = new_stack()
-    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
+    stack = Stack.init()
+    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-12)
 
 
 def test_physics_is_preferred_to_experts_that_know_nothing() -> None:
-    stack, rng = new_stack(), np.random.default_rng(2)
+    stack, rng = Stack.init(), np.random.default_rng(2)
     for _ in range(60):
-        stack = stack.update(rng.normal(size=(3, NP)), rng.normal(size=NP), 0.0, FIRST)
+        stack = stack.update(experts(rng.normal(size=(3, NP))), rng.normal(size=NP), 0.0)
     assert stack.weights.sum() < 0.1
 
 
 def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
-    stack = new_stack()
-    stack = stack.update(np.full((3, NP), 1e-3), np.full(NP, -1e-3), 1.0, FIRST)
+    stack = Stack.init()
+    stack = stack.update(experts(np.full((3, NP), 1e-3)), np.full(NP, -1e-3), 1.0)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-4)
 
 
 @given(scale=st.sampled_from([1e-9, 1e-3, 1e3]), seed=st.integers(0, 2**32 - 1))
 def test_positions_in_another_unit_have_the_same_weights(scale: float, seed: int) -> None:
-    one, other, rng = new_stack(), new_stack(), np.random.default_rng(seed)
+    one, other, rng = Stack.init(), Stack.init(), np.random.default_rng(seed)
     for _ in range(5):
         measured = rng.normal(size=NP)
-        predicted = measured + rng.normal(size=(3, NP)) * np.array([[1.0], [0.3], [0.5]])
-        one = one.update(predicted, measured, 0.0, FIRST)
-        other = other.update(scale * predicted, scale * measured, 0.0, FIRST)
+        predicted = measured + rng.normal(size=(5, NP)) * np.array([[1.0], [0.3], [0.5], [2.0], [0.7]])
+        one = one.update(predicted, measured, 0.0)
+        other = other.update(scale * predicted, scale * measured, 0.0)
     np.testing.assert_allclose(other.weights, one.weights, atol=1e-9)
 
 
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
-    stack = new_stack()
+    stack = Stack.init()
     stack = replayed(stack, (3.0, 0.1, 3.0), 30)
     stack = stack.copy(1, 0)
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
-    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
+    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
     assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
     stack = stack.forget(0)
-    stack = stack.update(np.zeros((3, NP)), np.zeros(NP), 0.0, FIRST)
+    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
     assert stack.weights[0] < 1e-9

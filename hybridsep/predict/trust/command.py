@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.signals import Array
 from ..regression import lags
-from .constants import TrustConstants
+from .constants import CONSTANTS
 
 __all__ = ["CommandFeatures"]
 
@@ -25,16 +25,14 @@ class CommandFeatures:
     ----------
     dead_time : int
         Of the physics model, in samples.
-    constants : TrustConstants
     """
 
     dead_time: int
-    constants: TrustConstants
 
     @property
     def p(self) -> int:
         """Lags."""
-        return self.constants.lags_of_command
+        return CONSTANTS.lags_of_command
 
     @property
     def n_before(self) -> int:
@@ -44,7 +42,7 @@ class CommandFeatures:
     @property
     def shares(self) -> Array:
         """Effects that features may have, ``(p + 2,)``, relative to the largest: an old increment explains less."""
-        return np.concatenate(([1.0], np.sqrt(self.constants.last_lag ** (np.arange(self.p + 1) / self.p))))
+        return np.concatenate(([1.0], np.sqrt(CONSTANTS.last_lag ** (np.arange(self.p + 1) / self.p))))
 
     def late(self, before: Array, x_d: Array) -> Array:
         """Return the commands ``d`` samples ago over a window, ``(n,)``, m.

@@ -20,7 +20,7 @@ from ...base.errors import SignalError
 from ...base.signals import Array
 from ...model.discrete import DiscreteModel
 from ..residual_window import ResidualWindow
-from .constants import CONSTANTS, TrustConstants
+from .constants import CONSTANTS
 
 __all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
 
@@ -126,7 +126,6 @@ class StaticFeatures:
     damping_of_motion : bool
         Whether the damping is that of the position's own velocity; else that of ``x_pb``. Behind a compensator ``x_pb``
         turns with every change of the command, and is far from the motion.
-    constants : TrustConstants
     """
 
     discrete: DiscreteModel
@@ -134,7 +133,6 @@ class StaticFeatures:
     period: float = 0.0
     own: tuple[Disturbance, ...] = ()
     damping_of_motion: bool = False
-    constants: TrustConstants = CONSTANTS
 
     @property
     def n_differences(self) -> int:
@@ -155,7 +153,7 @@ class StaticFeatures:
     def shares(self) -> Array:
         """Effects that features may have, ``(n,)``, relative to the largest."""
         shares = np.ones(self.n)
-        shares[-self.n_disturbances :] = self.constants.difference_share
+        shares[-self.n_disturbances :] = CONSTANTS.difference_share
         return shares
 
     def rest(self) -> StaticState:
@@ -283,5 +281,5 @@ class StaticFeatures:
 
     def _spread(self, velocity_scale: float) -> Array:
         """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
-        c = self.constants
-        return np.asarray((velocity_scale or 1.0) * (c.friction_least * c.friction_ratio ** np.arange(_N_FRICTION)))
+        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(_N_FRICTION)
+        return np.asarray((velocity_scale or 1.0) * spread)

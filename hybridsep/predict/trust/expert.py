@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from ...base.records import within
 from ...base.signals import Array
 from ..regression import PenalisedSolution, RidgeRegression, lags
-from .constants import TrustConstants
+from .constants import CONSTANTS
 
 __all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "solve"]
 
@@ -98,12 +98,7 @@ class ExpertErrors:
     correlation: float = field(default=1.0, metadata=within(1.0))
 
     def judge(
-        self,
-        prediction: ExpertPrediction,
-        measured: Array,
-        accepted: NDArray[np.bool_],
-        given: float,
-        constants: TrustConstants,
+        self, prediction: ExpertPrediction, measured: Array, accepted: NDArray[np.bool_], given: float
     ) -> ExpertErrors:
         """Return noise and correlation with the errors of a window.
 
@@ -114,14 +109,13 @@ class ExpertErrors:
             Residuals of its first samples, and which count.
         given : float, m²
             Variance of the noise, if it is known; else 0.
-        constants : TrustConstants
         """
         noise_variance, correlation = given or prediction.noise_variance, self.correlation
         if noise_variance > 0.0:
             error = (measured - prediction.unshrunk[: len(measured)])[accepted]
             seen = min(len(error) * float(np.mean(error)) ** 2 / noise_variance, _DIVERGED)
-            correlation += constants.correlation_rate * (seen - correlation)
-            correlation = min(max(correlation, 1.0), constants.correlation_max)
+            correlation += CONSTANTS.correlation_rate * (seen - correlation)
+            correlation = min(max(correlation, 1.0), CONSTANTS.correlation_max)
         return ExpertErrors(noise_variance, correlation)
 
 
@@ -193,13 +187,7 @@ class SolvedExpert(NamedTuple):
 
 
 def solve(
-    evidence: RidgeRegression,
-    errors: ExpertErrors,
-    scales: Array,
-    p: int,
-    first: float,
-    least: float,
-    constants: TrustConstants,
+    evidence: RidgeRegression, errors: ExpertErrors, scales: Array, p: int, first: float, least: float
 ) -> SolvedExpert:
     """Return an expert with the weights that follow from all rows so far.
 
@@ -214,11 +202,10 @@ def solve(
         Lags of the residual.
     first, least : float, m²
         Variance of the noise while it is not known, and the least one.
-    constants : TrustConstants
     """
     resolved = _RESOLUTION * evidence.target_square
     variance = max(errors.noise_variance or first, least, resolved) * errors.correlation
-    priors = np.concatenate((scales, np.sqrt(constants.last_lag ** (np.arange(p) / max(p, 1)))))
+    priors = np.concatenate((scales, np.sqrt(CONSTANTS.last_lag ** (np.arange(p) / max(p, 1)))))
     solution = evidence.penalised(variance / priors**2)
     return SolvedExpert(len(scales), solution, variance, max(solution.residual_sum, resolved) / evidence.n_rows)
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...base.signals import Array
 from ..regression import RidgeRegression
 from ..residual_window import FeatureScales, Forecast, ResidualWindow
+from .constants import CONSTANTS
 from .disturbances import LEAST_VELOCITY
 from .expert import ExpertPrediction, SolvedExpert, solve
 from .stack import COMMAND, DOUBTING, HOLD, LAGGED, N_EXPERTS, STATIC
@@ -53,10 +54,10 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     path : (m,) array, m, optional
         Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
     """
-    c, static, learned = state.fixed.constants, state.fixed.static, state.learned
-    T_s, before = state.fixed.settings.T_s, learned.velocity_scale
+    static, learned, T_s = state.fixed.static, state.learned, state.fixed.settings.T_s
+    before = learned.velocity_scale
     peak = static.peak_velocity(state.run.static, window.x_d)
-    outgrown = peak > max(c.outgrown * before, LEAST_VELOCITY)
+    outgrown = peak > max(CONSTANTS.outgrown * before, LEAST_VELOCITY)
     step = max(learned.largest_step, peak * T_s)
     if path is not None and state.evidence[OF_PHYSICS].n_rows == 0.0:
         peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
@@ -78,13 +79,13 @@ def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert
             rows = evidence.all()
             found |= {expert: _solved(state, expert, rows, scales) for expert in experts}
             if state.doubts and state.leading == experts[0]:
-                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(state.fixed.constants.less), scales)
+                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
     return found
 
 
 def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
     """Return an expert with the weights that follow from rows."""
-    settings, c, kind = state.fixed.settings, state.fixed.constants, state.kind_of(expert)
+    settings, kind = state.fixed.settings, state.kind_of(expert)
     square = state.learned.scales[kind].largest_square
     effect = settings.effect or math.sqrt(square)
     if kind == OF_COMMAND:
@@ -93,8 +94,9 @@ def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: Fea
     else:
         p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
     priors = effect * shares / np.maximum(largest, _LEAST)
-    first = settings.noise_std**2 or c.first_noise * square
-    return solve(rows, state.learned.errors_of(expert), priors, p, first, min(settings.lam, c.least_noise * square), c)
+    first = settings.noise_std**2 or CONSTANTS.first_noise * square
+    least = min(settings.lam, CONSTANTS.least_noise * square)
+    return solve(rows, state.learned.errors_of(expert), priors, p, first, least)
 
 
 def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
@@ -120,13 +122,13 @@ def forecast_by(
 ) -> TrustedForecast:
     """Predict as :func:`forecast` by the experts of :func:`solved`, with the shrinking of ``held`` if there is."""
     x_d, x_pb, _ = window
-    learned, command, c, run = state.learned, state.fixed.command, state.fixed.constants, state.run
-    bound, growth = c.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
+    learned, command, run = state.learned, state.fixed.command, state.run
+    bound, growth = CONSTANTS.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
 
     def predicted(expert: int, features: Array) -> ExpertPrediction:
         kind = state.kind_of(expert)
         scale = learned.scales[OF_COMMAND].grown(growth) if kind == OF_COMMAND else learned.scales[OF_PHYSICS]
-        most = c.bound_of_command * scale.largest if kind == OF_COMMAND else bound
+        most = CONSTANTS.bound_of_command * scale.largest if kind == OF_COMMAND else bound
         shrunk = None if held is None else held.get(expert)
         return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk)
 
@@ -164,4 +166,4 @@ def _growth(state: TrustedModel, scales: FeatureScales) -> float:
     before = state.learned.largest_step
     if not (before > 0.0 and state.learned.stack.leader == COMMAND):
         return 1.0
-    return min(scales.step / before, state.fixed.constants.growth)
+    return min(scales.step / before, CONSTANTS.growth)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...base.signals import Array
 from ..regression import lags
 from ..residual_window import ResidualWindow
+from .constants import CONSTANTS
 from .evidence import Evidence
 from .expert import ExpertErrors
 from .forecast import TrustedForecast
@@ -68,7 +69,7 @@ def learn(
     state = _with_scales(state, forecast, max(state.learned.fastest, fastest))
     learned, measured = state.learned, x - window.x_pb
     largest, T_s = learned.scales[OF_PHYSICS].largest, fixed.settings.T_s
-    accepted, reach = reached(run.reach, measured, largest, learned.fastest, T_s, fixed.constants)
+    accepted, reach = reached(run.reach, measured, largest, learned.fastest, T_s)
     e = _bridged(state.last, measured, accepted)
     e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
     rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
@@ -117,22 +118,22 @@ def _judged(
     state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> TrustedModel:
     """Judge the experts and their stack by the measurement of their window."""
-    settings, c, learned = state.fixed.settings, state.fixed.constants, state.learned
+    settings, learned = state.fixed.settings, state.learned
     errors = {
-        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2, c)
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
         for expert, one in forecast.predictions.items()
     }
     scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
     n, late = len(accepted), settings.measurement_delay
     published = accepted & (np.arange(n) >= late) if late < n else accepted
-    stack, first = learned.stack, state.fixed.first_weights
+    stack = learned.stack
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
-        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam, first, c)
+        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
     evidence = state.evidence
-    if state.doubts and stack.weights[DOUBTING] > c.doubt:
+    if state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt:
         # All experts go on with this run alone, and are judged anew.
-        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init(first)
+        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init()
         errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
     learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
     return replace(state, learned=learned, evidence=evidence)

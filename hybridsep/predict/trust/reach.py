@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.signals import Array
-from .constants import TrustConstants
+from .constants import CONSTANTS
 
 __all__ = ["Reach", "reached"]
 
@@ -36,9 +36,7 @@ class Reach:
     n_beyond: int = 0
 
 
-def reached(
-    reach: Reach, e: Array, largest: float, fastest: float, T_s: float, constants: TrustConstants
-) -> tuple[NDArray[np.bool_], Reach]:
+def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) -> tuple[NDArray[np.bool_], Reach]:
     """Return whether each sample of a window is believed, ``(n,)`` bool, and the reach after it.
 
     Before the first motion, and over the first window that has a residual, all are.
@@ -53,16 +51,15 @@ def reached(
     fastest : float, m
         Largest change of ``x_pb`` from sample to sample so far, of the window, too.
     T_s : float, s
-    constants : TrustConstants
     """
     known = largest > 0.0 and fastest > 0.0
     believed, n_missing, n_beyond = np.isfinite(e), reach.n_missing, reach.n_beyond
-    patience = math.ceil(constants.patience / T_s)
+    patience = math.ceil(CONSTANTS.patience / T_s)
     for k, size in enumerate(np.abs(e).tolist()):
         n_missing += 1
         if not believed[k]:
             continue
-        beyond = size > constants.reach_residuals * largest + constants.reach_steps * fastest
+        beyond = size > CONSTANTS.reach_residuals * largest + CONSTANTS.reach_steps * fastest
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
             believed[k] = False

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.records import within
 from ...base.signals import Array
-from .constants import CONSTANTS, TrustConstants
+from .constants import CONSTANTS
 
 __all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "N_EXPERTS", "STATIC", "Stack", "simplex_minimum"]
 
@@ -19,6 +19,9 @@ the one of these with lags that led, with little weight of earlier runs."""
 
 N_EXPERTS = 5
 """All of them."""
+
+_FIRST = np.array([0.0, CONSTANTS.first_lagged, CONSTANTS.first_static, 0.0, 0.0])
+"""Weights ``π₀`` without evidence."""
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
@@ -47,19 +50,16 @@ class Stack:
     evidence: Array = field(metadata=within())
 
     @classmethod
-    def init(cls, first: Array) -> Stack:
-        """Return the stack without evidence, with the weights ``π₀``."""
-        n = len(first)
-        return cls(first, np.zeros((n, n)), np.zeros(n), np.zeros(2))
+    def init(cls) -> Stack:
+        """Return the stack without evidence."""
+        return cls(_FIRST, np.zeros((N_EXPERTS, N_EXPERTS)), np.zeros(N_EXPERTS), np.zeros(2))
 
     @property
     def leader(self) -> int:
         """COMMAND, if it has more of the weights than LAGGED and STATIC together, else LAGGED."""
         return COMMAND if self.weights[COMMAND] > self.weights[LAGGED] + self.weights[STATIC] else LAGGED
 
-    def update(
-        self, predicted: Array, measured: Array, least: float, first: Array, constants: TrustConstants = CONSTANTS
-    ) -> Stack:
+    def update(self, predicted: Array, measured: Array, least: float) -> Stack:
         """Return the stack with a measured window more.
 
         Parameters
@@ -69,19 +69,16 @@ class Stack:
         measured : (n,) array, m
         least : float, m²
             Least mean square that errors are judged by.
-        first : (n_experts,) array
-            ``π₀``.
-        constants : TrustConstants
         """
-        gamma, n = constants.gamma, len(measured)
+        gamma, n = CONSTANTS.gamma, len(measured)
         gram = gamma * self.gram + predicted @ predicted.T
         cross = gamma * self.cross + predicted @ measured
         evidence = gamma * self.evidence + np.array([measured @ measured, n])
         total, rows = evidence.tolist()
         errors = total - 2.0 * cross + np.diag(gram)
         best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
-        ridge = constants.kappa * best * n
-        weights = simplex_minimum(gram + ridge * np.eye(len(first)), cross + ridge * first)
+        ridge = CONSTANTS.kappa * best * n
+        weights = simplex_minimum(gram + ridge * np.eye(N_EXPERTS), cross + ridge * _FIRST)
         return Stack(weights, gram, cross, evidence)
 
     def copy(self, expert: int, to: int) -> Stack:

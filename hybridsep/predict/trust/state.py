@@ -22,12 +22,12 @@ from ...base.signals import Array
 from ...model.discrete import DiscreteModel
 from ..regression import RidgeRegression
 from .command import CommandFeatures
-from .constants import CONSTANTS, TrustConstants
+from .constants import CONSTANTS
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .evidence import Evidence
 from .expert import ExpertErrors, ResidualScale
 from .reach import Reach
-from .stack import COMMAND, DOUBTING, LAGGED, N_EXPERTS, STATIC, Stack
+from .stack import COMMAND, DOUBTING, LAGGED, N_EXPERTS, Stack
 
 __all__ = [
     "OF_COMMAND",
@@ -59,20 +59,11 @@ class Parameters:
         ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
     static : StaticFeatures
     command : CommandFeatures
-    constants : TrustConstants
     """
 
     settings: PredictorSettings
     static: StaticFeatures
     command: CommandFeatures
-    constants: TrustConstants
-
-    @property
-    def first_weights(self) -> Array:
-        """Weights of the stack without evidence, ``(N_EXPERTS,)``."""
-        first = np.zeros(N_EXPERTS)
-        first[LAGGED], first[STATIC] = self.constants.first_lagged, self.constants.first_static
-        return first
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +130,7 @@ class Learned:
     def init(cls, fixed: Parameters) -> Learned:
         """Return that nothing has been learned."""
         scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * (N_EXPERTS - LAGGED)
-        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(fixed.first_weights), np.zeros(fixed.static.n))
+        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(fixed.static.n))
 
     def errors_of(self, expert: int) -> ExpertErrors:
         """Return what is known of the errors of an expert."""
@@ -216,12 +207,7 @@ class TrustedModel:
         return factors and self.learned.is_sound and self.leading in (LAGGED, COMMAND)
 
 
-def init(
-    settings: PredictorSettings,
-    discrete: DiscreteModel,
-    own: tuple[Disturbance, ...] = (),
-    constants: TrustConstants = CONSTANTS,
-) -> TrustedModel:
+def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()) -> TrustedModel:
     """Return the model at rest, with nothing learned.
 
     Parameters
@@ -231,10 +217,9 @@ def init(
         ``G_pb``.
     own : tuple of Disturbance
         Of the user's own.
-    constants : TrustConstants
     """
-    static = StaticFeatures(discrete, settings.q, settings.period, own, constants=constants)
-    fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time, constants), constants)
+    static = StaticFeatures(discrete, settings.q, settings.period, own)
+    fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
     evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
     return TrustedModel(fixed, Learned.init(fixed), evidence, LAGGED, RunState.init(fixed))
 
@@ -242,7 +227,7 @@ def init(
 def restart(state: TrustedModel) -> TrustedModel:
     """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
     fixed, learned = state.fixed, state.learned
-    most = fixed.constants.carried * fixed.settings.Np
+    most = CONSTANTS.carried * fixed.settings.Np
     of_physics, of_command = (one.begin_run(most) for one in state.evidence)
     leading, stack, errors = learned.stack.leader, learned.stack.forget(DOUBTING), ExpertErrors()
     if of_physics.earlier.n_rows > 0.0:

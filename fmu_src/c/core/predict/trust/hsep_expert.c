@@ -195,23 +195,18 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
     memcpy(hsep_at(self, self->unshrunk) + self->n, past, (size_t)self->p * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_expert_go_on(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last)
-{
-    expert_free_run(self, rows, first, last);
-    hsep_expert_vary(self, rows, first, last);
-}
-
-HSEP_API void hsep_expert_predict(hsep_expert *self, const hsep_real rows[], hsep_word varied)
+HSEP_API void hsep_expert_predict(
+    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied)
 {
     hsep_real *kept = hsep_at(self, self->kept);
-    expert_free_run(self, rows, 0, self->n);
-    if (varied > 0) {
-        hsep_expert_vary(self, rows, 0, varied);
-        for (hsep_word j = 0; j < self->n - varied; j++) {
+    expert_free_run(self, rows, first, last);
+    if (varied > first) {
+        hsep_expert_vary(self, rows, first, varied);
+        for (hsep_word j = self->n - last; j < self->n - varied; j++) {
             kept[j] = expert_kept(self, expert_most(self));
         }
     }
-    expert_shrink(self, 0, self->n);
+    expert_shrink(self, self->n - last, self->n - (varied > first ? varied : first));
 }
 
 HSEP_API void hsep_expert_judge(

@@ -82,13 +82,12 @@ HSEP_API void hsep_expert_solve(
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
 
-/* Predict n samples in free run. rows: (n, n_static), sample after sample; varied: samples whose variance is computed,
- * the first ones, while those behind them are taken as unknown; 0: what the variance leaves stays that of the last
- * prediction. Cost: n (n_static + p) multiply-adds, and that of hsep_expert_vary. */
-HSEP_API void hsep_expert_predict(hsep_expert *self, const hsep_real rows[], hsep_word varied);
-
-/* Predict samples first ... last - 1 alone; first is 0, or where the last call ended. */
-HSEP_API void hsep_expert_go_on(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
+/* Predict samples first ... last - 1 in free run; first is 0, or where the last call ended. rows: (n, n_static), sample
+ * after sample. Variances are computed of the samples before varied, while those behind them are taken as unknown; if
+ * varied is first, what the variance leaves stays that of the last prediction. Cost of a sample: n_static + p
+ * multiply-adds, and that of hsep_expert_vary. */
+HSEP_API void hsep_expert_predict(
+    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied);
 
 /* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
  * them by it. Cost for each: that of hsep_gram_leverages, four at a time, and last multiply-adds. */

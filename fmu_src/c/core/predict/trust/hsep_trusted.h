@@ -125,15 +125,15 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
- * them, m, of a compensator; or NULL. Cost: m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last
- * n / 2, and 6 n tanh. */
+ * them, m, of a compensator, for which all n are predicted, with the variances of the first last ones; or NULL. Cost:
+ * m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last n / 2, and 6 n tanh. */
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
     hsep_real e[], hsep_word last);
 
-/* Predict samples first ... last - 1, too: their variances are dear, and nobody asks for them before. */
+/* Predict samples first ... last - 1, too, where the last call ended; varied: as hsep_expert_predict's. */
 HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last);
+    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word varied);
 
 /* Predict other commands with the same scales and weights. e: (n + p,), m; varied: samples whose variance is computed,
  * the first ones, while the prediction of those behind them means nothing yet; 0: shrinking stays that of the last

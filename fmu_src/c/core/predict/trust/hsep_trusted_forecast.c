@@ -108,17 +108,22 @@ static const hsep_real *trusted_rows(hsep_trusted *self, hsep_word expert)
                                                                  : hsep_at(self, self->rows);
 }
 
-/* Begin the prediction by an expert. past: (p,) m, the last residuals of the physics model. */
-static void trusted_begin(hsep_trusted *self, hsep_word expert, const hsep_real past[])
+/* Begin the prediction of commands x_d by the experts that know something. past: (p,) m, the last residuals of the
+ * physics model. */
+static void trusted_begin(hsep_trusted *self, const hsep_real x_d[], const hsep_real past[])
 {
-    const hsep_residual_scale *scales = self->learned.scales;
-    const hsep_real growth = self->growth, most = growth * scales[HSEP_OF_COMMAND].largest;
-    if (hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND) {
-        hsep_expert_begin(
-            hsep_trusted_expert(self, expert), hsep_at(self, self->e_0) + self->Np,
-            growth * growth * scales[HSEP_OF_COMMAND].largest_square, HSEP_TRUST_BOUND_OF_COMMAND * most);
-    } else {
-        hsep_expert_begin(hsep_trusted_expert(self, expert), past, scales[HSEP_OF_PHYSICS].largest_square, self->bound);
+    const hsep_residual_scale *of_physics = &self->learned.scales[HSEP_OF_PHYSICS];
+    const hsep_residual_scale *of_command = &self->learned.scales[HSEP_OF_COMMAND];
+    const hsep_real *past_of_command = hsep_at(self, self->e_0) + self->Np, growth = self->growth;
+    const hsep_real most = growth * of_command->largest, square = growth * growth * of_command->largest_square;
+    hsep_command_take(hsep_trusted_command(self), x_d, self->n);
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        hsep_expert *expert = hsep_trusted_expert(self, i);
+        if (self->predicted[i] && hsep_trusted_kind_of(self, i) == HSEP_OF_COMMAND) {
+            hsep_expert_begin(expert, past_of_command, square, HSEP_TRUST_BOUND_OF_COMMAND * most);
+        } else if (self->predicted[i]) {
+            hsep_expert_begin(expert, past, of_physics->largest_square, self->bound);
+        }
     }
 }
 
@@ -157,88 +162,14 @@ static void trusted_stack(hsep_trusted *self, hsep_real e[], hsep_word begin, hs
     }
 }
 
-/* Predict by all experts that know something, whose rows hold the commands, and stiffness and damping at x_pb. past:
- * (p,) m. */
-static void trusted_by_experts(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real past[], hsep_word varied)
-{
-    hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
-    if (self->predicted[HSEP_STATIC]) {
-        hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
-        trusted_begin(self, HSEP_STATIC, past);
-        hsep_expert_predict(first, rows, varied > 0 ? self->n : 0);
-        for (hsep_word j = 0; j < self->n; j++) {
-            x[j] = x_pb[j] + hsep_at_const(first, first->e_h)[j];
-        }
-        hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, 0, self->n, rows);
-    }
-    if (self->predicted[HSEP_COMMAND]) {
-        hsep_command_take(hsep_trusted_command(self), x_d, self->n);
-        hsep_command_fill(hsep_trusted_command(self), self->n, 0, self->n);
-    }
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            trusted_begin(self, i, past);
-            hsep_expert_predict(hsep_trusted_expert(self, i), trusted_rows(self, i), varied);
-            trusted_take(self, i, x_pb, 0, self->n);
-        }
-    }
-}
-
-HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied)
-{
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_real *rows = hsep_at(self, self->rows);
-    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
-    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
-    trusted_by_experts(self, x_d, x_pb, e + self->n, varied);
-    trusted_stack(self, e, 0, self->n);
-}
-
-HSEP_API void hsep_trusted_vary(hsep_trusted *self, hsep_word first, hsep_word last)
-{
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            hsep_expert_vary(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last);
-        }
-    }
-}
-
-HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
-    hsep_real e[], hsep_word last)
-{
-    const int outgrown = trusted_scale(self, x_d, x_pb, path, n_path);
-    self->bound = HSEP_TRUST_BOUND * self->learned.scales[HSEP_OF_PHYSICS].largest;
-    self->growth = trusted_growth(self);
-    const hsep_real hold = hsep_fmin(hsep_fmax(e[self->n], -self->bound), self->bound);
-    trusted_solved(self, outgrown);
-    for (hsep_word i = 0; i < HSEP_N_EXPERTS * self->n; i++) { /* hold, and what knows nothing */
-        hsep_at(self, self->stacked)[i] = i / self->n == HSEP_HOLD ? hold : 0.0;
-    }
-    if (path != NULL) {
-        trusted_by_experts(self, x_d, x_pb, e + self->n, last); /* the rows are those of the scales */
-        trusted_stack(self, e, self->n - last, self->n);
-        return;
-    }
-    hsep_command_take(hsep_trusted_command(self), x_d, self->n);
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            trusted_begin(self, i, e + self->n);
-        }
-    }
-    hsep_trusted_go_on(self, x_pb, e, 0, last);
-}
-
 HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last)
+    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word varied)
 {
     const hsep_word begin = self->n - last, end = self->n - first;
     hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
         hsep_expert *at_first = hsep_trusted_expert(self, HSEP_STATIC);
-        hsep_expert_go_on(at_first, rows, first, last);
+        hsep_expert_predict(at_first, rows, first, last, varied > first ? last : first);
         for (hsep_word j = begin; j < end; j++) {
             x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
         }
@@ -249,9 +180,45 @@ HSEP_API void hsep_trusted_go_on(
     }
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
-            hsep_expert_go_on(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last);
+            hsep_expert_predict(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last, varied);
             trusted_take(self, i, x_pb, begin, end);
         }
     }
     trusted_stack(self, e, begin, end);
+}
+
+HSEP_API void hsep_trusted_forecast(
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
+    hsep_real e[], hsep_word last)
+{
+    const int outgrown = trusted_scale(self, x_d, x_pb, path, n_path);
+    self->bound = HSEP_TRUST_BOUND * self->learned.scales[HSEP_OF_PHYSICS].largest;
+    self->growth = trusted_growth(self);
+    const hsep_real hold = hsep_clip(e[self->n], self->bound);
+    trusted_solved(self, outgrown);
+    for (hsep_word i = 0; i < HSEP_N_EXPERTS * self->n; i++) { /* hold, and what knows nothing */
+        hsep_at(self, self->stacked)[i] = i / self->n == HSEP_HOLD ? hold : 0.0;
+    }
+    trusted_begin(self, x_d, e + self->n);
+    hsep_trusted_go_on(self, x_pb, e, 0, path != NULL ? self->n : last, last); /* the rows are those of the scales */
+}
+
+HSEP_API void hsep_trusted_predict(
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied)
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    hsep_real *rows = hsep_at(self, self->rows);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
+    trusted_begin(self, x_d, e + self->n);
+    hsep_trusted_go_on(self, x_pb, e, 0, self->n, varied);
+}
+
+HSEP_API void hsep_trusted_vary(hsep_trusted *self, hsep_word first, hsep_word last)
+{
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_vary(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last);
+        }
+    }
 }
