@@ -62,7 +62,7 @@ void prove_recursion(void)
     const hsep_recursion recursion = {
         .w_x = weights + 1, .w_e = weights + 1 + Q + 1, .p = P, .q = Q, .bias = weights[0]};
     hsep_recursion_run(&recursion, x, e, N, 0, N);
-    (void)hsep_recursion_stable(&recursion, work);
+    (void)hsep_has_stable_poles(&recursion, work);
 }
 
 /* The stack of experts, with any evidence. */

@@ -67,6 +67,30 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
     return x;
 }
 
+HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
+{
+    const hsep_word p = recursion->p;
+    hsep_real *a = work, *next = work + p;
+    for (hsep_word i = 0; i < p; i++) {
+        a[i] = -recursion->w_e[i];
+    }
+    for (hsep_word m = p; m-- > 0;) {
+        const hsep_real reflection = a[m];
+        if (!(hsep_fabs(reflection) < 1.0)) { /* NaN too */
+            return 0;
+        }
+        /* a_i := (a_i - kappa a_(m-i)) / (1 - kappa^2) */
+        const hsep_real inverse = 1.0 / ((1.0 - reflection) * (1.0 + reflection));
+        for (hsep_word i = 0; i < m; i++) {
+            next[i] = (a[i] - reflection * a[m - 1 - i]) * inverse;
+        }
+        hsep_real *swap = a;
+        a = next;
+        next = swap;
+    }
+    return 1;
+}
+
 /* Whether the hybrid model may plan the window that begins. */
 static int compensator_trusts(hsep_compensator *self)
 {
@@ -74,7 +98,7 @@ static int compensator_trusts(hsep_compensator *self)
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     return self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
            hsep_paper_regression(hsep_residual_paper(hsep_predictor_model(predictor)))->n_rows > 0.0 &&
-           hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
+           hsep_has_stable_poles(&recursion, hsep_at(self, self->trial_e));
 }
 
 /* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from

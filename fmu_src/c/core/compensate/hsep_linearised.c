@@ -1,5 +1,6 @@
 #include "hsep_linearised.h"
 
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
 #include <string.h>
@@ -155,13 +156,20 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
     self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
 }
 
+/* What shrinking and bounds leave of an expert's recursion at place j. */
+static hsep_real linearised_left(const hsep_expert *expert, hsep_word j)
+{
+    const hsep_real unshrunk = hsep_at_const(expert, expert->unshrunk)[j];
+    return unshrunk == 0.0 ? hsep_at_const(expert, expert->kept)[j] : hsep_at_const(expert, expert->e_h)[j] / unshrunk;
+}
+
 /* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
 static void linearised_shrink(
     const hsep_linearised *self, hsep_trusted *model, hsep_word place, hsep_real weight, hsep_real shrink[])
 {
     const hsep_expert *expert = hsep_trusted_expert(model, place);
     for (hsep_word k = 0; weight > 0.0 && k < self->n; k++) {
-        shrink[k] = weight * hsep_expert_shrink(expert, self->n - 1 - k);
+        shrink[k] = weight * linearised_left(expert, self->n - 1 - k);
     }
 }
 
@@ -207,14 +215,45 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
     }
 }
 
+/* Slopes of the disturbances at the samples of a prediction, (n, count), sample after sample: of each friction with the
+ * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s, and of what
+ * repeats with the position, 1/m. */
+static void linearised_slopes(
+    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
+{
+    const hsep_disturbances *disturbances = hsep_trusted_disturbances(model);
+    const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
+    hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
+    for (hsep_word j = self->n; j-- > 0; slopes += self->count) {
+        const hsep_real v_d = (x_d[j] - last) / disturbances->T_s;
+        last = x_d[j];
+        for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
+            const hsep_real spread = hsep_disturbances_sign_velocity(scale, i);
+            if (half > 0.0) {
+                slopes[i] = (hsep_tanh((v_d + half) / spread) - hsep_tanh((v_d - half) / spread)) / (2.0 * half);
+            } else {
+                const hsep_real sign = hsep_tanh(v_d / spread);
+                slopes[i] = (1.0 - sign * sign) / spread;
+            }
+        }
+        const hsep_real v = hsep_disturbances_damped_velocity(disturbances, x_pb, x, self->n, j);
+        slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * hsep_fabs(x[j]);
+        slopes[HSEP_DISTURBANCES_DAMPING] = 2.0 * hsep_fabs(v);
+        if (self->count > HSEP_DISTURBANCES_N_LASTING) {
+            const hsep_real angle = hsep_disturbances_angle(disturbances, x[j]);
+            const hsep_real turns = HSEP_TWO_PI / disturbances->period;
+            slopes[HSEP_DISTURBANCES_N_LASTING] = turns * hsep_cos(angle);
+            slopes[HSEP_DISTURBANCES_N_LASTING + 1] = -turns * hsep_sin(angle);
+        }
+    }
+}
+
 HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
     const hsep_linearised_change *change, hsep_real reach)
 {
     const hsep_word n = self->n, first = linearised_first(self, model);
-    hsep_disturbances_slopes(
-        hsep_trusted_disturbances(model), x_d, x_pb, hsep_at(model, model->x), n, model->forecast_scale, reach,
-        hsep_at(self, self->slopes));
+    linearised_slopes(self, model, x_d, x_pb, reach);
     linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
     linearised_command(self, model, change);
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {

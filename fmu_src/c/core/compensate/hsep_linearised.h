@@ -64,7 +64,8 @@ typedef struct {
 } hsep_linearised_change;
 
 /* Linearise at commands x_d that the model, which has learned, was last tried with, with the response x_pb, both
- * (n,), m, newest first, for a change that may begin at any sample of the preview. reach: see hsep_disturbances_slopes.
+ * (n,), m, newest first, for a change that may begin at any sample of the preview. reach: half of the change of
+ * velocity that the friction's slope is taken over, relative to the velocity scale; 0: the tangent.
  * Cost: 12 tanh a sample. */
 HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],

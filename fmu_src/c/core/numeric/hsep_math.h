@@ -10,6 +10,8 @@
 #define HSEP_MATH(name) name
 #endif
 
+#define HSEP_TWO_PI 6.283185307179586
+
 #define hsep_ceil HSEP_MATH(ceil)
 #define hsep_cos HSEP_MATH(cos)
 #define hsep_exp HSEP_MATH(exp)

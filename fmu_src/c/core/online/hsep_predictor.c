@@ -162,12 +162,12 @@ HSEP_API hsep_word hsep_predictor_warm_up(const hsep_predictor *self) { return p
 
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, hsep_word last)
 {
-    hsep_uncertainty_signals signals = {
+    const hsep_uncertainty_signals signals = {
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
-        .n_physics = predictor_warm_up(self, self->late)};
+        .n_physics = predictor_warm_up(self, self->late),
+        .variance = hsep_residual_variance(hsep_predictor_model(self))};
     if (self->divergence == HSEP_CONVERGES) {
-        hsep_residual_signal(hsep_predictor_model(self), &signals);
         hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
     }
 }

@@ -60,8 +60,4 @@ HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bi
 HSEP_API void hsep_recursion_run(
     const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_word n, hsep_word first, hsep_word last);
 
-/* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
- * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
-HSEP_API int hsep_recursion_stable(const hsep_recursion *self, hsep_real work[]);
-
 #endif

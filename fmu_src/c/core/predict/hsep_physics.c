@@ -6,8 +6,6 @@
 
 #define PHYSICS_TERMS 20 /* of the series: 0.5^20 / 20! < 1e-24 */
 
-static const hsep_real physics_two_pi = 6.283185307179586;
-
 /* E := F G + scale E, all (4, 4) by rows; E is none of the others. */
 static void physics_multiply(hsep_real E[16], const hsep_real F[16], const hsep_real G[16], hsep_real scale)
 {
@@ -56,7 +54,7 @@ static void physics_expm1(hsep_real E[16], hsep_real M[16])
 
 HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold)
 {
-    const hsep_real omega = physics_two_pi * continuous->f_n; /* rad/s */
+    const hsep_real omega = HSEP_TWO_PI * continuous->f_n; /* rad/s */
     /* States (omega^2 z, omega z') with z'' + 2 zeta omega z' + omega^2 z = u, both in m; then u and its ramp
      * (Van Loan 1978): the exponential of the augmented matrix holds Phi, Gamma_1 and Gamma_2. */
     hsep_real M[16] = {0.0}, E[16];

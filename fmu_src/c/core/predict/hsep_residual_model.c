@@ -18,11 +18,6 @@ HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self)
     return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
 }
 
-static const hsep_trusted *residual_trusted(const hsep_residual_model *self)
-{
-    return self->trusted ? (const hsep_trusted *)hsep_at_const(self, self->trusted) : NULL;
-}
-
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
@@ -147,12 +142,10 @@ HSEP_API void hsep_residual_predict(
     }
 }
 
-HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals)
+HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self)
 {
     hsep_trusted *trusted = hsep_residual_trusted(self);
-    if (trusted != NULL) {
-        signals->variance = hsep_at(trusted, trusted->variance) + (trusted->n - self->n);
-    }
+    return trusted != NULL ? hsep_at(trusted, trusted->variance) + (trusted->n - self->n) : NULL;
 }
 
 HSEP_API void hsep_residual_take_in(
@@ -182,14 +175,13 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
     return self->learning != 0;
 }
 
-HSEP_API const hsep_real *hsep_residual_accepted(const hsep_residual_model *self)
+HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
 {
-    const hsep_trusted *trusted = residual_trusted(self);
-    return trusted != NULL ? hsep_at_const(trusted, trusted->accepted) : NULL;
+    hsep_trusted *trusted = hsep_residual_trusted(self);
+    return trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL;
 }
 
 HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self)
 {
-    const hsep_trusted *trusted = residual_trusted(self);
-    return trusted != NULL ? trusted->n_rejected : 0;
+    return self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->n_rejected : 0;
 }

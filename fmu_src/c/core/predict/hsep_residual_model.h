@@ -11,7 +11,6 @@
 
 #include "hsep_paper.h"
 #include "hsep_trusted.h"
-#include "hsep_uncertainty.h"
 
 typedef struct {
     hsep_word Np, late, n; /* samples of a window, those not measured yet before it, both together */
@@ -68,8 +67,8 @@ HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self);
 HSEP_API void hsep_residual_predict(
     hsep_residual_model *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
 
-/* Add to the signals of a prediction's errors what the model itself tells. */
-HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals);
+/* What the model knows of the errors of a predicted window, (n,) m2, newest first; NULL: nothing. */
+HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self);
 
 /* Take in a sample of the window. */
 HSEP_API void hsep_residual_take_in(
@@ -80,7 +79,7 @@ HSEP_API void hsep_residual_take_in(
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window);
 
 /* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
-HSEP_API const hsep_real *hsep_residual_accepted(const hsep_residual_model *self);
+HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self);
 
 /* Measurements of this run that were missing or not plausible. */
 HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self);

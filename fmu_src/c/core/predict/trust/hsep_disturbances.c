@@ -6,17 +6,6 @@
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
-#define DISTURBANCES_SPREAD_2 (HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
-#define DISTURBANCES_SPREAD_4 (DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
-
-/* Velocities of the friction's change of sign, relative to the velocity scale. */
-static const hsep_real disturbances_spread[HSEP_DISTURBANCES_N_FRICTION] = {
-    HSEP_TRUST_FRICTION_LEAST, HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO,
-    DISTURBANCES_SPREAD_2,     DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO,
-    DISTURBANCES_SPREAD_4,     DISTURBANCES_SPREAD_4 * HSEP_TRUST_FRICTION_RATIO};
-
-static const hsep_real disturbances_turn = 6.283185307179586; /* rad */
-
 HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters)
 {
     return parameters->trust->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_DISTURBANCES_N_LASTING;
@@ -163,10 +152,13 @@ static void disturbances_differences(const hsep_disturbances *self, const hsep_r
     }
 }
 
-/* Velocity of the change of sign of friction i, m/s. */
-static hsep_real disturbances_sign_velocity(hsep_real velocity_scale, hsep_word i)
+HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_word i)
 {
-    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * disturbances_spread[i];
+    hsep_real spread = HSEP_TRUST_FRICTION_LEAST;
+    for (; i > 0; i--) {
+        spread *= HSEP_TRUST_FRICTION_RATIO;
+    }
+    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * spread;
 }
 
 /* Friction of n samples of the velocity v_d, m/s, into the rows. */
@@ -178,7 +170,7 @@ static void disturbances_friction(
         const hsep_word left = HSEP_DISTURBANCES_N_FRICTION - first;
         const hsep_word count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
         for (hsep_word i = 0; i < count; i++) {
-            const hsep_real spread = disturbances_sign_velocity(velocity_scale, first + i);
+            const hsep_real spread = hsep_disturbances_sign_velocity(velocity_scale, first + i);
             for (hsep_word k = 0; k < n; k++) {
                 u[HSEP_PHYSICS_ABREAST * k + i] = hsep_tanh(v_d[k] / spread);
             }
@@ -213,8 +205,7 @@ HSEP_API void hsep_disturbances_command(
     }
 }
 
-/* Velocity of the damping at place j of n samples, m/s. */
-static hsep_real disturbances_velocity(
+HSEP_API hsep_real hsep_disturbances_damped_velocity(
     const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word j)
 {
     const int is_first = j + 1 == n;
@@ -225,17 +216,16 @@ static hsep_real disturbances_velocity(
     return step / self->T_s;
 }
 
-/* Angle within the period at a position relative to the start, rad; 0 without a period. */
-static hsep_real disturbances_angle(const hsep_disturbances *self, hsep_real x)
+HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x)
 {
-    return self->period > 0.0 ? disturbances_turn / self->period * (self->origin + x) : 0.0;
+    return self->period > 0.0 ? HSEP_TWO_PI / self->period * (self->origin + x) : 0.0;
 }
 
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
     hsep_real rows[])
 {
-    const hsep_real s = hsep_sin(disturbances_angle(self, 0.0)), c = hsep_cos(disturbances_angle(self, 0.0));
+    const hsep_real s = hsep_sin(hsep_disturbances_angle(self, 0.0)), c = hsep_cos(hsep_disturbances_angle(self, 0.0));
     hsep_real disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER] = {0.0};
     if (first == 0) {
         disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
@@ -246,11 +236,11 @@ HSEP_API void hsep_disturbances_motion(
         for (hsep_word k = 0; k < count; k++) {
             hsep_real *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
             j--;
-            const hsep_real v = disturbances_velocity(self, x_pb, x, n, j);
+            const hsep_real v = hsep_disturbances_damped_velocity(self, x_pb, x, n, j);
             *of_sample++ = x[j] * hsep_fabs(x[j]);
             *of_sample++ = v * hsep_fabs(v);
             if (self->count > HSEP_DISTURBANCES_N_LASTING) {
-                const hsep_real angle = disturbances_angle(self, x[j]);
+                const hsep_real angle = hsep_disturbances_angle(self, x[j]);
                 *of_sample++ = hsep_sin(angle) - s;
                 *of_sample = hsep_cos(angle) - c;
             }
@@ -267,32 +257,4 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
         disturbances_filter(self, 0), disturbances_tried(self, 0),
         (size_t)(self->count * self->filter_words) * sizeof(hsep_real));
     self->before = self->after;
-}
-
-HSEP_API void hsep_disturbances_slopes(
-    const hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real x[], hsep_word n,
-    hsep_real velocity_scale, hsep_real reach, hsep_real slopes[])
-{
-    const hsep_real half = reach * velocity_scale;
-    hsep_real last = self->before.x_d;
-    for (hsep_word j = n; j-- > 0; slopes += self->count) {
-        const hsep_real v_d = (x_d[j] - last) / self->T_s;
-        last = x_d[j];
-        for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
-            const hsep_real spread = disturbances_sign_velocity(velocity_scale, i);
-            if (half > 0.0) {
-                slopes[i] = (hsep_tanh((v_d + half) / spread) - hsep_tanh((v_d - half) / spread)) / (2.0 * half);
-            } else {
-                const hsep_real sign = hsep_tanh(v_d / spread);
-                slopes[i] = (1.0 - sign * sign) / spread;
-            }
-        }
-        slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * hsep_fabs(x[j]);
-        slopes[HSEP_DISTURBANCES_DAMPING] = 2.0 * hsep_fabs(disturbances_velocity(self, x_pb, x, n, j));
-        if (self->count > HSEP_DISTURBANCES_N_LASTING) {
-            const hsep_real angle = disturbances_angle(self, x[j]), turns = disturbances_turn / self->period;
-            slopes[HSEP_DISTURBANCES_N_LASTING] = turns * hsep_cos(angle);
-            slopes[HSEP_DISTURBANCES_N_LASTING + 1] = -turns * hsep_sin(angle);
-        }
-    }
 }

@@ -87,12 +87,11 @@ HSEP_API void hsep_disturbances_motion(
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
-/* Slopes of the disturbances at these samples, (n, self->count), sample after sample: of each friction with the
- * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s, and of what
- * repeats with the position, 1/m. reach: half of the change of velocity that the friction's slope is taken over,
- * relative to the velocity scale; 0: the tangent. */
-HSEP_API void hsep_disturbances_slopes(
-    const hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real x[], hsep_word n,
-    hsep_real velocity_scale, hsep_real reach, hsep_real slopes[]);
+/* Velocity of the change of sign of friction i, m/s; velocity of the damping at place j of n samples, m/s; angle within
+ * the period at a position, rad, 0 without a period. */
+HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_word i);
+HSEP_API hsep_real hsep_disturbances_damped_velocity(
+    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word j);
+HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);
 
 #endif

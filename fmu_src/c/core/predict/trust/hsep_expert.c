@@ -62,12 +62,6 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
     return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape));
 }
 
-HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j)
-{
-    const hsep_real unshrunk = hsep_at_const(self, self->unshrunk)[j];
-    return unshrunk == 0.0 ? hsep_at_const(self, self->kept)[j] : hsep_at_const(self, self->e_h)[j] / unshrunk;
-}
-
 HSEP_API void hsep_expert_solve(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
     const hsep_real scales[], hsep_real first, hsep_real least)

@@ -99,7 +99,4 @@ HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
     hsep_real given);
 
-/* What shrinking and bounds leave of the recursion at place j. */
-HSEP_API hsep_real hsep_expert_shrink(const hsep_expert *self, hsep_word j);
-
 #endif

@@ -7,8 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real start_two_pi = 6.283185307179586;
-
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
 {
@@ -45,7 +43,7 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *
     for (hsep_word i = 0; i < parameters->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = v t has the solution omega^2 z = v t - 2 zeta v / omega, in the state
          * (omega^2 z, omega z'). */
-        const hsep_real omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / settings->T_s;
+        const hsep_real omega = HSEP_TWO_PI * parameters->modes[i].f_n, v = 1.0 / settings->T_s;
         states[2 * i] = -late - 2.0 * parameters->modes[i].zeta * v / omega;
         states[2 * i + 1] = v / omega;
     }

@@ -62,7 +62,6 @@ typedef struct {
     hsep_real n_accepted; /* samples that are */
     /* Offsets in words from the beginning of the struct */
     hsep_word forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
-    hsep_word scales;           /* (max(n_static, p of the command + 2),) prior standard deviations of weights, work */
     hsep_word x;                /* (n,) m, position */
     hsep_word measured;         /* (Np,) m, measured position, NaN where missing */
     hsep_word accepted;         /* (Np,) whether it is believed */
@@ -81,7 +80,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    32 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    31 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);

@@ -56,7 +56,7 @@ static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
     const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
     hsep_expert *expert = hsep_trusted_expert(self, place);
-    hsep_real *scales = hsep_at(self, self->scales);
+    hsep_real scales[HSEP_TRUST_LAGS_OF_COMMAND + 2];
     for (hsep_word i = 0; i < expert->n_static; i++) {
         const int of_command = kind == HSEP_OF_COMMAND;
         const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];

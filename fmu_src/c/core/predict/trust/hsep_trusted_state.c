@@ -57,7 +57,6 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     const hsep_real n_static = (hsep_real)self->n_static;
     self->largest = hsep_take(&end, n_static); /* behind what else is learned */
     self->forecast_largest = hsep_take(&end, n_static);
-    self->scales = hsep_take(&end, hsep_fmax(n_static, p_of_command + 2.0));
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
