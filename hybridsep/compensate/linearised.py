@@ -12,18 +12,67 @@ expert that doubts earlier runs, D, counts as the one of these whose counterpart
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..predict.residual_window import ResidualWindow
-from ..predict.trust.disturbances import DisturbanceSlopes
-from ..predict.trust.expert import SolvedExpert
+from ..predict.trust.disturbances import N_FRICTION, N_LASTING, StaticFeatures, StaticState
+from ..predict.trust.expert import ExpertPrediction, SolvedExpert
 from ..predict.trust.forecast import TrustedForecast, forecast_by, scales_of, solved
 from ..predict.trust.stack import STATIC
 from ..predict.trust.state import OF_COMMAND, TrustedModel
 
 __all__ = ["PlanModel"]
+
+_OWN_REACH = 1e-3
+"""Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
+the friction's is the tangent."""
+
+
+class DisturbanceSlopes(NamedTuple):
+    """Slopes of the disturbances at given commands.
+
+    Attributes
+    ----------
+    friction : (n, 6) array, s/m
+        Of each friction with the commanded velocity.
+    stiffness, damping : (n,) array, m and m/s
+        Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
+    of_position : (n, n_disturbances − 8) array, 1/m
+        Of all others with ``x``.
+    of_velocity : (n, n_own) array, s/m
+        Of the user's own, the last ones, with the commanded velocity.
+    """
+
+    friction: Array
+    stiffness: Array
+    damping: Array
+    of_position: Array
+    of_velocity: Array
+
+    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
+        """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
+
+        Parameters
+        ----------
+        weights : (n_disturbances,) array
+        velocity : (n, m) array, m/s
+            Changes of the commanded velocity, each a column.
+        moved, moved_velocity : (n, m) array, m and m/s
+            Changes of the position, and of its velocity.
+        """
+        of_position = weights[N_FRICTION] * self.stiffness + self.of_position @ weights[N_LASTING:]
+        of_velocity = self.friction @ weights[:N_FRICTION]
+        if n_own := self.of_velocity.shape[1]:
+            of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
+        return np.asarray(
+            of_velocity[:, None] * velocity
+            + of_position[:, None] * moved
+            + (weights[N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
+        )
 
 
 class PlanModel:
@@ -86,16 +135,16 @@ class PlanModel:
         passed : (n, m) array
             The changes filtered by ``G_pb``.
         reach : float
-            Of the friction's slope, as that of :meth:`StaticFeatures.slopes`.
+            Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale.
         """
         n_late, weights = len(self._late), self._model.learned.stack.weights.tolist()
-        over_all = self._static.slopes(self._model.run.static, at.window, at.x, self.scales.velocity, reach)
+        over_all = slopes_of(self._static, self._model.run.static, at.window, at.x, self.scales.velocity, reach)
         slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
         total: Array = passed.copy()
         for expert, one in self._solved.items():
             if weights[expert] == 0.0:
                 continue
-            kept = weights[expert] * at.predictions[expert].shrink[n_late:, None]
+            kept = weights[expert] * _left(at.predictions[expert])[n_late:, None]
             if self._model.kind_of(expert) == OF_COMMAND:
                 acted = self._late_changes(changes)
                 total += kept * self._of_command(one, acted) + weights[expert] * (acted - passed)
@@ -119,7 +168,8 @@ class PlanModel:
         discrete = self._discrete
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
-        linear, own, differences = self._static.split(solved.solution.weights[: solved.n_static])
+        weights, first = solved.solution.weights[: solved.n_static], 2 + self._static.n_differences
+        linear, own, differences = np.split(weights[1:], [first - 1, first - 1 + self._static.n_disturbances])
         disturbance = slopes.change(own, velocity, passed, moved)
         disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
@@ -135,3 +185,44 @@ def _recur(solved: SolvedExpert, drive: Array) -> Array:
     if not len(solved.lag_weights):
         return drive
     return np.asarray(lfilter([1.0], np.concatenate(([1.0], -solved.lag_weights)), drive, axis=0))
+
+
+def slopes_of(
+    static: StaticFeatures, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float, reach: float
+) -> DisturbanceSlopes:
+    """Return the slopes of the disturbances of a window; other parameters as those of :meth:`StaticFeatures.rows`.
+
+    Parameters
+    ----------
+    reach : float
+        Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
+        0: the tangent.
+    """
+    x_d, x_pb, start = window
+    v_d, spread = static.velocity(state, x_d), static.spread(velocity_scale)
+    v, half = v_d[:, None], reach * velocity_scale
+    if half > 0.0:
+        friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
+    else:
+        friction = (1.0 - np.tanh(v / spread) ** 2) / spread
+    of_position = []
+    if static.period > 0.0:
+        angle, turns = static.angle(start + x), 2.0 * np.pi / static.period
+        of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
+    of_velocity = np.empty((len(x), 0))
+    if static.own:
+        step, half = velocity_scale * static.discrete.T_s, half or _OWN_REACH * velocity_scale
+        of_position.append(
+            (static.own_at(start + (x + step), v_d) - static.own_at(start + (x - step), v_d)) / (2.0 * step)
+        )
+        of_velocity = (static.own_at(start + x, v_d + half) - static.own_at(start + x, v_d - half)) / (2.0 * half)
+    damping = 2.0 * np.abs(static.damped_velocity(state, x_pb, x))
+    return DisturbanceSlopes(
+        friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
+    )
+
+
+def _left(prediction: ExpertPrediction) -> Array:
+    """Return what shrinking and bounds leave of a prediction, ``(n,)``."""
+    unshrunk = prediction.unshrunk
+    return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.kept.copy(), where=unshrunk != 0.0))

@@ -54,15 +54,7 @@ def restart(state: ResidualModel) -> ResidualModel:
 
 
 def forecast(state: ResidualModel, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
-    """Predict the residual over the next window.
-
-    Parameters
-    ----------
-    state : PaperModel or TrustedModel
-    window : ResidualWindow
-    scales : FeatureScales, optional
-        With trust: scales of the features over a preview; those of the window if left out.
-    """
+    """Predict the residual over the next window; with trust a compensator gives the ``scales`` of its preview."""
     if isinstance(state, TrustedModel):
         return trust_forecast.forecast(state, window, scales)
     return paper.forecast(state, window)
@@ -71,17 +63,9 @@ def forecast(state: ResidualModel, window: ResidualWindow, scales: FeatureScales
 def learn(
     state: ResidualModel, forecast: Forecast, x: Array, *, fold: bool = True
 ) -> tuple[ResidualModel, NDArray[np.bool_]]:
-    """Return the model that has learned from the measurement of a window, and which samples it accepted, ``(m,)`` bool.
+    """Return the model that has learned from a window measured at ``x``, and which samples it accepted, ``(m,)`` bool.
 
-    Parameters
-    ----------
-    state : PaperModel or TrustedModel
-    forecast : Forecast
-        Of that state.
-    x : (m,) array, m
-        Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
-    fold : bool
-        Whether they are learned; the next window starts from them in any case.
+    Positions, m, are relative to the start, NaN where missing; if not ``fold``, the next window but starts from them.
     """
     if isinstance(state, TrustedModel):
         assert isinstance(forecast, trust_forecast.TrustedForecast)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,13 +22,13 @@ from ...model.discrete import DiscreteModel
 from ..residual_window import ResidualWindow
 from .constants import CONSTANTS
 
-__all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
+__all__ = ["LEAST_VELOCITY", "N_FRICTION", "N_LASTING", "Disturbance", "StaticFeatures", "StaticState"]
 
 Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
-_N_FRICTION, _N_LASTING, _N_PERIODIC = 6, 8, 2
+N_FRICTION, N_LASTING, N_PERIODIC = 6, 8, 2
 """Disturbances by friction, with stiffness and damping, and those that repeat with the position."""
 
 LEAST_VELOCITY = 1e-200
@@ -36,9 +36,6 @@ LEAST_VELOCITY = 1e-200
 
 _OWN_MAX = 1e100
 """Magnitude that a disturbance of the user's own must not exceed."""
-
-_OWN_REACH = 1e-3
-"""Change of velocity, relative to the velocity scale, that their slope is taken over where it is the tangent."""
 
 _DIFFERENCES = 3
 """Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
@@ -64,49 +61,6 @@ class StaticState:
     filtered: Array
     x_d: float
     x_pb: Array
-
-
-class DisturbanceSlopes(NamedTuple):
-    """Slopes of the disturbances at given commands.
-
-    Attributes
-    ----------
-    friction : (n, 6) array, s/m
-        Of each friction with the commanded velocity.
-    stiffness, damping : (n,) array, m and m/s
-        Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
-    of_position : (n, n_disturbances − 8) array, 1/m
-        Of all others with ``x``.
-    of_velocity : (n, n_own) array, s/m
-        Of the user's own, the last ones, with the commanded velocity.
-    """
-
-    friction: Array
-    stiffness: Array
-    damping: Array
-    of_position: Array
-    of_velocity: Array
-
-    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
-        """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
-
-        Parameters
-        ----------
-        weights : (n_disturbances,) array
-        velocity : (n, m) array, m/s
-            Changes of the commanded velocity, each a column.
-        moved, moved_velocity : (n, m) array, m and m/s
-            Changes of the position, and of its velocity.
-        """
-        of_position = weights[_N_FRICTION] * self.stiffness + self.of_position @ weights[_N_LASTING:]
-        of_velocity = self.friction @ weights[:_N_FRICTION]
-        if n_own := self.of_velocity.shape[1]:
-            of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
-        return np.asarray(
-            of_velocity[:, None] * velocity
-            + of_position[:, None] * moved
-            + (weights[_N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
-        )
 
 
 @dataclass(frozen=True)
@@ -142,7 +96,7 @@ class StaticFeatures:
     @property
     def n_disturbances(self) -> int:
         """Number of disturbances."""
-        return _N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
+        return N_LASTING + (N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
 
     @property
     def n(self) -> int:
@@ -187,19 +141,19 @@ class StaticFeatures:
             If a disturbance of the user's own does not return a finite number for each sample.
         """
         x_d, x_pb, start = window
-        first, v_d, v = 2 + self.n_differences, self._velocity(state, x_d), self._damped_velocity(state, x_pb, x)
+        first, v_d, v = 2 + self.n_differences, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
         past = np.concatenate((state.x_pb, x_pb))
         disturbances = np.empty((len(x_d), self.n_disturbances))
-        disturbances[:, :_N_FRICTION] = np.tanh(v_d[:, None] / self._spread(velocity_scale))
-        disturbances[:, _N_FRICTION] = x * np.abs(x)
-        disturbances[:, _N_FRICTION + 1] = v * np.abs(v)
+        disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
+        disturbances[:, N_FRICTION] = x * np.abs(x)
+        disturbances[:, N_FRICTION + 1] = v * np.abs(v)
         if self.period > 0.0:
-            angle, at_start = self._angle(start + x), self._angle(start + 0.0)
-            disturbances[:, _N_LASTING] = np.sin(angle) - np.sin(at_start)
-            disturbances[:, _N_LASTING + 1] = np.cos(angle) - np.cos(at_start)
+            angle, at_start = self.angle(start + x), self.angle(start + 0.0)
+            disturbances[:, N_LASTING] = np.sin(angle) - np.sin(at_start)
+            disturbances[:, N_LASTING + 1] = np.cos(angle) - np.cos(at_start)
         if self.own:
-            at_rest = self._own(np.full(1, start), np.zeros(1))
-            disturbances[:, -len(self.own) :] = self._own(start + x, v_d) - at_rest
+            at_rest = self.own_at(np.full(1, start), np.zeros(1))
+            disturbances[:, -len(self.own) :] = self.own_at(start + x, v_d) - at_rest
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
         rows = np.empty((len(x_d), self.n))
         rows[:, 0] = 1.0
@@ -209,39 +163,7 @@ class StaticFeatures:
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())
 
-    def slopes(
-        self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float, reach: float
-    ) -> DisturbanceSlopes:
-        """Return the slopes of the disturbances of a window; other parameters as those of :meth:`rows`.
-
-        Parameters
-        ----------
-        reach : float
-            Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
-            0: the tangent.
-        """
-        x_d, x_pb, start = window
-        v_d, spread = self._velocity(state, x_d), self._spread(velocity_scale)
-        v, half = v_d[:, None], reach * velocity_scale
-        if half > 0.0:
-            friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
-        else:
-            friction = (1.0 - np.tanh(v / spread) ** 2) / spread
-        of_position = []
-        if self.period > 0.0:
-            angle, turns = self._angle(start + x), 2.0 * np.pi / self.period
-            of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
-        of_velocity = np.empty((len(x), 0))
-        if self.own:
-            step, half = velocity_scale * self.discrete.T_s, half or _OWN_REACH * velocity_scale
-            of_position.append((self._own(start + (x + step), v_d) - self._own(start + (x - step), v_d)) / (2.0 * step))
-            of_velocity = (self._own(start + x, v_d + half) - self._own(start + x, v_d - half)) / (2.0 * half)
-        damping = 2.0 * np.abs(self._damped_velocity(state, x_pb, x))
-        return DisturbanceSlopes(
-            friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
-        )
-
-    def _own(self, x: Array, v: Array) -> Array:
+    def own_at(self, x: Array, v: Array) -> Array:
         """Return the disturbances of the user's own at positions, m, and velocities, m/s, ``(n, n_own)``."""
         found = np.empty((len(x), len(self.own)))
         for i, disturbance in enumerate(self.own):
@@ -257,15 +179,15 @@ class StaticFeatures:
             found[:, i] = values
         return found
 
-    def _angle(self, x: Array | float) -> Array:
+    def angle(self, x: Array | float) -> Array:
         """Return the angle within the period at a position, rad."""
         return np.asarray(2.0 * np.pi / self.period * x)
 
-    def _velocity(self, state: StaticState, x_d: Array) -> Array:
+    def velocity(self, state: StaticState, x_d: Array) -> Array:
         """Return the commanded velocity over a window, ``(n,)``, m/s."""
         return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
 
-    def _damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
+    def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
         v = np.diff(x_pb, prepend=state.x_pb[-1])
         if self.damping_of_motion:
@@ -273,13 +195,7 @@ class StaticFeatures:
             v = v + np.diff(e, prepend=e[:1])
         return np.asarray(v / self.discrete.T_s)
 
-    def split(self, weights: Array) -> tuple[Array, Array, Array]:
-        """Return the weights of ``x_pb`` and its differences, of the disturbances, and of their first differences."""
-        first = 2 + self.n_differences
-        second = first + self.n_disturbances
-        return weights[1:first], weights[first:second], weights[second:]
-
-    def _spread(self, velocity_scale: float) -> Array:
+    def spread(self, velocity_scale: float) -> Array:
         """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
-        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(_N_FRICTION)
+        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
         return np.asarray((velocity_scale or 1.0) * spread)

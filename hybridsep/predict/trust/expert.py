@@ -76,11 +76,6 @@ class ExpertPrediction(NamedTuple):
     variance: Array
     noise_variance: float
 
-    @property
-    def shrink(self) -> Array:
-        """What shrinking and bounds leave of ``unshrunk``, ``(n,)``."""
-        return np.asarray(np.divide(self.e_h, self.unshrunk, out=self.kept.copy(), where=self.unshrunk != 0.0))
-
 
 @dataclass(frozen=True)
 class ExpertErrors:

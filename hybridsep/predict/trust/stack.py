@@ -20,9 +20,6 @@ the one of these with lags that led, with little weight of earlier runs."""
 N_EXPERTS = 5
 """All of them."""
 
-_FIRST = np.array([0.0, CONSTANTS.first_lagged, CONSTANTS.first_static, 0.0, 0.0])
-"""Weights ``π₀`` without evidence."""
-
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
 
@@ -52,7 +49,7 @@ class Stack:
     @classmethod
     def init(cls) -> Stack:
         """Return the stack without evidence."""
-        return cls(_FIRST, np.zeros((N_EXPERTS, N_EXPERTS)), np.zeros(N_EXPERTS), np.zeros(2))
+        return cls(_first_weights(), np.zeros((N_EXPERTS, N_EXPERTS)), np.zeros(N_EXPERTS), np.zeros(2))
 
     @property
     def leader(self) -> int:
@@ -78,7 +75,7 @@ class Stack:
         errors = total - 2.0 * cross + np.diag(gram)
         best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
         ridge = CONSTANTS.kappa * best * n
-        weights = simplex_minimum(gram + ridge * np.eye(N_EXPERTS), cross + ridge * _FIRST)
+        weights = simplex_minimum(gram + ridge * np.eye(N_EXPERTS), cross + ridge * _first_weights())
         return Stack(weights, gram, cross, evidence)
 
     def copy(self, expert: int, to: int) -> Stack:
@@ -92,6 +89,11 @@ class Stack:
         others = np.arange(len(self.weights)) != expert
         gram = np.where(others[:, None] & others, self.gram, 0.0)
         return Stack(np.where(others, self.weights, 0.0), gram, np.where(others, self.cross, 0.0), self.evidence)
+
+
+def _first_weights() -> Array:
+    """Return the weights without evidence, ``π₀``."""
+    return np.array([0.0, CONSTANTS.first_lagged, CONSTANTS.first_static, 0.0, 0.0])
 
 
 def simplex_minimum(hessian: Array, linear: Array) -> Array:

@@ -47,13 +47,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_linearised, 19);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters);
-
-/* Fill the block. */
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters);
-
-/* Whether a block, in any alignment, is one that hsep_linearised_init with these parameters began. */
 HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* A change of the commands that begins at sample 0 of the preview. */

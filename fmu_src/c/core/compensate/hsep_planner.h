@@ -38,16 +38,13 @@ typedef enum {
     HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns 1 */
 } hsep_plan_status;
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
-
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
 /* Splines that a bounded plan leaves as they are. */
 HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
-/* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
 /* Another largest |delta| from the next plan on, m; where the rest of the last plan is larger, that bounds it. */

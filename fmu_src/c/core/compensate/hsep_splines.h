@@ -32,7 +32,6 @@ HSEP_API hsep_word hsep_splines_count(hsep_word preview, hsep_word spacing);
 
 /* Bytes of the block, counted as a number. */
 HSEP_API hsep_real hsep_splines_size(hsep_word preview, hsep_word spacing);
-
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 HSEP_API void hsep_splines_init(
     hsep_splines *self, hsep_word preview, hsep_word spacing, const hsep_real limit[HSEP_ORDERS]);
@@ -40,7 +39,6 @@ HSEP_API void hsep_splines_init(
 /* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
 HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit);
 
-/* Whether a block, in any alignment, is one that hsep_splines_init with these parameters began. */
 HSEP_API int hsep_splines_valid(const void *block, hsep_word preview, hsep_word spacing);
 
 /* What the first count splines give at sample k, with coefficients c, (count,), those of the splines -3, -2, -1 first.

@@ -96,8 +96,6 @@ hsep_trusted_planner_size(const hsep_residual_parameters *parameters, const hsep
 HSEP_API void hsep_trusted_planner_init(
     hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start);
-
-/* Whether a block, in any alignment, is one that hsep_trusted_planner_init with these parameters began. */
 HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 

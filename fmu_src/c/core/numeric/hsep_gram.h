@@ -45,11 +45,8 @@ HSEP_ASSERT_WORDS(hsep_gram, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
 HSEP_API hsep_real hsep_gram_size(hsep_word n);
-
 /* Fill the block for n >= 1 features, without rows. */
 HSEP_API void hsep_gram_init(hsep_gram *self, hsep_word n);
-
-/* Whether a block, in any alignment, is one that hsep_gram_init with n features began. */
 HSEP_API int hsep_gram_valid(const void *block, hsep_word n);
 
 /* Where the next row goes, (n + 1,): phi, then its target; what is there before does not matter. */

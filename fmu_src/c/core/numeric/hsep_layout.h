@@ -3,6 +3,10 @@
  * One function of a block walks its arrays with a cursor, the end of what is taken so far in words: the offsets and
  * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of
  * one size alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
+ *
+ * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, hsep_NAME_init fills it
+ * with nothing learned, and hsep_NAME_valid tells whether a block, in any alignment, is one that init with the same
+ * parameters began. All functions of a block are reentrant and allocate nothing.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H

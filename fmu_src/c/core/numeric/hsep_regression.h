@@ -33,12 +33,9 @@ HSEP_ASSERT_WORDS(hsep_regression, 7);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
 HSEP_API hsep_real hsep_regression_size(hsep_word n);
-
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
 HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real lambda);
-
-/* Whether a block, in any alignment, is one that hsep_regression_init with n features began. */
 HSEP_API int hsep_regression_valid(const void *block, hsep_word n);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */

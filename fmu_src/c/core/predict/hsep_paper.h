@@ -1,10 +1,9 @@
-/* The paper's residual model: a ridge regression of e_pb on the features phi, eqs. (4) to (6).
+/* The paper's residual model: a ridge regression of e_pb on the features phi, eqs. (4) to (6); as predict/paper.py.
  *
  *   phi(k) = [1 | x_pb(k) ... x_pb(k-q) | e_pb(k-1) ... e_pb(k-p)]
  *
- * Signals are kept newest first: sample k of n is at place n - 1 - k, its lag i at i places further.
- * Every sample is a row, folded when it is measured. Memory is one block: the struct, then its arrays of numbers; no
- * pointers. Reentrant; allocates nothing.
+ * Signals are kept newest first: sample k of n is at place n - 1 - k, its lag i at i places further. Every sample is a
+ * row, folded when it is measured. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_PAPER_H
 #define HSEP_PAPER_H
@@ -31,13 +30,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_paper, 6);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
-
-/* Fill the block with nothing learned. */
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
-
-/* Whether a block, in any alignment, is one that hsep_paper_init with these settings began. */
 HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *settings);
 
 HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);

@@ -1,7 +1,6 @@
-/* Discrete-time physics-based model G_pb under a zero- or first-order hold; eqs. (2) and (15).
+/* Discrete-time physics-based model G_pb under a zero- or first-order hold, eqs. (2) and (15); as model/discrete.py.
  *
- * Memory is one block: the struct, then its arrays of numbers. No pointers, so a copy of the block is the state.
- * Reentrant; allocates nothing; nothing here can fail once the parameters are in range.
+ * A block as hsep_layout.h has them. Nothing here can fail once the parameters are in range.
  */
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
@@ -38,14 +37,10 @@ HSEP_ASSERT_WORDS(hsep_physics, 5);
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times T_s. */
 HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time);
-
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold);
-
-/* Whether a block, in any alignment, is one that hsep_physics_init with these parameters began. */
 HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time);
 
 /* Begin with a state: (2 n_modes + dead_time,), m, of the modes, then the commands within the dead time, oldest first;

@@ -1,10 +1,9 @@
-/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the one that can be trusted (hsep_trusted.h).
+/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the one that can be trusted (hsep_trusted.h); as
+ * predict/residual_model.py.
  *
- * What differs between the two is decided here, and nowhere else in a predictor: the block holds one of them, and each
- * function calls its counterpart. Per window these follow: hsep_residual_begin, _predict until all samples are
- * predicted, _take_in at each sample, _finish. A compensator plans with what hsep_residual_paper or _trusted gives.
- *
- * Memory is one block: the struct, then the model; no pointers. Reentrant; allocates nothing.
+ * The block holds one of them, and each function calls its counterpart. For a window: hsep_residual_begin; _predict,
+ * which may go on in parts while _take_in takes its samples; _finish. A compensator plans with what hsep_residual_paper
+ * or _trusted gives. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_RESIDUAL_MODEL_H
 #define HSEP_RESIDUAL_MODEL_H
@@ -22,14 +21,10 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters);
-
 /* Fill the block, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_residual_init(
     hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
-
-/* Whether a block, in any alignment, is one that hsep_residual_init with these parameters began. */
 HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* The implementation; NULL if it is the other one. */

@@ -1,14 +1,8 @@
-/* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
- *
- * The variance of a sample is a sum of three components, v = sum_i theta_i f_i, of what errors come with: measurement
- * noise; timing, the squared difference of x_pb; and what the residual model knows of itself, the variance of the
- * mixture of its experts. The last two follow their cause with a delay: they are averaged over the samples before, from
- * the last measured one on. The standard deviation is c sqrt(v). After each window theta takes a step of expectation
- * maximisation for normal errors of that variance, and c, which changes exponentially from the beginning to the end of
- * a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together.
+/* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows; as
+ * predict/uncertainty.py, which says how and why.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
- * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
+ * learned. A block as hsep_layout.h has them. Cost of a window: 50 n operations each.
  */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
@@ -38,7 +32,6 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n);
 
 /* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
@@ -47,8 +40,6 @@ HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real n
 
 /* Fill the block. variance: that first one. */
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_word n, hsep_real variance);
-
-/* Whether a block, in any alignment, is one that hsep_uncertainty_init with these parameters began. */
 HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n);
 
 /* Whether the numbers learned, (HSEP_N_UNCERTAINTY,) from theta on, are in range. */

@@ -1,10 +1,7 @@
-/* Features of the expert without a physics model: eq. (4) with G_pb = 1.
+/* Features of the expert without a physics model, eq. (4) with G_pb = 1; as predict/trust/command.py.
  *
- * The residual is that of the command itself, e_0(k) = x(k) - x_d(k - d) with the dead time d; its features are 1 and
- * the increments x_d(k-d-j) - x_d(k-d-j-1), j = 0 ... p, beside p lags of it.
- *
- * Positions are relative to the start. Of m samples that come next, sample k is at place m - 1 - k: newest first.
- * Memory is one block, without pointers. Reentrant; allocates nothing.
+ * Positions are relative to the start. Of m samples that come next, sample k is at place m - 1 - k: newest first. A
+ * block as hsep_layout.h has them.
  */
 #ifndef HSEP_COMMAND_H
 #define HSEP_COMMAND_H
@@ -29,13 +26,9 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_command, 8);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters);
-
 /* Fill the block, at rest. */
 HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters);
-
-/* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
 HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */

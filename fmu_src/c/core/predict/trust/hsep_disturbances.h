@@ -1,12 +1,9 @@
-/* Features without lags: the physics-based prediction, and disturbances filtered by the physics model.
+/* Features without lags: the physics-based prediction, and disturbances filtered by the physics model; as
+ * predict/trust/disturbances.py, which says why.
  *
- * What the physics model misses acts where the command does, so e_pb = G_pb d(x, v). A feature is G_pb applied to a
- * candidate disturbance d: friction tanh(v / v_i) over a spread of velocities v_i, stiffness x |x| and damping v |v|;
- * where a period is given, sine and cosine of the position over it, as of cogging or a screw's pitch.
- * A row is [1 | x_pb and its differences | filtered disturbances | their first differences].
- *
- * Positions are relative to the start. Of n samples, sample k is at place n - 1 - k: newest first, as their past is
- * behind them. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * A row is [1 | x_pb and its differences | filtered disturbances | their first differences]. Positions are relative to
+ * the start. Of n samples, sample k is at place n - 1 - k: newest first, as their past is behind them. A block as
+ * hsep_layout.h has them.
  */
 #ifndef HSEP_DISTURBANCES_H
 #define HSEP_DISTURBANCES_H
@@ -54,14 +51,10 @@ HSEP_API hsep_word hsep_disturbances_n(const hsep_residual_parameters *parameter
 /* Effect that a feature may have, relative to the largest. */
 HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters);
-
 /* Fill the block, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
-
-/* Whether a block, in any alignment, is one that hsep_disturbances_init with these parameters began. */
 HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Begin again, at rest but for a motion that went on as the n samples begin, (n,) m each. */

@@ -1,7 +1,5 @@
-/* Rows that experts have learned: of this run and, as long as they are doubted, of earlier ones apart.
- *
- * Memory is one block, without pointers. Reentrant; allocates nothing.
- */
+/* Rows that experts have learned: of this run and, as long as they are doubted, of earlier ones apart; as
+ * predict/trust/evidence.py. A block as hsep_layout.h has them. */
 #ifndef HSEP_EVIDENCE_H
 #define HSEP_EVIDENCE_H
 
@@ -15,11 +13,7 @@ HSEP_ASSERT_WORDS(hsep_evidence, 2);
 
 /* Bytes of the block, counted as a number so that no size can overflow; n: features. */
 HSEP_API hsep_real hsep_evidence_size(hsep_word n);
-
-/* Fill the block, without rows. */
 HSEP_API void hsep_evidence_init(hsep_evidence *self, hsep_word n);
-
-/* Whether a block, in any alignment, is one that hsep_evidence_init with n features began. */
 HSEP_API int hsep_evidence_valid(const void *block, hsep_word n);
 
 static inline hsep_gram *hsep_evidence_of_run(hsep_evidence *self) { return (hsep_gram *)hsep_at(self, self->of_run); }

@@ -1,12 +1,8 @@
 /* Expert of the residual: a regression on static features and lags with normal priors, trusted as far as its own
- * variance allows.
- *
- * Weights have normal priors, so the variance of w' phi is known; it is carried through the recursion's impulse
- * response. A prediction of variance tau^2 is shrunk by v / (v + tau^2), v being the largest mean square of a window:
- * at a first motion, a first reversal or in a region not seen yet the physics model remains.
+ * variance allows; as predict/trust/expert.py, which says how.
  *
  * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
- * them are the window, which is measured then. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * them are the window, which is measured then. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_EXPERT_H
 #define HSEP_EXPERT_H
@@ -63,13 +59,8 @@ HSEP_ASSERT_WORDS(hsep_expert, 20);
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
-
-/* Fill the block, with nothing learned. */
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
-
-/* Whether a block, in any alignment, is one that hsep_expert_init with this shape began. */
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
 
 /* Solve for the weights from all rows, those of earlier runs weighed by weight. scales: (n_static,) prior standard

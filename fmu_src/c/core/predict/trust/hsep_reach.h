@@ -1,12 +1,5 @@
-/* Reach: a measurement is believed, unless the axis cannot have got there.
- *
- * The residual of an axis grows from sample to sample by no more than the axis and its model move. A value whose
- * residual is beyond twice the largest so far, by more than a few of the fastest steps of the model, is missing. So are
- * the values after it, until as many within reach have followed as there were beyond it: an axis passes by the zero
- * that its sensor reads. After a second the axis has been moved, or its sensor set, and the value is believed.
- *
- * Plain data; reentrant; allocates nothing.
- */
+/* Reach: a measurement is believed, unless the axis cannot have got there; as predict/trust/reach.py, which says when.
+ * Plain data; reentrant; allocates nothing. */
 #ifndef HSEP_REACH_H
 #define HSEP_REACH_H
 

@@ -1,8 +1,5 @@
-/* Stack of experts: the convex sum of their predictions that would have erred least so far.
- *
- * pi = argmin |e - F pi|^2 + kappa s^2 n |pi - pi_0|^2 over the windows so far, pi >= 0, sum pi <= 1, their evidence
- * fading by gamma a window, with the mean square s^2 of the best expert and n samples of a window: without evidence
- * pi = pi_0. The remainder of the weights is the prediction 0, the physics model's. Plain data; reentrant.
+/* Stack of experts: the convex sum of their predictions that would have erred least so far; as predict/trust/stack.py,
+ * which has the formula. The remainder of the weights is the prediction 0, the physics model's. Plain data; reentrant.
  */
 #ifndef HSEP_STACK_H
 #define HSEP_STACK_H

@@ -1,11 +1,6 @@
-/* Motion before a run, estimated from its first window.
+/* Motion before a run, estimated from its first window; as predict/trust/start.py, which says how.
  *
- * A run is taken to begin at rest. Where it was in motion, what the axis did before decays as a free response of G_pb;
- * its state follows from the residuals of the first window by least squares, near that of a motion at the first
- * commanded velocity. The residuals decide between this motion and rest.
- *
- * Positions are relative to the start, signals newest first. Memory is one block, without pointers. Reentrant;
- * allocates nothing.
+ * Positions are relative to the start, signals newest first. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_START_H
 #define HSEP_START_H
@@ -30,12 +25,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_start, 11);
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters);
-
 HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters);
-
-/* Whether a block, in any alignment, is one that hsep_start_init with these parameters began. */
 HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */

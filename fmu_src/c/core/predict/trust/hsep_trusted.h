@@ -1,16 +1,11 @@
-/* Residual model that can be trusted: the paper's regression twice, stacked with physics and hold.
- *
- * e_pb = x - x_pb of a window is predicted by physics (0), hold (the last residual), by static features with lags and
- * without, and by eq. (4) with G_pb = 1, on the residual of the command itself, which saves a user whose physics model
- * is poor. Their sum is weighted by their errors so far. Where the paper's regression has one bare penalty lambda on
- * every weight, here each weight has a prior from the effect that its feature may have, and lambda is the least
- * variance of the noise.
+/* Residual model that can be trusted: experts of e_pb, stacked with physics and hold; as predict/trust/state.py, which
+ * says what they are, forecast.py and learn.py.
  *
  * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. A compensator,
  * which decides the commands of a window, begins with the rest of its last plan, and calls hsep_trusted_predict for
  * other commands that it tries over its preview; the last ones count. Signals are kept newest first: of n samples,
- * sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative to the start. Memory
- * is one block, without pointers; a window predicted and not measured yet is part of it. Reentrant; allocates nothing.
+ * sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative to the start. A
+ * block as hsep_layout.h has them; a window predicted and not measured yet is part of it.
  */
 #ifndef HSEP_TRUSTED_H
 #define HSEP_TRUSTED_H
@@ -82,13 +77,9 @@ HSEP_ASSERT_WORDS(
     hsep_trusted,
     31 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
-
 /* Fill the block, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_residual_parameters *parameters, hsep_real start);
-
-/* Whether a block, in any alignment, is one that hsep_trusted_init with these parameters began. */
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Parts of the block; of the experts not hold. */
