@@ -28,8 +28,8 @@ from hybridsep.predict.trust import disturbances, expert, forecast, learn, stack
 from hybridsep.predict.trust.constants import CONSTANTS
 
 ROOT = Path(__file__).resolve().parent
-SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
-CONSTANTS_HEADER = SETTINGS_HEADER.with_name("hsep_predict_constants.h")
+SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_settings.h"
+CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_predict_constants.h"
 RANGES_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_ranges.h"
 
 DECLARED = {

@@ -121,7 +121,9 @@ def main() -> int:
     error = relative_error(predictor.weights, exact_weights(rows, predictor.settings.lam, repetitions))
     growth = memory[1] - memory[0]
 
-    table = Table(title=f"n = {predictor.n_features} features, a block of {BLOCK} samples {repetitions} times")
+    table = Table(
+        title=f"n = {predictor.regression.n_features} features, a block of {BLOCK} samples {repetitions} times"
+    )
     table.add_column("")
     table.add_column("seen", justify="right")
     table.add_column("limit", justify="right")

@@ -326,11 +326,6 @@ class HybridPredictor:
         return self.residual.regressions[0]
 
     @property
-    def n_features(self) -> int:
-        """Number of features ``n``."""
-        return self.regression.n_features
-
-    @property
     def weights(self) -> Array:
         """``w`` of eq. (6) from all learned samples, ``(n,)``."""
         return self.regression.weights
@@ -349,10 +344,6 @@ class HybridPredictor:
     def n_rejected(self) -> int:
         """Measurements of this run that were missing or not plausible; 0 without trust."""
         return self.residual.n_rejected
-
-    def last_accepted_residual(self) -> float:
-        """Return the residual ``e_pb``, m, that the next window starts from: with trust the last one accepted."""
-        return self.residual.last
 
     def _warm_up(self, n: int, *, late: int = 0) -> int:
         """Return how many of ``n`` samples, the next ones or from ``late`` samples before, are within the warm-up."""

@@ -1,7 +1,6 @@
 """Model of the residual ``e_pb = x − x_pb``: the paper's, or with trust the one that can be trusted.
 
-What differs between the two is decided here, and nowhere else in a predictor. A state is a record; each function
-returns another one.
+Each function calls its counterpart of the two. A state is a record; each function returns another one.
 """
 
 from __future__ import annotations

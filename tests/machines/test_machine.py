@@ -217,7 +217,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
     without = machine.new_compensator(predictor=replace(machine.compensator_predictor, trust=False))
-    assert without.predictor.n_features == 2 + 9 + 20
+    assert without.predictor.regression.n_features == 2 + 9 + 20
     assert machine.fmi_parameters()["Np"] == 50
 
 

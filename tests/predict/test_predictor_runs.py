@@ -43,7 +43,7 @@ def test_a_window_longer_than_a_batch_is_learned_whole() -> None:
     replay(parts, x_d[50:87], x[50:87])
     np.testing.assert_allclose(whole.weights, parts.weights, rtol=1e-9, atol=1e-9)
     assert whole.k == parts.k == 87
-    assert whole.last_accepted_residual() == pytest.approx(parts.last_accepted_residual(), abs=1e-16)
+    assert whole.residual.last == pytest.approx(parts.residual.last, abs=1e-16)
 
 
 def test_start_is_the_first_command_unless_given() -> None:
@@ -98,7 +98,7 @@ def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:
     predictor.predict(np.zeros(10))
     predictor.restart(0.5, t_init=0.013)
     np.testing.assert_array_equal(predictor.weights, weights)
-    assert (predictor.k, predictor.start, predictor.last_accepted_residual()) == (0, 0.5, 0.0)
+    assert (predictor.k, predictor.start, predictor.residual.last) == (0, 0.5, 0.0)
     with pytest.raises(SignalError, match=r"^update must follow predict"):
         predictor.update(np.zeros(10))
     np.testing.assert_array_equal(predictor.predict(np.full(20, 0.5)).active, np.arange(20) >= 13)
@@ -128,7 +128,7 @@ def test_the_last_accepted_residual_of_the_paper_s_model_is_what_was_measured_la
     x_d, x = small_signals(60)
     predicted = predictor.predict(x_d[50:])
     predictor.update(x[50:57])
-    assert predictor.last_accepted_residual() == pytest.approx(x[56] - predicted.x_pb[6], abs=1e-15)
+    assert predictor.residual.last == pytest.approx(x[56] - predicted.x_pb[6], abs=1e-15)
 
 
 def test_memory_does_not_grow() -> None:
@@ -144,7 +144,7 @@ def test_fmi_names() -> None:
     predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi({"trust": False, **parameters}), start=0.5)
     assert (predictor.settings.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
     assert (predictor.Np, predictor.settings.p, predictor.settings.q, predictor.start) == (8, 3, 1, 0.5)
-    assert predictor.n_features == len(predictor.weights) == 6
+    assert predictor.regression.n_features == len(predictor.weights) == 6
     with pytest.raises(ParameterError, match=r"^input_hold must be 0 … 1, got 2$"):
         HybridPredictor(MODEL, PredictorSettings.from_fmi({"input_hold": 2}))
 

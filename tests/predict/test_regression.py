@@ -182,5 +182,5 @@ def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, 
     e_pb = x - np.array(x_pb)
     rows = np.array([oracle.features(x_pb, e_pb.tolist(), k, p, q) for k in range(n)])
     exact = oracle.ridge_extended(rows, e_pb, lam)
-    assert predictor.n_features == rows.shape[1] == 2 + q + p
+    assert predictor.regression.n_features == rows.shape[1] == 2 + q + p
     assert relative_error(predictor.weights, exact) < tolerance

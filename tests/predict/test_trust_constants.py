@@ -28,7 +28,7 @@ PLAIN = {0.0, 0.5, 1.0, 2.0}
 LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor", "window"}
 """Constants are generated for C; its regression is below ``numeric``, its predictor below ``online``."""
 
-CORE_ALONE = {"predict_constants", "settings", "physics", "trusted"}
+CORE_ALONE = {"predict_constants", "physics", "trusted"}
 """Generated headers; the physics model, in the library below ``model``; the header of three files."""
 
 TRUSTED = {"state": "trusted_state", "forecast": "trusted_forecast", "learn": "trusted_learn"}

@@ -150,7 +150,7 @@ def test_the_last_accepted_residual_is_that_of_the_last_plausible_measurement() 
     x_d, x_pb, x = with_friction(150)
     predictor = trusted()
     run(predictor, x_d, x)
-    assert predictor.last_accepted_residual() == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
+    assert predictor.residual.last == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
 
 
 def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
@@ -162,7 +162,7 @@ def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
     predictor.update(x[200:], learn=False)
     np.testing.assert_array_equal(predictor.regression.factor, before)
     assert (predictor.regression.n_rows, predictor.k) == (n_rows, 300)
-    assert predictor.last_accepted_residual() == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
+    assert predictor.residual.last == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
 
 
 def test_what_is_held_is_bounded_by_what_was_learned() -> None:
@@ -246,5 +246,5 @@ def test_an_operator_is_refused() -> None:
 
 def test_features_are_those_of_the_model_with_trust() -> None:
     predictor = trusted(p=7, q=2)
-    assert predictor.n_features == len(predictor.weights) == 2 + 2 + 16 + 7
+    assert predictor.regression.n_features == len(predictor.weights) == 2 + 2 + 16 + 7
     assert predictor.T_s == TS

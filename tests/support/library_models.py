@@ -103,9 +103,9 @@ def runaway_predictor() -> HybridPredictor:
     """
     machine = paper_machine("spring_mass_damper")
     predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
-    weights = np.zeros(predictor.n_features)
+    weights = np.zeros(predictor.regression.n_features)
     weights[0], weights[2 + predictor.settings.q] = 1e-3, RUNAWAY
-    factor = np.asfortranarray(1e6 * np.eye(predictor.n_features + 1))
+    factor = np.asfortranarray(1e6 * np.eye(predictor.regression.n_features + 1))
     factor[:-1, -1] = factor[:-1, :-1] @ weights
     predictor.take_over((), predictor.state.uncertainty, (RidgeRegression(factor, 1000.0),))
     return predictor

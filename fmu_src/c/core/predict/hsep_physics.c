@@ -111,9 +111,8 @@ HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time)
 HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time)
 {
     hsep_physics got;
-    memcpy(&got, block, sizeof got);
-    (void)physics_lay_out(&got, n_modes, dead_time); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && (got.oldest == 0 || got.oldest < dead_time);
+    return HSEP_LAID_OUT(got, block, physics_lay_out(&got, n_modes, dead_time)) &&
+           (got.oldest == 0 || got.oldest < dead_time);
 }
 
 HSEP_API void hsep_physics_init(
@@ -129,14 +128,11 @@ HSEP_API void hsep_physics_init(
 
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])
 {
-    hsep_real *ring = hsep_at(self, self->ring);
     self->oldest = 0;
     for (hsep_word i = 0; i < 2 * self->n_modes; i++) {
-        physics_modes(self)[i / 2].s[i % 2] = state != NULL ? state[i] : 0.0;
+        physics_modes(self)[i / 2].s[i % 2] = state[i];
     }
-    for (hsep_word i = 0; i < self->dead_time; i++) {
-        ring[i] = state != NULL ? state[2 * self->n_modes + i] : 0.0;
-    }
+    memcpy(hsep_at(self, self->ring), state + 2 * self->n_modes, (size_t)self->dead_time * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)

@@ -46,7 +46,7 @@ HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self);
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 HSEP_API int hsep_residual_sound(hsep_residual_model *self);
 
-/* Begin another run with what was learned. */
+/* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
 
 /* Whether a measurement may be missing, NaN. */

@@ -1,7 +1,7 @@
 /* Signals of a window whose residual a model predicts, and that it learns from.
  *
- * They are kept newest first: of the n = Np + late samples that are predicted, sample k is at place n - 1 - k, and what
- * was before them is behind them; the first Np are measured when the window ends.
+ * They are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is at
+ * place n - 1 - k, and what was before them is behind them; the first Np are measured when the window ends.
  */
 #ifndef HSEP_RESIDUAL_WINDOW_H
 #define HSEP_RESIDUAL_WINDOW_H

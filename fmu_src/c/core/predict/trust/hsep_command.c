@@ -78,7 +78,7 @@ HSEP_API void hsep_command_end(hsep_command *self, hsep_word m)
     memmove(before, before - m, (size_t)self->n_before * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_command_begin(hsep_command *self, hsep_real first, hsep_real second)
+HSEP_API void hsep_command_begin_in_motion(hsep_command *self, hsep_real first, hsep_real second)
 {
     hsep_real *before = hsep_at(self, self->commands) + self->n;
     for (hsep_word i = 0; i < self->n_before; i++) {

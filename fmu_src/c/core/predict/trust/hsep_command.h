@@ -46,7 +46,7 @@ HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_word 
 /* End the window, which are the m samples taken in last. */
 HSEP_API void hsep_command_end(hsep_command *self, hsep_word m);
 
-/* Begin with the motion that goes on with the commands first and second, m, before the window. */
-HSEP_API void hsep_command_begin(hsep_command *self, hsep_real first, hsep_real second);
+/* Begin in motion: commands, m, went on as the first and the second of the first window. */
+HSEP_API void hsep_command_begin_in_motion(hsep_command *self, hsep_real first, hsep_real second);
 
 #endif

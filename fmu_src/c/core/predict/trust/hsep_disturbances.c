@@ -22,14 +22,10 @@ HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_w
     return feature + self->count < self->n ? 1.0 : HSEP_TRUST_DIFFERENCE_SHARE;
 }
 
+/* Filter i before the window; behind those of all disturbances are the ones after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_word i)
 {
     return (hsep_physics *)hsep_at(self, self->filters + i * self->filter_words);
-}
-
-static hsep_physics *disturbances_tried(hsep_disturbances *self, hsep_word i)
-{
-    return (hsep_physics *)hsep_at(self, self->tried + i * self->filter_words);
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -37,7 +33,7 @@ static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residu
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_word count = hsep_disturbances_count(parameters);
-    const hsep_real filters = (hsep_real)count * hsep_physics_size(parameters->n_modes, settings->dead_time);
+    const hsep_real filter = hsep_physics_size(parameters->n_modes, settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_disturbances);
     self->count = count;
     self->period = parameters->trust->period;
@@ -45,9 +41,8 @@ static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residu
     self->n_differences = self->n - 2 - 2 * count;
     self->of_motion = parameters->planned != 0;
     self->T_s = settings->T_s;
-    self->filters = hsep_take_block(&end, filters);
-    self->tried = hsep_take_block(&end, filters);
-    self->filter_words = (self->tried - self->filters) / count;
+    self->filters = hsep_take_block(&end, 2.0 * (hsep_real)count * filter);
+    self->filter_words = (hsep_word)(filter / sizeof(hsep_real));
     return end * sizeof(hsep_real);
 }
 
@@ -81,14 +76,10 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
     return sound;
 }
 
-HSEP_API void hsep_disturbances_restart(
+HSEP_API void hsep_disturbances_begin_in_motion(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n)
 {
     hsep_disturbed *before = &self->before;
-    for (hsep_word i = 0; i < self->count; i++) {
-        hsep_physics_begin(disturbances_filter(self, i), NULL);
-        before->filtered[i] = 0.0;
-    }
     before->x_d = 2.0 * x_d[n - 1] - x_d[n - 2];
     for (int i = 0; i <= HSEP_DISTURBANCES_DIFFERENCES; i++) {
         before->x_pb[i] = x_pb[n - 1] - (x_pb[n - 2] - x_pb[n - 1]) * (hsep_real)(i + 1);
@@ -113,7 +104,7 @@ static void disturbances_filter_samples(
     hsep_real x[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     hsep_physics *filters[HSEP_PHYSICS_ABREAST] = {NULL};
     for (hsep_word i = 0; i < count; i++) {
-        filters[i] = disturbances_tried(self, first + i);
+        filters[i] = disturbances_filter(self, self->count + first + i);
     }
     hsep_physics_abreast(filters, count, u, x, n);
     hsep_real *entry = rows + 2 + self->n_differences + first, *filtered = self->after.filtered + first;
@@ -131,7 +122,7 @@ static void disturbances_filter_samples(
 static void disturbances_rewind(hsep_disturbances *self, hsep_word first, hsep_word last)
 {
     memcpy(
-        disturbances_tried(self, first), disturbances_filter(self, first),
+        disturbances_filter(self, self->count + first), disturbances_filter(self, first),
         (size_t)((last - first) * self->filter_words) * sizeof(hsep_real));
     for (hsep_word i = first; i < last; i++) {
         self->after.filtered[i] = self->before.filtered[i];
@@ -254,7 +245,7 @@ HSEP_API void hsep_disturbances_motion(
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
 {
     memcpy(
-        disturbances_filter(self, 0), disturbances_tried(self, 0),
+        disturbances_filter(self, 0), disturbances_filter(self, self->count),
         (size_t)(self->count * self->filter_words) * sizeof(hsep_real));
     self->before = self->after;
 }

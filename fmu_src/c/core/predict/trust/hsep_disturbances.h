@@ -37,12 +37,12 @@ typedef struct {
     hsep_disturbed before;   /* the window that comes next */
     hsep_disturbed after;    /* the samples that were tried last */
     hsep_word filter_words;  /* words of a filter */
-    hsep_word filters;       /* offset of the hsep_physics of each disturbance before the window, */
-    hsep_word tried;         /* and after the samples that were tried last */
+    hsep_word filters;       /* offset of the hsep_physics of each disturbance before the window, and behind them after
+                              * the samples that were tried last */
 } hsep_disturbances;
 
 HSEP_ASSERT_WORDS(hsep_disturbed, 15);
-HSEP_ASSERT_WORDS(hsep_disturbances, 40);
+HSEP_ASSERT_WORDS(hsep_disturbances, 39);
 
 /* Disturbances, and features. */
 HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters);
@@ -57,8 +57,8 @@ HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
 HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters);
 
-/* Begin again, at rest but for a motion that went on as the n samples begin, (n,) m each. */
-HSEP_API void hsep_disturbances_restart(
+/* Begin in motion, which went on as the n samples of the first window begin, (n,) m each. */
+HSEP_API void hsep_disturbances_begin_in_motion(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n);
 
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */

@@ -110,7 +110,8 @@ HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);
 HSEP_API int hsep_trusted_sound(const hsep_trusted *self);
 
-/* Begin another run: what was learned is discounted and doubted, as a machine may have changed meanwhile. */
+/* Begin a run with what an earlier one has learned, loaded into a fresh block: it is discounted and doubted, as a
+ * machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as

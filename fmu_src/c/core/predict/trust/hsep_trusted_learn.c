@@ -11,9 +11,9 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x
     const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
     hsep_real *past = hsep_at(self, self->e_0) + Np;
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
+    hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
-    hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
+    hsep_command_begin_in_motion(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
     for (hsep_word i = 0; i < hsep_trusted_command(self)->p; i++) {
         past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
