@@ -122,14 +122,14 @@ class Uncertainty:
         """Return what is assumed before the first window is measured, with the ``variance``, m², of the noise."""
         return cls(np.array([variance, *_SHARES]), np.zeros(N_COMPONENTS), 1.0, 1.0, 0.0)
 
-    def predict(self, x_pb: Array, e_h: Array, variance: Array, Np: int) -> PredictedError:
+    def predict(self, x_pb: Array, e_h: Array, variance: Array | float, Np: int) -> PredictedError:
         """Return what is known of the error of the next window.
 
         Parameters
         ----------
         x_pb, e_h : (n,) array, m
             Physics-based prediction and published residual, relative to the start.
-        variance : (n,) array, m²
+        variance : (n,) array or float, m²
             What the residual model knows of its error.
         Np : int
             Samples of a usual window.
