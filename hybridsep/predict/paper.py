@@ -73,37 +73,6 @@ def restart(state: PaperModel) -> PaperModel:
     return replace(state, x_pb=np.zeros_like(state.x_pb), e_pb=np.zeros_like(state.e_pb))
 
 
-def forecast(state: PaperModel, window: ResidualWindow) -> Forecast:
-    """Predict the residual over the next window."""
-    return Forecast(window, free_run(state, window.x_pb), np.zeros(len(window.x_pb)))
-
-
-def free_run(state: PaperModel, x_pb: Array) -> Array:
-    """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
-
-    Parameters
-    ----------
-    state : PaperModel
-    x_pb : (n,) array, m
-        Physics-based prediction, relative to the start.
-    """
-    w, w_e = state.regression.weights, state.lag_weights
-    # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
-    drive = w[0] + np.convolve(np.concatenate((state.x_pb, x_pb)), w[1 : -len(w_e)], "valid")
-    # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
-    # its state is z_j = Σ_m w_e,j+m e(−m)
-    before = np.correlate(w_e, state.e_pb[::-1], "full")[len(w_e) - 1 :]
-    e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=before)
-    return np.asarray(e_h)
-
-
-def impulse_response(state: PaperModel, g_pb: Array) -> Array:
-    """Return that of the hybrid model, ``(n,)``, from that of ``G_pb``: the first column of ``G_h`` of eq. (3)."""
-    # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
-    w, w_e = state.regression.weights, state.lag_weights
-    return np.asarray(g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb))
-
-
 def learn(
     state: PaperModel, forecast: Forecast, x: Array, *, fold: bool = True
 ) -> tuple[PaperModel, NDArray[np.bool_]]:
@@ -133,3 +102,34 @@ def learn(
         )
         regression = regression.update_stacked(rows)
     return replace(state, x_pb=x_pb[m:], e_pb=e_pb[m:], regression=regression), np.ones(m, dtype=np.bool_)
+
+
+def forecast(state: PaperModel, window: ResidualWindow) -> Forecast:
+    """Predict the residual over the next window."""
+    return Forecast(window, free_run(state, window.x_pb), np.zeros(len(window.x_pb)))
+
+
+def free_run(state: PaperModel, x_pb: Array) -> Array:
+    """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
+
+    Parameters
+    ----------
+    state : PaperModel
+    x_pb : (n,) array, m
+        Physics-based prediction, relative to the start.
+    """
+    w, w_e = state.regression.weights, state.lag_weights
+    # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
+    drive = w[0] + np.convolve(np.concatenate((state.x_pb, x_pb)), w[1 : -len(w_e)], "valid")
+    # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
+    # its state is z_j = Σ_m w_e,j+m e(−m)
+    before = np.correlate(w_e, state.e_pb[::-1], "full")[len(w_e) - 1 :]
+    e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=before)
+    return np.asarray(e_h)
+
+
+def impulse_response(state: PaperModel, g_pb: Array) -> Array:
+    """Return that of the hybrid model, ``(n,)``, from that of ``G_pb``: the first column of ``G_h`` of eq. (3)."""
+    # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
+    w, w_e = state.regression.weights, state.lag_weights
+    return np.asarray(g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb))

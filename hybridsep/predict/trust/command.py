@@ -44,8 +44,8 @@ class CommandFeatures:
         """Effects that features may have, ``(p + 2,)``, relative to the largest: an old increment explains less."""
         return np.concatenate(([1.0], np.sqrt(CONSTANTS.last_lag ** (np.arange(self.p + 1) / self.p))))
 
-    def late(self, before: Array, x_d: Array) -> Array:
-        """Return the commands ``d`` samples ago over a window, ``(n,)``, m.
+    def rows(self, before: Array, x_d: Array) -> Array:
+        """Return the features of a window, ``(n, p + 2)``: 1, and the increments.
 
         Parameters
         ----------
@@ -53,12 +53,12 @@ class CommandFeatures:
             Commands before it, oldest first.
         x_d : (n,) array, m
         """
-        return np.concatenate((before, x_d))[self.p + 1 : self.p + 1 + len(x_d)]
-
-    def rows(self, before: Array, x_d: Array) -> Array:
-        """Return the features of a window, ``(n, p + 2)``: 1, and the increments; parameters as for :meth:`late`."""
         increments = np.diff(np.concatenate((before, x_d))[: self.p + 1 + len(x_d)])
         return np.column_stack((np.ones(len(x_d)), lags(increments, self.p + 1)))
+
+    def late(self, before: Array, x_d: Array) -> Array:
+        """Return the commands ``d`` samples ago over a window, ``(n,)``, m; parameters as for :meth:`rows`."""
+        return np.concatenate((before, x_d))[self.p + 1 : self.p + 1 + len(x_d)]
 
     def largest(self, step: float) -> Array:
         """Return the largest magnitudes of the features, ``(p + 2,)``, for the largest increment ``step``, m."""

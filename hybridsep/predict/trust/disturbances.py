@@ -119,6 +119,43 @@ class StaticFeatures:
         """Return the largest magnitude of the commanded velocity over a window, m/s."""
         return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
 
+    def spread(self, velocity_scale: float) -> Array:
+        """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
+        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
+        return np.asarray((velocity_scale or 1.0) * spread)
+
+    def velocity(self, state: StaticState, x_d: Array) -> Array:
+        """Return the commanded velocity over a window, ``(n,)``, m/s."""
+        return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
+
+    def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
+        """Return the velocity of the damping over a window, ``(n,)``, m/s."""
+        v = np.diff(x_pb, prepend=state.x_pb[-1])
+        if self.damping_of_motion:
+            e = x - x_pb
+            v = v + np.diff(e, prepend=e[:1])
+        return np.asarray(v / self.discrete.T_s)
+
+    def angle(self, x: Array | float) -> Array:
+        """Return the angle within the period at a position, rad."""
+        return np.asarray(2.0 * np.pi / self.period * x)
+
+    def own_at(self, x: Array, v: Array) -> Array:
+        """Return the disturbances of the user's own at positions, m, and velocities, m/s, ``(n, n_own)``."""
+        found = np.empty((len(x), len(self.own)))
+        for i, disturbance in enumerate(self.own):
+            name = f"disturbances[{i}]"
+            try:
+                values = np.asarray(disturbance(x.copy(), v.copy()), dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise SignalError(f"{name} must return numbers for arrays x, m, and v, m/s: {error}") from error
+            if values.shape not in ((), x.shape):
+                raise SignalError(f"{name} must return a number for each of {len(x)} samples, got shape {values.shape}")
+            if not np.all(np.abs(values) <= _OWN_MAX):  # NaN too
+                raise SignalError(f"{name} must be finite and at most {_OWN_MAX:g} in magnitude")
+            found[:, i] = values
+        return found
+
     def rows(
         self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float
     ) -> tuple[Array, StaticState]:
@@ -162,40 +199,3 @@ class StaticFeatures:
         rows[:, first : first + self.n_disturbances] = filtered
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())
-
-    def own_at(self, x: Array, v: Array) -> Array:
-        """Return the disturbances of the user's own at positions, m, and velocities, m/s, ``(n, n_own)``."""
-        found = np.empty((len(x), len(self.own)))
-        for i, disturbance in enumerate(self.own):
-            name = f"disturbances[{i}]"
-            try:
-                values = np.asarray(disturbance(x.copy(), v.copy()), dtype=np.float64)
-            except (TypeError, ValueError) as error:
-                raise SignalError(f"{name} must return numbers for arrays x, m, and v, m/s: {error}") from error
-            if values.shape not in ((), x.shape):
-                raise SignalError(f"{name} must return a number for each of {len(x)} samples, got shape {values.shape}")
-            if not np.all(np.abs(values) <= _OWN_MAX):  # NaN too
-                raise SignalError(f"{name} must be finite and at most {_OWN_MAX:g} in magnitude")
-            found[:, i] = values
-        return found
-
-    def angle(self, x: Array | float) -> Array:
-        """Return the angle within the period at a position, rad."""
-        return np.asarray(2.0 * np.pi / self.period * x)
-
-    def velocity(self, state: StaticState, x_d: Array) -> Array:
-        """Return the commanded velocity over a window, ``(n,)``, m/s."""
-        return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
-
-    def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
-        """Return the velocity of the damping over a window, ``(n,)``, m/s."""
-        v = np.diff(x_pb, prepend=state.x_pb[-1])
-        if self.damping_of_motion:
-            e = x - x_pb
-            v = v + np.diff(e, prepend=e[:1])
-        return np.asarray(v / self.discrete.T_s)
-
-    def spread(self, velocity_scale: float) -> Array:
-        """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
-        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
-        return np.asarray((velocity_scale or 1.0) * spread)

@@ -68,21 +68,6 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     return FeatureScales(velocity, np.maximum(largest, np.abs(rows).max(axis=0)), step)
 
 
-def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
-    """Return the experts that know something, with their weights."""
-    found: dict[int, SolvedExpert] = {}
-    for kind, experts in ((OF_PHYSICS, (LAGGED, STATIC)), (OF_COMMAND, (COMMAND,))):
-        evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
-        if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
-            continue
-        if kind == OF_COMMAND or not outgrown:
-            rows = evidence.all()
-            found |= {expert: _solved(state, expert, rows, scales) for expert in experts}
-            if state.doubts and state.leading == experts[0]:
-                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
-    return found
-
-
 def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
     """Return an expert with the weights that follow from rows."""
     settings, kind = state.fixed.settings, state.kind_of(expert)
@@ -99,18 +84,30 @@ def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: Fea
     return solve(rows, state.learned.errors_of(expert), priors, p, first, least)
 
 
-def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
-    """Predict the residual over the next window.
+def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
+    """Return the experts that know something, with their weights."""
+    found: dict[int, SolvedExpert] = {}
+    for kind, experts in ((OF_PHYSICS, (LAGGED, STATIC)), (OF_COMMAND, (COMMAND,))):
+        evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
+        if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
+            continue
+        if kind == OF_COMMAND or not outgrown:
+            rows = evidence.all()
+            found |= {expert: _solved(state, expert, rows, scales) for expert in experts}
+            if state.doubts and state.leading == experts[0]:
+                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
+    return found
 
-    Parameters
-    ----------
-    state : TrustedModel
-    window : ResidualWindow
-    scales : FeatureScales, optional
-        Those of :func:`scales_of` its commands if left out; a compensator's follow from its preview.
+
+def _growth(state: TrustedModel, scales: FeatureScales) -> float:
+    """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
+
+    What follows the command alone is linear in it: it may be larger than anything so far by as much.
     """
-    scales = scales_of(state, window) if scales is None else scales
-    return forecast_by(state, solved(state, scales), window, scales)
+    before = state.learned.largest_step
+    if not (before > 0.0 and state.learned.stack.leader == COMMAND):
+        return 1.0
+    return min(scales.step / before, CONSTANTS.growth)
 
 
 def forecast_by(
@@ -158,12 +155,15 @@ def forecast_by(
     return TrustedForecast(window, e_h, variance, x, stacked, found, scales)
 
 
-def _growth(state: TrustedModel, scales: FeatureScales) -> float:
-    """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
+def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
+    """Predict the residual over the next window.
 
-    What follows the command alone is linear in it: it may be larger than anything so far by as much.
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+    scales : FeatureScales, optional
+        Those of :func:`scales_of` its commands if left out; a compensator's follow from its preview.
     """
-    before = state.learned.largest_step
-    if not (before > 0.0 and state.learned.stack.leader == COMMAND):
-        return 1.0
-    return min(scales.step / before, CONSTANTS.growth)
+    scales = scales_of(state, window) if scales is None else scales
+    return forecast_by(state, solved(state, scales), window, scales)

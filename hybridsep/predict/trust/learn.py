@@ -43,6 +43,68 @@ def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel
     return replace(state, run=replace(state.run, static=static, commands=commands, past=past))
 
 
+def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
+    """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
+    learned, (velocity, largest, step) = state.learned, forecast.scales
+    of_physics, of_command = state.evidence
+    stack = learned.stack
+    if velocity != learned.velocity_scale:
+        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
+    learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
+    return replace(state, learned=learned, evidence=(of_physics, of_command))
+
+
+def _folded(
+    state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
+) -> TrustedModel:
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
+    settings, n = state.fixed.settings, len(e[OF_PHYSICS])
+    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+
+    def learned(kind: int) -> Evidence:
+        past = state.run.past[kind]
+        p = len(past)
+        # Measured samples, as were all but a few of their lags
+        n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
+        counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
+        return state.evidence[kind].discount(kept).learn(rows[kind][counts], lagged[counts], e[kind][counts])
+
+    return replace(state, evidence=(learned(OF_PHYSICS), learned(OF_COMMAND)))
+
+
+def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
+    """Return residuals with those not accepted interpolated between accepted ones; ``last`` is before the first."""
+    known = np.flatnonzero(accepted)
+    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
+    return np.asarray(np.interp(np.arange(len(measured)), places, values))
+
+
+def _judged(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> TrustedModel:
+    """Judge the experts and their stack by the measurement of their window."""
+    settings, learned = state.fixed.settings, state.learned
+    errors = {
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
+        for expert, one in forecast.predictions.items()
+    }
+    scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    n, late = len(accepted), settings.measurement_delay
+    published = accepted & (np.arange(n) >= late) if late < n else accepted
+    stack = learned.stack
+    if published.any():
+        predicted = forecast.stacked[:, :n][:, published]
+        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
+    evidence = state.evidence
+    if state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt:
+        # All experts go on with this run alone, and are judged anew.
+        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init()
+        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
+    learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
+    return replace(state, learned=learned, evidence=evidence)
+
+
 def learn(
     state: TrustedModel, forecast: TrustedForecast, x: Array, *, fold: bool = True
 ) -> tuple[TrustedModel, NDArray[np.bool_]]:
@@ -82,65 +144,3 @@ def learn(
     n_rejected = run.n_rejected + m - int(accepted.sum())
     commands = np.concatenate((run.commands, window.x_d))[m:]
     return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], reach, n_rejected)), accepted
-
-
-def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
-    """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
-    learned, (velocity, largest, step) = state.learned, forecast.scales
-    of_physics, of_command = state.evidence
-    stack = learned.stack
-    if velocity != learned.velocity_scale:
-        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
-    learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
-    return replace(state, learned=learned, evidence=(of_physics, of_command))
-
-
-def _folded(
-    state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
-) -> TrustedModel:
-    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
-    settings, n = state.fixed.settings, len(e[OF_PHYSICS])
-    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
-
-    def learned(kind: int) -> Evidence:
-        past = state.run.past[kind]
-        p = len(past)
-        # Measured samples, as were all but a few of their lags
-        n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
-        counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
-        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
-        return state.evidence[kind].discount(kept).learn(rows[kind][counts], lagged[counts], e[kind][counts])
-
-    return replace(state, evidence=(learned(OF_PHYSICS), learned(OF_COMMAND)))
-
-
-def _judged(
-    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
-) -> TrustedModel:
-    """Judge the experts and their stack by the measurement of their window."""
-    settings, learned = state.fixed.settings, state.learned
-    errors = {
-        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
-        for expert, one in forecast.predictions.items()
-    }
-    scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
-    n, late = len(accepted), settings.measurement_delay
-    published = accepted & (np.arange(n) >= late) if late < n else accepted
-    stack = learned.stack
-    if published.any():
-        predicted = forecast.stacked[:, :n][:, published]
-        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
-    evidence = state.evidence
-    if state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt:
-        # All experts go on with this run alone, and are judged anew.
-        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init()
-        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
-    learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
-    return replace(state, learned=learned, evidence=evidence)
-
-
-def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
-    """Return residuals with those not accepted interpolated between accepted ones; ``last`` is before the first."""
-    known = np.flatnonzero(accepted)
-    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
-    return np.asarray(np.interp(np.arange(len(measured)), places, values))

@@ -51,11 +51,6 @@ class Stack:
         """Return the stack without evidence."""
         return cls(_first_weights(), np.zeros((N_EXPERTS, N_EXPERTS)), np.zeros(N_EXPERTS), np.zeros(2))
 
-    @property
-    def leader(self) -> int:
-        """COMMAND, if it has more of the weights than LAGGED and STATIC together, else LAGGED."""
-        return COMMAND if self.weights[COMMAND] > self.weights[LAGGED] + self.weights[STATIC] else LAGGED
-
     def update(self, predicted: Array, measured: Array, least: float) -> Stack:
         """Return the stack with a measured window more.
 
@@ -77,6 +72,11 @@ class Stack:
         ridge = CONSTANTS.kappa * best * n
         weights = simplex_minimum(gram + ridge * np.eye(N_EXPERTS), cross + ridge * _first_weights())
         return Stack(weights, gram, cross, evidence)
+
+    @property
+    def leader(self) -> int:
+        """COMMAND, if it has more of the weights than LAGGED and STATIC together, else LAGGED."""
+        return COMMAND if self.weights[COMMAND] > self.weights[LAGGED] + self.weights[STATIC] else LAGGED
 
     def copy(self, expert: int, to: int) -> Stack:
         """Return the stack with the evidence of an expert given to another, as if it had predicted the same so far."""

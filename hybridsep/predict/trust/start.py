@@ -48,6 +48,15 @@ class MotionBefore(NamedTuple):
     x_pb: Array
 
 
+def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float, late: int) -> Array:
+    """Return the state, ``late`` samples before command 0, of a motion that has lasted, ``step`` m a sample."""
+    register = step * np.arange(-discrete.dead_time - late, -late)
+    # z̈ + 2ζω ż + ω² z = v t has the solution ω² z = v t − 2ζ v/ω, in the state (ω² z, ω ż).
+    here, v = -(discrete.dead_time + late) * step, step / discrete.T_s
+    states = [(here - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
+    return np.concatenate((np.ravel(states), register))
+
+
 def motion_before(
     model: ModalModel, discrete: DiscreteModel, x_d: Array, residuals: Array, late: int
 ) -> MotionBefore | None:
@@ -83,12 +92,3 @@ def motion_before(
         return None
     change = RidgeRegression.init(n, _DAMPING).update(of_modes[: len(residuals)][known], left).weights
     return MotionBefore(moving + modes @ change, commands, of_motion + of_modes @ change)
-
-
-def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float, late: int) -> Array:
-    """Return the state, ``late`` samples before command 0, of a motion that has lasted, ``step`` m a sample."""
-    register = step * np.arange(-discrete.dead_time - late, -late)
-    # z̈ + 2ζω ż + ω² z = v t has the solution ω² z = v t − 2ζ v/ω, in the state (ω² z, ω ż).
-    here, v = -(discrete.dead_time + late) * step, step / discrete.T_s
-    states = [(here - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
-    return np.concatenate((np.ravel(states), register))
