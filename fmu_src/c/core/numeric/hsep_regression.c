@@ -128,7 +128,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
      * v, and with it every division, is not needed for the x of the next pivot: they run beside the sweeps.
-     * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
+     * The last form is the cheapest and its rounding error is a Givens rotation's divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     hsep_real v = 1.0;
     hsep_word rows = self->n;

@@ -27,7 +27,7 @@ static int predictor_settled(hsep_predictor *self)
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     const hsep_word i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
-    /* What was measured is that of late samples ago. */
+    /* x_meas was measured late samples ago. */
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
