@@ -127,7 +127,7 @@ class SepCompensator:
         Parameters
         ----------
         **settings
-            ``compensate`` or ``change_max``, as those of :class:`~hybridsep.base.settings.CompensatorSettings`.
+            ``compensate`` or ``change_max``, as in :class:`~hybridsep.base.settings.CompensatorSettings`.
 
         Raises
         ------

@@ -62,7 +62,7 @@ class ChosenPlan(NamedTuple):
 
 
 class PublishedPosition(NamedTuple):
-    """``x_h`` and ``x_h_std``, ``(Np,)``, m; leading samples where ``x_h = x_pb``; those that follow the last plan."""
+    """``x_h``, ``x_h_std``, ``(Np,)``, m; leading samples where ``x_h = x_pb``; leading samples that follow the last plan."""
 
     x_h: Array
     x_h_std: Array
@@ -86,7 +86,7 @@ class Planning(ABC):
     PINNED : int
         Leading samples of a window in which a plan follows the last one.
     ALWAYS : bool
-        Whether every plan does; else those that the drive's limits bound.
+        Whether every plan follows the last one there; else only plans that the drive's limits bound.
     TOLERANCE : Tolerance
         Of the solver.
     """
