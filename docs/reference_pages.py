@@ -35,8 +35,8 @@ FMUS = {
     "SepCompensator": "In the predictor's place: it delays the command by `preview` samples and modifies it.",
     "FeedDrive": "The nonlinear drive of eq. (13), a plant to try the others with.",
     "ReferenceTrajectory": "Plays the staircase, the spiral or samples of yours, so that a system runs without a "
-    "script. Built with samples (`--trajectory`) it has `3 samples` besides and starts with it; the interval is that "
-    "of what lies in its archive.",
+    "script. Built with samples (`--trajectory`) it has `3 samples` besides and starts with it; the samples in the "
+    "archive set the interval.",
 }
 """FMUs of the default machine, with what each is for."""
 

@@ -110,7 +110,7 @@ def open_checked(
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
         if not trust and any(finding.name == "gaps" for finding in intake.findings):
-            bridged = f"with trust (--trust true) those of at most {BRIDGED_MAX} samples are bridged"
+            bridged = f"with trust (--trust true) gaps of at most {BRIDGED_MAX} samples are bridged"
             show([f"every gap cuts, as the model has trust = false; {bridged}"], [])
         fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != MISSING))
         return (fixed if segments else _longest_segment(fixed, path)), intake

@@ -173,7 +173,7 @@ def _change(values: Sequence[float | None]) -> float:
 
 
 def _first(axes: Sequence[Course], page: Path, results: Path) -> str:
-    """Return the lists of the axes to look at first, each axis in that of its gravest remark."""
+    """Return the lists of the axes to look at first, each axis in the list of its gravest remark."""
     marked: dict[str, list[Course]] = {kind: [] for kind in _KINDS}
     for axis in axes:
         for kind, _ in axis.remarks()[:1]:
@@ -214,7 +214,7 @@ def _histogram(ratios: Sequence[float]) -> str:
     better = sum(ratio < 1.0 for ratio in ratios)
     middle = median_high(ratios)
     words = (
-        f"The hybrid's error relative to that of the best of physics model, hold and ARX models, latest log of each "
+        f"Error of the hybrid relative to the best of physics model, hold and ARX models, latest log of each "
         f"axis: {better} of {len(ratios)} below 1, median {middle:.2f}."
     )
     box = f"-8 0 {len(counts) * width + 16} {height}"

@@ -1,9 +1,9 @@
 """Shared libraries of the native FMUs, one for each kind and platform.
 
 A library serves all FMUs of its kind: what one FMU differs in is read from its resources
-(:mod:`hybridsep.fmi.table_file`). Building a wheel compiles some (``hatch_build.py``): this machine's, of a release
-those of all platforms. Others are compiled when they are first asked for and kept, by a hash of sources and compiler,
-in a checkout's ``build/binaries`` or the user's cache.
+(:mod:`hybridsep.fmi.table_file`). Building a wheel compiles some (``hatch_build.py``): for this machine, in a release
+for all platforms. Others are compiled when they are first asked for and kept, by a hash of sources and compiler, in a
+checkout's ``build/binaries`` or the user's cache.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def has_native() -> bool:
 
 
 def default_targets() -> tuple[str, ...]:
-    """Return the targets where none are asked for: those of ``$HYBRIDSEP_TARGETS``, or else :func:`ready_targets`."""
+    """Return the targets where none are asked for: ``$HYBRIDSEP_TARGETS`` if it is set, else :func:`ready_targets`."""
     return (os.environ.get("HYBRIDSEP_TARGETS") and chosen_targets()) or ready_targets()
 
 

@@ -21,7 +21,7 @@ these are a quarter apart."""
 def slow_parts(modes: Sequence[Mode]) -> list[float]:
     """Return the frequencies, Hz, of the slow parts that are nearly cancelled, by each other or by zeros.
 
-    The parts are those of the partial fractions of eq. (15): the modes, an over-damped one as its two real poles.
+    The parts are the partial fractions of eq. (15): the modes, an over-damped mode as its two real poles.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ def _draw_structures(axes: Axes, found: IdentifiedModel, scale: float, unit: str
 def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> None:
     """Draw magnitude, phase and error of a frequency response and its fit to a PNG.
 
-    Where no phase was measured there is none, and the error is that of the magnitude.
+    Where no phase was measured, none is drawn, and the error is the magnitude's.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ def identify_frequency_response(
     dead_time : int
         Whole samples of dead time in the response.
     sampled : bool
-        Whether the response is that of sampled signals, which the hold has a part in.
+        Whether the response was measured on sampled signals, so that it contains the hold.
     progress : callable, optional
         Called with a message and the fraction done.
 

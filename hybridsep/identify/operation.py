@@ -257,7 +257,7 @@ def _findings(
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
             f"the error on the part that was held out, {shown.words(chosen.rms_held_out)}, is "
-            f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
-            "kind, or the axis is not linear"
+            f"{chosen.rms_held_out / chosen.fit.rms:.1f} times the error of the fit before it: the later motion is of "
+            "another kind, or the axis is not linear"
         )
     return findings

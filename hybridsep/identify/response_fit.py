@@ -51,7 +51,7 @@ class Lines:
         Whether they are a part of the magnitude, which the fitted one is then the better measure of.
     unit_gain : bool
     sampling : (float, str) or None
-        Sampling interval and hold, where the response is that of sampled signals.
+        Sampling interval and hold, where the response was measured on sampled signals.
     """
 
     omega: Array

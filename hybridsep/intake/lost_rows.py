@@ -16,7 +16,7 @@ from .finding import ERROR, Finding, Fix, Picture
 __all__ = ["check_lost_rows"]
 
 _ALIKE = 0.35
-"""Relative distance from the local step of the steps beside it, at most."""
+"""Largest relative difference between the local step and the steps beside it."""
 
 _WHOLE = 0.15
 """Distance of a step from a whole number of local ones, two at least."""

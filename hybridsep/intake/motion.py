@@ -40,7 +40,7 @@ _FIRST = 10
 """Samples whose mean velocity must say so as well: at rest a command may flicker by one count."""
 
 _LARGEST = {"travel": (20.0, "m"), "velocity": (20.0, "m/s"), "acceleration": (500.0, "m/s²")}
-"""What a feed axis travels and does at most; more of it is read in too large a unit."""
+"""Largest travel and motion of a feed axis; a log with more was read in too large a unit."""
 
 _PER_PERIOD = 4.0
 """Samples a period of the fastest mode below which its motion is not resolved."""

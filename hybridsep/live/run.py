@@ -73,7 +73,7 @@ def run_live(
     sinks : sequence of Sink
         They get every row, and are told of the end, by an error too.
     ends : tuple of type
-        Exceptions, such as that of Ctrl-C, which end a run as its source would.
+        Exceptions, such as Ctrl-C's, which end a run as its source would.
     watch : callable, optional
         Sampling interval, s, and samples in a window → what checks the first seconds.
 

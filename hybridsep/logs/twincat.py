@@ -38,7 +38,7 @@ _FILETIME, _TICK, _MS = 1e12, 1e-7, 1e-3
 
 @dataclass(frozen=True)
 class _Place:
-    """Column: its field in a line, and that of its times."""
+    """Column: its field in a line, and the field of its times."""
 
     field: int
     time: int

@@ -29,7 +29,7 @@ _AT_ONCE = 100_000
 
 @dataclass(frozen=True)
 class Losses:
-    """RMS errors against the measured position over a log, m; those of a backtest without :func:`n_unjudged` samples.
+    """RMS errors against the measured position over a log, m, as of a backtest without :func:`n_unjudged` samples.
 
     Attributes
     ----------

@@ -54,7 +54,7 @@ class TestWithoutLinuxCnc:
         assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
         assert not (tmp_path / "x" / "weights.bin").exists()
         status, _, err = hybridsep("hal", *AXES, *given)
-        assert (status, "--weights are those of one axis" in err) == (2, True)
+        assert (status, "--weights belong to one axis" in err) == (2, True)
 
     def test_a_compensator_needs_limits_a_predictor_does_not(self, hybridsep: Run, tmp_path: Path) -> None:
         status, _, err = hybridsep("hal", "emps", "--out", str(tmp_path))
