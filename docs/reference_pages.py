@@ -205,7 +205,7 @@ def fmu_variables() -> str:
         "interval `T_s`, `dead_time` and `input_hold` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
         "An identified one is the model that a log gave, for trying: no measurement. "
         "FMUs are named "
-        "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
+        "after their machine (`HybridPredictor_als25010_x`), but of `spring_mass_damper` plainly; the Python flavour "
         "ends in `Py`, FMI 3.0 in `Fmi3`, before the machine.",
     ]
     return _page(parts)

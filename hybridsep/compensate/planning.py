@@ -62,7 +62,7 @@ class ChosenPlan(NamedTuple):
 
 
 class PublishedPosition(NamedTuple):
-    """``x_h``, ``x_h_std``, ``(Np,)``, m; leading samples: in the warm-up (``x_h = x_pb``); that follow the last plan."""
+    """``x_h``, ``x_h_std``, ``(Np,)``, m; leading samples: in the warm-up (``x_h = x_pb``); following the last plan."""
 
     x_h: Array
     x_h_std: Array

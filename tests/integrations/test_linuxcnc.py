@@ -1,6 +1,6 @@
 """The HAL component in a running LinuxCNC, on simulated drives; ``hybridsep hal`` without it.
 
-LinuxCNC's own tests are those of the night: they need its package with the headers, root to install the component, and
+The tests in a running LinuxCNC run at night: they need its package with the headers, root to install the component, and
 an ordinary user that LinuxCNC runs as.
 """
 
