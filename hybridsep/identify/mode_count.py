@@ -24,8 +24,9 @@ DEVIATIONS = 3.0
 """Standard deviations by which a damping ratio is above 0, at least."""
 
 FRICTION_WORTH = 0.6
-"""Ratio of the weighted errors at which modes that do not oscillate, or slow ones that zeros all but cancel, are taken
-beside others: friction in a swept sine leaves 0.9, a real pole that is left out less than 0.1."""
+"""Ratio of the weighted errors, with and without them, at which modes that do not oscillate, or slow modes that zeros
+all but cancel, are taken beside others: modes that fit friction in a swept sine leave 0.9, a true real pole less than
+0.1."""
 
 
 def best_fit(lines: Lines, fits: Sequence[tuple[ModalFit, Complex]]) -> int:

@@ -35,7 +35,7 @@ _LATE_COMMAND = -1.0
 """Lag of the measured position, samples, up to which the command is the later column."""
 
 _PERHAPS_LATE_COMMAND = 0.5
-"""Lag, samples, up to which it may be."""
+"""Lag, samples, up to which it may be the later column."""
 
 _LEFT_BY_DRIVE = 0.3
 """Share of the variance that a drive may leave if it is to explain one column by the other."""
@@ -50,10 +50,10 @@ _VELOCITY_LEFT = 0.3
 """Largest part that it leaves unexplained, relative to the part that the position leaves."""
 
 _OFFSET_TRAVEL = 0.02
-"""Offset, in travels, from which it is no servo error."""
+"""Offset, relative to the travel, from which it is no servo error."""
 
 _OFFSET_SPREAD = 6.0
-"""The same in spreads of the error around it."""
+"""The same, relative to the spread of the error around it."""
 
 _OFFSET_REST = 2.0
 """Offset, relative to the travel that the gain leaves out, below which an axis at rest may have it."""
@@ -109,7 +109,7 @@ _MODEL_DELAY = 0.4
 """Delay against a known model, in samples, from which it is noted."""
 
 _MODEL_SHARE = 0.4
-"""The same in the model's own lag."""
+"""The same, relative to the model's own lag."""
 
 _MODEL_GAIN = 10.0
 """Factor by which its correction must reduce the squared error."""

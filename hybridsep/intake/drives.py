@@ -29,7 +29,7 @@ _DEAD_TIME_MAX = 8.0
 """Largest dead time, samples: with a longer one any phase of a sine is a drive's."""
 
 _SEARCHES, _EVALUATIONS = 3, 60
-"""Best beginnings that are searched on from, and evaluations of each."""
+"""Best initial values from which the search goes on, and evaluations from each."""
 
 
 def drive_explaining(x_d: Array, x: Array, gains: tuple[float, float] = DRIVE_GAINS) -> DeadTime:

@@ -52,8 +52,8 @@ class Tried:
     ----------
     settings : PredictorSettings
     rms_h : float
-        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The
-        earlier half says who learns fastest, but machines run warm.
+        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The earlier
+        half shows which learns fastest, but machines run warm.
     """
 
     settings: PredictorSettings

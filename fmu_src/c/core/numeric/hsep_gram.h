@@ -2,10 +2,10 @@
  *
  * w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2
  *
- * What rows come to is the same at every sample, and a solution is one Cholesky factor, a third of the work of a
- * triangular factor that is carried. It squares the condition of the rows, which the penalties bound: no pivot is less
- * than its penalty. What rounding takes from an entry is carried along and given back with the next rows, so that the
- * digits do not wear off.
+ * A row costs the same at every sample, and a solution one Cholesky factor, which is a third of the work of updating a
+ * triangular factor. The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot is less
+ * than its penalty. The rounding error of an entry is kept and added back with the next rows (compensated summation),
+ * so that errors do not pile up.
  *
  * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
@@ -68,7 +68,7 @@ HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 
-/* Add the rows that wait to the sums now, so that a solution need not: before the last row of a window comes. */
+/* Add the rows that wait to the sums now, so that hsep_gram_solve need not; called before the last row of a window. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
 /* Sum of the squares of the targets, m2. */

@@ -43,7 +43,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real
 
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
-/* u := u + change with what rounding takes from it kept in carry, and given back next time (Kahan 1965). */
+/* u := u + change; its rounding error is kept in carry and added back next time (Kahan 1965). */
 static inline void regression_add(hsep_real *restrict u, hsep_real *restrict carry, hsep_real change)
 {
     const hsep_real wanted = change + *carry, sum = *u + wanted;
