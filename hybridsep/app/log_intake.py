@@ -93,7 +93,7 @@ def open_checked(
     check_unit(path.name, checked, machine)
     trust = bool(reading.get("may_miss"))
     intake = check(replace(checked, unit=machine.unit), machine, bridged=BRIDGED_MAX if trust else 0)
-    # Times that repeat, as those do that are rounded coarsely, tell no interval
+    # Times that repeat, because they are rounded coarsely, tell no interval
     if not fix and not any(finding.name == "time order" for finding in intake.errors):
         check_interval(path.name, reader.T_s, machine)
     if intake.errors and not (fix or as_is):
@@ -120,7 +120,7 @@ def open_checked(
 
 
 def different_logs(logs: Sequence[Log]) -> list[Log]:
-    """Return the logs without those that have the samples of one before; it is said of each that is left out."""
+    """Return the logs, leaving out and reporting each that has the samples of an earlier one."""
     kept: list[Log] = []
     for log in logs:
         same = [

@@ -167,7 +167,7 @@ def takes_parameters(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that gives a command an option for each parameter.
 
-    The command's argument ``parameters`` becomes the mapping of those that are given, by their names in FMUs.
+    The command's argument ``parameters`` becomes the mapping of the parameters that are given, by their names in FMUs.
 
     Parameters
     ----------

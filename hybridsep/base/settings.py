@@ -214,7 +214,7 @@ class PredictorSettings(Settings):
     )
     trust: bool = flag(
         True,
-        "whether the residual model is trusted only as far as its variance allows; false: the paper's",
+        "whether the residual is predicted by online model averaging; false: by the paper's model",
         learned=True,
     )
     effect: float = real(

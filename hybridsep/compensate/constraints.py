@@ -144,7 +144,7 @@ def solve(
     """Return the minimiser of the cost within the bounds.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
-    ``rest``: a real-time implementation solves for the others while those act.
+    ``rest``: a real-time implementation solves for the others while the pinned ones act.
 
     Parameters
     ----------

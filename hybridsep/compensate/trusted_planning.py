@@ -60,8 +60,8 @@ class TrustedPlanning(Planning):
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.
 
-        It may be trusted by itself, and which model planned the window is known only after its first samples have
-        acted.
+        Its prediction needs no stability test, and which model planned the window is known only after its first samples
+        have acted.
         """
         n_followed, Np = self.n_pinned * self.spacing, len(prediction.x_pb)
         if most is SepState.HYBRID:

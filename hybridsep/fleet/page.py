@@ -166,7 +166,7 @@ def _mode(row: Mapping[str, Any]) -> float | None:
 
 
 def _change(values: Sequence[float | None]) -> float:
-    """Return the latest value relative to the median of those before, less 1; 0 without both."""
+    """Return the latest value relative to the median of the values before, less 1; 0 without both."""
     *before, last = [value for value in values if value is not None] or [0.0]
     middle = median_high(before) if before else 0.0
     return last / middle - 1.0 if middle else 0.0

@@ -67,7 +67,7 @@ def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
 def library_paths(
     wanted: Sequence[Library], on_library: Callable[[Library], object] = lambda _wanted: None
 ) -> dict[Library, Path]:
-    """Return the files of libraries; those that are not there are compiled, and each is kept as soon as it is there.
+    """Return the files of libraries; missing ones are compiled, and each is kept as soon as it is there.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def operation_figure(
 
 
 def _draw_structures(axes: Axes, found: IdentifiedModel, scale: float, unit: str) -> None:
-    """Draw fitted and held-out error of each structure, those with an objection pale."""
+    """Draw fitted and held-out error of each structure, pale where there is an objection."""
     for i, other in enumerate(found.alternatives):
         alpha = 0.35 if other.objection else 1.0
         axes.plot(scale * other.rms_fitted, i, "o", color=HOLD, alpha=alpha, label="fitted part")

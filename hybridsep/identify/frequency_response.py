@@ -111,7 +111,7 @@ def identify_frequency_response(
     Parameters
     ----------
     frequency : (n,) array_like, Hz
-        Lines in any order; those at 0 and where the response is 0 or not finite are left out.
+        Lines in any order; lines at 0, and where the response is 0 or not finite, are left out.
     response : (n,) array_like of complex, m/m
     std : (n,) array_like, optional
         Standard deviation of each line's complex error; a constant part of its magnitude if left out.

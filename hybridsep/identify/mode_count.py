@@ -30,7 +30,7 @@ all but cancel, are taken beside others: modes that fit friction in a swept sine
 
 
 def best_fit(lines: Lines, fits: Sequence[tuple[ModalFit, Complex]]) -> int:
-    """Return the place of the fit to take among those with growing numbers of modes."""
+    """Return the index of the fit to take among fits with growing numbers of modes."""
     n_effective = max(_independent(fit) for fit, _ in fits)  # too few modes leave errors that are alike
     sound = [i for i, (fit, _) in enumerate(fits) if i == 0 or not doubtful_modes(fit, lines)]
     chosen = _by_criterion(lines, fits, sound, n_effective)

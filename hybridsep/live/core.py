@@ -88,7 +88,7 @@ class LiveCore:
     experts : tuple of str
         Experts whose shares the FMU tells.
     n_samples, n_missing : int
-        Samples taken in; those without a measured position.
+        Number of samples taken in, and of samples without a measured position.
     times : StepTimes
         Of the FMU's steps.
     """
@@ -116,7 +116,7 @@ class LiveCore:
         Raises
         ------
         SignalError
-            If its command is ahead and those before were not, or the other way round.
+            If its command is ahead and the commands before were not, or the other way round.
         FmuError
             If the FMU refuses it.
         """

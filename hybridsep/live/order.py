@@ -53,7 +53,7 @@ class Order:
         self.n_repeated = self.n_late = 0
 
     def take(self, sample: Sample) -> list[Sample]:
-        """Take a sample in; return those whose turn it is, with their numbers.
+        """Take a sample in; return the samples whose turn it is, with their numbers.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Run of the native core on a source: samples in order, rows to those who show or send them."""
+"""Run of the native core on a source: samples in order, rows to the sinks that show or send them."""
 
 from __future__ import annotations
 

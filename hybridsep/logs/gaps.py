@@ -70,7 +70,7 @@ def mean_interval(t: Array) -> tuple[float, float]:
 
 
 def row_interval(t: Array, T_s: float) -> float:
-    """Return the mean interval, s, of rows whose distinct times are ``T_s`` apart; those that repeat are rounded."""
+    """Return the mean interval, s, of rows whose distinct times are ``T_s`` apart; times that repeat are rounded."""
     return T_s * len(np.unique(t)) / len(t)
 
 

@@ -190,7 +190,7 @@ def bounded_lines(path: Path, file: IO[str]) -> Iterator[str]:
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
-    """Return names that occur once, ``Time#2`` for the second ``Time``, and those by the name that they had."""
+    """Return names that occur once, ``Time#2`` for the second ``Time``; and these, by the name that they had."""
     own: list[str] = []
     twins: dict[str, list[str]] = {}
     for i, name in enumerate(names):

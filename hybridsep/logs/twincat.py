@@ -45,7 +45,7 @@ class _Place:
 
 
 class TwinCatSource(Source):
-    """The channels of an export of TwinCAT Scope; those that are sampled more slowly end in an earlier line.
+    """The channels of an export of TwinCAT Scope; channels that are sampled more slowly end in an earlier line.
 
     Where slow channels are filled with their previous value, the lines in which their time repeats are left out. The
     rows of scale factors and offsets are not applied: whether the export has scaled the values, its settings decide.

@@ -24,8 +24,8 @@ _STANDSTILL = 1e-3
 
 
 _LEARNS = 0.8
-"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of what tests, below which a
-longer log is said to help."""
+"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of the test samples, below
+which a longer log is said to help."""
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,7 @@ class Replay:
         return self._parts([getattr(result, name) for result in self.results], training)
 
     def commands(self) -> Array:
-        """Return the commanded position over all samples that judge, ``(n,)``, m."""
+        """Return the commanded position over all test samples, ``(n,)``, m."""
         return self._parts([recording.x_d for recording in self.recordings], False)
 
     def errors(self, *, training: bool = False) -> Array:

@@ -184,7 +184,7 @@ static void compensator_plan(hsep_compensator *self)
     self->solving = status == HSEP_PLAN_BOUNDED;
 }
 
-/* Begin a plan on the residual model that can be trusted; which model planned is known when the plan is made. */
+/* Begin a plan on the residual model with trust; which model planned is known when the plan is made. */
 static void compensator_plan_trusted(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);

@@ -52,7 +52,7 @@ struct hsep_compensator {
     hsep_word spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
     hsep_word trial;     /* the physics model of a trial */
     hsep_word planner, predictor;
-    hsep_word trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
+    hsep_word trusted; /* the planner on the residual model with trust; 0: the paper's */
 };
 
 HSEP_ASSERT_WORDS(hsep_compensator, 15);

@@ -1,4 +1,4 @@
-/* Linearisation of the residual model that can be trusted in the commands, over a preview.
+/* Linearisation of the residual model with trust (online model averaging) in the commands, over a preview.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
  * for friction and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,

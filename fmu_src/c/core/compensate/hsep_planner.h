@@ -29,7 +29,7 @@ typedef struct {
     hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
-    hsep_word pinned;             /* samples that follow the last plan: one of those above, or less if half of Np is */
+    hsep_word pinned;             /* samples that follow the last plan: HSEP_PINNED or _WITH_TRUST, or Np / 2 if less */
 } hsep_planner_parameters;
 
 typedef enum {

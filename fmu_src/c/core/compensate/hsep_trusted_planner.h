@@ -1,4 +1,4 @@
-/* Planner on the residual model that can be trusted, by Newton steps that follow the slope of its disturbances.
+/* Planner on the residual model with trust, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower

@@ -1,4 +1,4 @@
-/* Work of the parts of a plan on the residual model that can be trusted, in multiply-adds, counted from the sizes and
+/* Work of the parts of a plan on the residual model with trust, in multiply-adds, counted from the sizes and
  * not timed, so that samples can share it equally on any processor. */
 #include "hsep_trusted_planner.h"
 
