@@ -130,8 +130,8 @@ def check_same(log: Log) -> Iterator[Finding]:
 def check_swapped(log: Log) -> Iterator[Finding]:
     """Find a commanded position that is noisy and late where the measured one is smooth: the columns are swapped.
 
-    All of it must be so, as an exchange makes nonsense of a good log: noise, lateness, and a drive that explains the
-    exchanged columns and not the given ones. Noise alone is noted.
+    All three signs must be there, as an exchange makes nonsense of a good log: noise, lateness, and a drive that
+    explains the exchanged columns and not the given ones. Noise alone is only noted.
     """
     part = stretch(log)
     x_d, x = log.x_d[part], log.x_meas[part]

@@ -68,10 +68,10 @@ _KNOWN_WITHIN = 0.03
 def runs_against(x_d: Array, x: Array) -> DeadTime | None:
     """Return the mode of negative static gain that explains the motion of a flipped position; None if it is not one.
 
-    The regression at the best lag is no judge of it: above a drive's bandwidth a correct position is late by half a
-    period, and one that is flipped looks like one that is late. A mode has the phase of its static gain where it is
-    slow. Where a drive of positive gain explains the motion, driven far above its bandwidth for example, nothing is
-    wrong with the sign.
+    The regression at the best lag cannot judge it: above a drive's bandwidth a correct position is late by half a
+    period, so a flipped position looks like a late one. A mode has the phase of its static gain at low frequencies.
+    Where a drive of positive gain explains the motion, driven far above its bandwidth for example, nothing is wrong
+    with the sign.
 
     Parameters
     ----------
