@@ -81,7 +81,7 @@ class Lines:
         return fit, part
 
     def criterion(self, fit: ModalFit, n_effective: float | None = None) -> float:
-        """Return the Bayesian information criterion, of ``n_effective`` independent values if the errors are correlated."""
+        """Return the Bayesian information criterion, of ``n_effective`` independent values if errors are correlated."""
         n = 2 * len(self.omega)
         counted = n if n_effective is None else n_effective
         return float(counted * np.log(max(fit.cost, 1e-300) / n) + fit.parameters.size * np.log(counted))
