@@ -146,8 +146,8 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
- * Every plan goes on from the rest of the last plan, which keeps the drive's limits and ends at x_d. With compensate
- * off the command follows that rest. Where the rest is larger than change_max, the rest is the bound. */
+ * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
+ * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. */
 HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
 
 /* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */

@@ -107,7 +107,7 @@ class DriveBounds:
         x_d_before, delta_before : (3,) arrays, m
             Last three commanded positions before the plan, and last three changes of them.
         rest : (3 + n_free,) array, m
-            Coefficients of the rest of the last plan, the decided ones first.
+            Coefficients of the remainder of the last plan, the decided ones first.
         may_turn : bool
             Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
         """

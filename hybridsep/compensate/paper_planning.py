@@ -26,7 +26,7 @@ class PaperPlanning(Planning):
     TOLERANCE: ClassVar[Tolerance] = EXACT
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the plan of the best model that has one, else the rest of the last plan."""
+        """Return the plan of the best model that has one, else the remainder of the last plan."""
         candidates = self._candidates(predictor, most)
         if not candidates:
             return ChosenPlan(SepState.OFF, preview.rest, None)

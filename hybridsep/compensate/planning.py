@@ -32,7 +32,7 @@ class Preview:
     x_d_before, delta_before : (3,) array, m
         Last commanded positions before, and last changes of them.
     rest : (3 + n_free,) array, m
-        Coefficients of the rest of the last plan, the decided ones first.
+        Coefficients of the remainder of the last plan, the decided ones first.
     """
 
     command: Array

@@ -111,12 +111,12 @@ class TrustedPlanner:
         return self._at(coefficients).cost
 
     def plan(self, rest: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
-        """Return the coefficients of the best plan found from the rest of the last one, and its cost, m².
+        """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
 
         Parameters
         ----------
         rest : (3 + n_free,) array, m
-            Coefficients of the rest of the last plan, the decided ones first; they are feasible.
+            Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
         bounds : Bounds
         n_pinned : int
             Coefficients that the plan does not change.

@@ -75,7 +75,7 @@ class TrustedPlanning(Planning):
         return runs_away(values @ hybrid, values @ physics, math.sqrt(cost / self.preview), change_max)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
-        """Return the trusted model over the preview, with the scales of the rest of the last plan."""
+        """Return the trusted model over the preview, with the scales of the remainder of the last plan."""
         trusted = predictor.residual
         assert isinstance(trusted, TrustedModel)
         assert predictor.start is not None

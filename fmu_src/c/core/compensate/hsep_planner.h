@@ -50,7 +50,8 @@ HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *paramete
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
-/* Set another bound on |delta| from the next plan on, m; a rest of the last plan that is larger is the bound. */
+/* Set another bound on |delta| from the next plan on, m; where the remainder of the last plan is larger, it is the
+ * bound. */
 HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
@@ -84,7 +85,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first);
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 
-/* Coefficients of the plan, (3 + n,), m; until it is made, of the rest of the last plan. */
+/* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
 
 /* Plan at this cost, which is used up. pinned: whether the first samples (hsep_planner_pinned) stay as they are in

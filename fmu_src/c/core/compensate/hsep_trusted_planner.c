@@ -52,7 +52,7 @@ static void trusted_planner_command(
 }
 
 /* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. varied: samples
- * whose variance is computed; 0: the variance under the rest of the last plan is kept. */
+ * whose variance is computed; 0: the variance under the remainder of the last plan is kept. */
 static hsep_real trusted_planner_predict(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
 {
@@ -96,7 +96,7 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
     }
 }
 
-/* Begin the physics model's plan; without one the rest of the last plan goes on. */
+/* Begin the physics model's plan; without one the remainder of the last plan goes on. */
 static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb);
@@ -146,7 +146,7 @@ HSEP_API void hsep_trusted_planner_begin(
     }
 }
 
-/* Variances of some of the samples under the rest of the last plan. */
+/* Variances of some of the samples under the remainder of the last plan. */
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_word all = self->preview + self->late, left = all - self->varied;

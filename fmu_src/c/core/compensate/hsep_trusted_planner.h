@@ -31,10 +31,10 @@
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
-    HSEP_TRUSTED_VARY,    /* variances under the rest of the last plan are to be computed */
+    HSEP_TRUSTED_VARY,    /* variances under the remainder of the last plan are to be computed */
     HSEP_TRUSTED_BEGIN,   /* the physics model's plan begins, */
     HSEP_TRUSTED_PHYSICS, /* it is bounded and being solved */
-    HSEP_TRUSTED_REST,    /* the rest of the last plan is to be judged */
+    HSEP_TRUSTED_REST,    /* the remainder of the last plan is to be judged */
     HSEP_TRUSTED_STEP,    /* a Newton step begins, */
     HSEP_TRUSTED_COLUMN,  /* changes of x_h by the splines are to be computed, */
     HSEP_TRUSTED_PRODUCT, /* and their products */
@@ -52,7 +52,7 @@ typedef struct {
     hsep_word stage;        /* hsep_trusted_stage */
     hsep_word follows;      /* whether the trusted model may plan */
     hsep_word steps;        /* Newton steps begun */
-    hsep_word varied;       /* samples whose variance under the rest of the last plan is computed */
+    hsep_word varied;       /* samples whose variance under the remainder of the last plan is computed */
     hsep_word columns;      /* splines that are pinned, or whose change of x_h is computed */
     hsep_word tries;        /* of this step, and */
     hsep_word tries_in_all; /* of all */
@@ -63,7 +63,7 @@ typedef struct {
     hsep_real penalty;      /* on the change of velocity, in the unit of the jerk's weight */
     hsep_real start;        /* m, position of rest */
     /* Offsets in words from the beginning of the struct */
-    hsep_word rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
+    hsep_word rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_word best;       /* (3 + n,) m, coefficients of the best plan so far */
     hsep_word of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
     hsep_word command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
@@ -110,10 +110,10 @@ typedef struct {
     const hsep_real *residuals; /* (p,) m, the last ones measured, newest first */
 } hsep_trusted_before;
 
-/* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
- * It computes variances only of the samples that the plan leaves as they are and of the late ones before them. Cost: as
- * hsep_trusted_forecast; a late measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part,
- * for variances. */
+/* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
+ * trusted. It computes variances only of the samples that the plan leaves as they are and of the late ones before them.
+ * Cost: as hsep_trusted_forecast; a late measurement adds late^2 / 2 multiply-adds for each expert, here and in the
+ * last part, for variances. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, hsep_word best);
 
