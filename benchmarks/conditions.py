@@ -3,10 +3,10 @@
     python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 40]      (some minutes)
 
 1. Start in motion: runs cut in mid-motion, RMS relative to the physics model's, which starts at rest, too.
-2. Delay of the measurement: RMS relative to that of a run without delay over the same samples, predicted at the same
+2. Delay of the measurement: RMS relative to a run without delay over the same samples, predicted at the same
    horizon, the samples since the last measurement that has arrived: its windows begin the delay earlier. Then over
    whole windows, where the run with delay predicts that much further.
-3. Plant changed before a warm run: RMS from 2 s on, relative to that of a cold run.
+3. Plant changed before a warm run: RMS from 2 s on, relative to a cold run.
 4. Sampling rates: RMS of one plant at 250 Hz, 1 kHz and 8 kHz, windows of 0.1 s each, relative to 1 kHz.
 
 RMS is against the measured position.
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def print_ratios(title: str, ratios: Iterator[tuple[str, float, float]]) -> None:
-    """Print a table of names, RMS errors, m, and their ratios to those of a peer."""
+    """Print a table of names, RMS errors, m, and their ratios to a peer's."""
     print(f"\n{title:44}{'µm':>10}{'peer':>10}{'ratio':>9}")
     found = []
     for name, error, peer in ratios:
@@ -147,7 +147,7 @@ def _in_turn(case: Case, settings: PredictorSettings, *, earlier: int = 0) -> li
     for x in case.x_meas:
         x_meas = _after_rest(x, earlier + late)[: len(x_d)]
         found = backtest(predictor, x_d, x_meas)
-        errors.append((x_meas - found.x_h)[earlier + late :])  # with a delay x_h is that of the sample measured
+        errors.append((x_meas - found.x_h)[earlier + late :])  # with a delay x_h belongs to the sample measured
         predictor.restart()
     return errors
 

@@ -65,7 +65,7 @@ class Row:
 
     @property
     def ratio(self) -> float:
-        """RMS of the hybrid relative to that of the best of the others."""
+        """RMS of the hybrid relative to the best of the others."""
         return self.rms["hybrid"] / self.rms[self.best]
 
     def __str__(self) -> str:

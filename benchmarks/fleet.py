@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.fleet`` replays ``--logs`` logs of simulated drives, some of them broken, on a cluster of two
 workers of which one is killed, then again; compares each row with a single replay, and the processor time, imports
-aside, with that of the same replays in one process; and runs 300 and 3000 tasks without work for the memory.
-``--fit`` fits, which takes twenty times as long.
+aside, with the same replays in one process; and runs 300 and 3000 tasks without work for the memory. ``--fit`` fits,
+which takes twenty times as long.
 """
 
 from __future__ import annotations

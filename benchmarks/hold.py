@@ -124,7 +124,7 @@ def reading(log: Path) -> list[str]:
 
 
 def of_fmu(archive: Path, x_d: Column, x_meas: Column, Np: int) -> float:
-    """Return the difference of an FMU's ``rms_hold``, m, from that of the columns that it shows."""
+    """Return the difference of an FMU's ``rms_hold``, m, from the value that follows from the columns it shows."""
     controller, n = FmuController(archive, {"t_init": 0.0}, 0.0), len(x_d)
     with controller:
         controller.initialise(x_d[0])

@@ -1,10 +1,10 @@
 """Instructions of a sample of the native FMUs, counted one by one by callgrind: median, 99th percentile, dearest.
 
 HybridPredictor with a window of 100 samples and 50 lags over the log of a staircase, and SepCompensator with windows
-of 50, 50 lags and a preview of 200 in closed loop with the drive of eq. (13), whose limits are those of the
-trajectory, so that nearly every plan is bounded. Both over 60 windows, with nothing learned before (cold) and with
-what an earlier run has learned (warm); the first window, or the first fill of the preview, is left out. Needs
-valgrind; ends with 1 if a limit is missed.
+of 50, 50 lags and a preview of 200 in closed loop with the drive of eq. (13), within the trajectory's limits, so that
+nearly every plan is bounded. Both over 60 windows, with nothing learned before (cold) and with what an earlier run has
+learned (warm); the first window, or the first fill of the preview, is left out. Needs valgrind; ends with 1 if a limit
+is missed.
 
 Run with ``python -m benchmarks.instructions``.
 """

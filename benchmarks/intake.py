@@ -1,10 +1,11 @@
 """Faults in many logs, and what the intake says of them and of good logs.
 
-``python -m benchmarks.intake --drives 150`` takes some minutes. The faults are those of tests/support/spoiled_logs.py.
+``python -m benchmarks.intake --drives 150`` takes some minutes. The faults come from tests/support/spoiled_logs.py.
 The thresholds of the checks were chosen on the logs named here, on the random drives 0 to 399 and on the generated logs
-0 to 159 (tests/support/generated_logs.py): ``--first 1000 --spoil 20 --generated 200`` judges them on others. Those of
-clipped positions were chosen on the axes 0 to 299 that stand by friction and load (tests/support/standing_axes.py), and
-on the recorded arm: ``--only-standing --first 1000 --standing 120`` judges them on others in a minute.
+0 to 159 (tests/support/generated_logs.py): ``--first 1000 --spoil 20 --generated 200`` judges them on others. The
+thresholds for clipped positions were chosen on the axes 0 to 299 that stand by friction and load
+(tests/support/standing_axes.py), and on the recorded arm: ``--only-standing --first 1000 --standing 120`` judges them
+on others in a minute.
 """
 
 from __future__ import annotations

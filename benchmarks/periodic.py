@@ -3,8 +3,8 @@
     python benchmarks/periodic.py
 
 RMS error of the hybrid in µm on random moves, cold, and in a second run with other moves from another start. The drive
-is that of the staircase without its cubic terms, plus a force that moves its position of rest by a sine of the
-position; the noise is 1 µm.
+is the staircase's without its cubic terms, plus a force that moves its position of rest by a sine of the position; the
+noise is 1 µm.
 """
 
 from __future__ import annotations

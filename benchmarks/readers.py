@@ -104,7 +104,7 @@ def read(path: Path) -> None:
 
 
 def _peak() -> float:
-    """Return the peak of the resident memory, MB; getrusage begins with that of the parent, which wrote the log."""
+    """Return the peak of the resident memory, MB; getrusage begins with the parent's, which wrote the log."""
     status = Path("/proc/self/status").read_text()
     return float(next(line.split()[1] for line in status.splitlines() if line.startswith("VmHWM:"))) / 1024
 

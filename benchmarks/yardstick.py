@@ -76,8 +76,8 @@ class Axis:
     split : bool
         Whether the warm run is of the test samples alone, after one of the samples before them; else of all samples.
     best : float, m
-        RMS error, over the test samples, of what the errors are relative to; those of the warm run are relative
-        to ``best_warm``.
+        RMS error over the test samples to which the errors of the cold run are relative; the warm run's are relative to
+        ``best_warm``.
     best_warm : float, m
     """
 

@@ -35,8 +35,8 @@ FMUS = {
     "SepCompensator": "In the predictor's place: it delays the command by `preview` samples and modifies it.",
     "FeedDrive": "The nonlinear drive of eq. (13), a plant to try the others with.",
     "ReferenceTrajectory": "Plays the staircase, the spiral or samples of yours, so that a system runs without a "
-    "script. Built with samples (`--trajectory`) it has `3 samples` besides and starts with it; the interval is that "
-    "of what lies in its archive.",
+    "script. Built with samples (`--trajectory`) it has `3 samples` besides and starts with it; the samples in the "
+    "archive set the interval.",
 }
 """FMUs of the default machine, with what each is for."""
 
@@ -205,7 +205,7 @@ def fmu_variables() -> str:
         "interval `T_s`, `dead_time` and `input_hold` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
         "An identified one is the model that a log gave, for trying: no measurement. "
         "FMUs are named "
-        "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
+        "after their machine (`HybridPredictor_als25010_x`), but of `spring_mass_damper` plainly; the Python flavour "
         "ends in `Py`, FMI 3.0 in `Fmi3`, before the machine.",
     ]
     return _page(parts)

@@ -9,8 +9,8 @@ The physics-based model is the drive without it::
 The paper's example is ``h = x_d²``; its Remark allows others. Eqs. (8) and (9) split the response from rest into what
 the command does and what ``h`` does, ``x = x_pb + e_pb``; the second part is eq. (10),
 ``e_pb(k) = Σ_{i<k} C A^{k−1−i} Γ h(i)``. With ``C Aⁿ Γ ≈ 0`` from ``n = p`` on, the paper concludes: if the last ``p``
-samples of ``h`` depend linearly on the ones before, ``η(D) h = 0`` with ``D`` the delay by one sample, so do those of
-the residual, ``η(D) e_pb ≈ 0``.
+samples of ``h`` depend linearly on the ones before, ``η(D) h = 0`` with ``D`` the delay by one sample, so do the
+residual's samples, ``η(D) e_pb ≈ 0``.
 
 The rest is not in the paper. By Cayley and Hamilton the characteristic polynomial ``χ`` of ``A`` takes the drive out,
 ``χ(D) e_pb = N(D) h``, with as many terms as ``A`` has states, whether or not ``C Aⁿ Γ`` has decayed. Hence

@@ -1,11 +1,11 @@
-"""Closed loops of FMUs at the times of importers: figures against those of exact steps.
+"""Closed loops of FMUs at the times of importers: figures against the figures of exact steps.
 
 SepCompensator and FeedDrive, and HybridPredictor and FeedDrive, over the staircase. What an importer calls the time is
 rounded, and so are its steps: whole nanoseconds, single precision up to 100 s, sums of steps. Where steps jitter, as
 differences of times in single precision do by 0.4 % of 1 ms, the drive moves otherwise, because it is integrated over
 the steps that it gets: what the look-ahead's clock adds to that is the difference from a loop whose look-ahead alone
 has exact steps. Ends with 1 if that is more than 1e-3 of an RMS, or if an RMS at times whose steps do not jitter
-differs by more from that of exact steps.
+differs by more from the RMS of exact steps.
 """
 
 from __future__ import annotations

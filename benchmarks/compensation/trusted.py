@@ -31,7 +31,7 @@ from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.trajectory import spiral, staircase
 
 NO_WORSE = 1.02
-"""Largest RMS relative to that of the physics model's plans, where there is no figure."""
+"""Largest RMS relative to the physics model's plans, where there is no figure."""
 
 OUTLIER_MOVES = 5.0
 """Largest change of x_dm by an outlier of 1 mm, µm."""

@@ -12,7 +12,8 @@ __all__ = ["FAULTS", "JITTER", "OFFSET_STEP", "Fault"]
 
 Fault = Callable[[Array, float, np.random.Generator], tuple[Array, int]]
 """From measured positions, (n,), m, the sampling interval, s, and random numbers, to faulty positions and the index of
-the last faulty sample; of an offset step that of the first shifted one, from which on the shifted position is true."""
+the last faulty sample; for an offset step the index of the first shifted sample, as the shifted position is true from
+there on."""
 
 
 def outliers(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:

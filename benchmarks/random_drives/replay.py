@@ -42,7 +42,7 @@ PREDICTORS: dict[str, Callable[[PredictorSettings], PredictorSettings]] = {
     "default": lambda settings: settings,
     "paper": lambda settings: replace(settings, trust=False),
 }
-"""Settings of a predictor, from those of a drive."""
+"""Settings of a predictor, from the settings of a drive."""
 
 
 def library_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:

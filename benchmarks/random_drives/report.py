@@ -18,7 +18,7 @@ UM = 1e6
 
 
 def print_replays(replays: Sequence[Replay], predictor: str) -> None:
-    """Print ratios of RMS errors, those of each kind of trajectory, and the worst drives."""
+    """Print ratios of RMS errors, over all drives and by kind of trajectory, and the worst drives."""
     print(f"{len(replays)} random drives, predictor: {predictor}")
     quantiles = (0.01, 0.1, 0.5, 0.9, 0.99)
     print(f"RMS at quantiles of {', '.join(f'{q:g}' for q in quantiles)}, µm")

@@ -122,7 +122,7 @@ def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
     command : (2, 4) array
         Output weights of the response to the command.
     force : (2, 4) array
-        Those of a force at the tool: every mode in phase, without zeros, static gain 1.
+        Output weights of the response to a force at the tool: every mode in phase, without zeros, static gain 1.
     """
     A, b, c = model.state_space()
     step, gain = np.zeros((2, 2, MODES_MAX)), np.zeros((2, MODES_MAX))

@@ -3,7 +3,7 @@
 Builds two C hosts (``main.c``): the compensator with the drive of eq. (13), and the predictor over the drive's log,
 both with the paper's settings; then the compensator with trust and the settings of its machine file. Times every step
 of both by turns, counts instructions step by step where valgrind is installed, and ends with 1 if a limit is missed.
-Where the drive's limits are those of the trajectory, nearly every plan is bounded, which is the most that planning can
+Within the trajectory's limits nearly every plan is bounded, which is the most that planning can
 cost.
 """
 

@@ -56,8 +56,8 @@ TAIL_OVER_MEDIAN_MAX = 15.0
 """Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
 
 TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX, TRUST_LONGEST = 1e6, 6.0, 0.5
-"""Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model; the
-longest step, if nothing interrupts it, relative to T_s."""
+"""Limits with trust: instructions of the most expensive step; median instructions over the paper's model's; the longest
+step, if nothing interrupts it, relative to T_s."""
 
 
 def lapack_ns_per_sample(n: int) -> float:
@@ -167,7 +167,7 @@ def trained() -> HybridPredictor:
 
 
 def trust_limits(run: str, counts: Array, paper: Array) -> list[tuple[bool, str]]:
-    """Compare the instructions of a cold or warm run with trust with their limits, and those of the paper's model."""
+    """Compare the instructions of a cold or warm run with trust with their limits and with the paper's model."""
     most, median = float(np.max(counts)), float(np.median(counts))
     ratio = median / float(np.median(paper))
     return [

@@ -62,7 +62,7 @@ class Result:
     excess: float
 
     def over_physics(self, part: int) -> float:
-        """RMS relative to that of the physics model's plans."""
+        """RMS relative to the physics model's plans."""
         return self.hybrid[part] / self.physics[part]
 
     def over_better(self, part: int) -> float:

@@ -27,7 +27,7 @@ DURATION = 2.5
 """Longest run, s."""
 
 KNOTS, SETTLING = 0.002, 0.15
-"""Time between the knots of a plan, and that of a preview beyond the window, s."""
+"""Time between the knots of a plan, and time of a preview beyond the window, s."""
 
 SPARE = (2.0, 3.0, 5.0)
 """Limits of velocity, acceleration and jerk relative to the trajectory's."""

@@ -7,8 +7,8 @@
  * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
  * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.
  * Arguments are as said at each function: positions are finite and within +- 1000 m, pointers are not NULL unless said
- * so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it returns 0 for those
- * that are out of their ranges, and no other function may be called with them.
+ * so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it returns 0 where one is
+ * out of its range, and no other function may be called with such parameters.
  *
  *   function                 | bounded cost                                          | what may fail
  *   hsep_defaults            | constant                                              | nothing
@@ -78,9 +78,9 @@ typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_D
 /* ------------------------------------------------------------------------------------------------ The predictor --
  *
  * It is a look-ahead buffer between interpolator and drive. Sample k brings x_d_ahead, the command r(k) that the drive
- * is to have Np samples later, and x_meas, the position measured now; after it the outputs are those of sample k + 1,
- * with x_d(k) = r(k - Np). Before r(0) arrives at the drive, the drive is at rest at start. Where the measurement is
- * late by measurement_delay samples, x_meas = x(k - measurement_delay).
+ * is to have Np samples later, and x_meas, the position measured now; after it the outputs belong to sample k + 1, with
+ * x_d(k) = r(k - Np). Until r(0) arrives at the drive, the drive is at rest at start. Where the measurement is late by
+ * measurement_delay samples, x_meas = x(k - measurement_delay).
  */
 typedef struct hsep_predictor hsep_predictor;
 
@@ -124,11 +124,11 @@ HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i);
  */
 typedef struct hsep_compensator hsep_compensator;
 
-/* Model that plans the commands of a window; of the setting compensate, the best one allowed. */
+/* Model that plans the commands of a window; as the setting compensate: the best model allowed. */
 typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
 
 typedef struct {
-    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
+    hsep_predictor_outputs predicted; /* x_h by the model that planned the window; with trust by the trusted model */
     hsep_real x_dm;                   /* m, now */
     hsep_sep_state state;             /* of the plan that x_dm follows now */
 } hsep_compensator_outputs;
@@ -146,8 +146,8 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
- * Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at x_d: with compensate off
- * that rest is followed, and where it is larger than change_max it is the bound. */
+ * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
+ * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. */
 HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
 
 /* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */

@@ -45,7 +45,7 @@ def hal(
     if len(set(names)) < len(names):
         raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
     if weights is not None and len(axes) > 1:
-        raise ParameterError(f"--weights are those of one axis, got {len(axes)} machines; write them one by one")
+        raise ParameterError(f"--weights belong to one axis, got {len(axes)} machines; write them one by one")
     component = COMPONENTS[model]
     trained = None if weights is None else load_trained(weights, axes[0], model)
     files = {out / name: content for name, content in component_files(model).items()}

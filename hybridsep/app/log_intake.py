@@ -93,7 +93,7 @@ def open_checked(
     check_unit(path.name, checked, machine)
     trust = bool(reading.get("may_miss"))
     intake = check(replace(checked, unit=machine.unit), machine, bridged=BRIDGED_MAX if trust else 0)
-    # Times that repeat, as those do that are rounded coarsely, tell no interval
+    # Times that repeat, because they are rounded coarsely, tell no interval
     if not fix and not any(finding.name == "time order" for finding in intake.errors):
         check_interval(path.name, reader.T_s, machine)
     if intake.errors and not (fix or as_is):
@@ -110,7 +110,7 @@ def open_checked(
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
         if not trust and any(finding.name == "gaps" for finding in intake.findings):
-            bridged = f"with trust (--trust true) those of at most {BRIDGED_MAX} samples are bridged"
+            bridged = f"with trust (--trust true) gaps of at most {BRIDGED_MAX} samples are bridged"
             show([f"every gap cuts, as the model has trust = false; {bridged}"], [])
         fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != MISSING))
         return (fixed if segments else _longest_segment(fixed, path)), intake
@@ -120,7 +120,7 @@ def open_checked(
 
 
 def different_logs(logs: Sequence[Log]) -> list[Log]:
-    """Return the logs without those that have the samples of one before; it is said of each that is left out."""
+    """Return the logs, leaving out and reporting each that has the samples of an earlier one."""
     kept: list[Log] = []
     for log in logs:
         same = [

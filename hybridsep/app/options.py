@@ -151,7 +151,7 @@ PREDICTOR_ENTRIES = _entries(PredictorSettings)
 """Parameters that the section ``[predictor]`` of a machine file may have, by the names of the settings' fields."""
 
 KNOWN_ENTRIES = {name: PREDICTOR_ENTRIES[name] for name in ("period", "measurement_delay")}
-"""Those that are known of an axis, which no log is fitted for."""
+"""Entries that are known of an axis and not fitted to a log."""
 
 COMPENSATOR_ENTRIES = {name: entry for name, entry in _entries(CompensatorSettings).items() if name != "compensate"}
 """Parameters that the section ``[compensator]`` may have besides, less the model, which commands choose themselves."""
@@ -167,14 +167,14 @@ def takes_parameters(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that gives a command an option for each parameter.
 
-    The command's argument ``parameters`` becomes the mapping of those that are given, by their names in FMUs.
+    The command's argument ``parameters`` becomes the mapping of the parameters that are given, by their names in FMUs.
 
     Parameters
     ----------
     *groups : dict
         Of :data:`PREDICTOR_ENTRIES` and :data:`COMPENSATOR_ENTRIES`.
     ranges : collection of str
-        Fields of those that take several values; theirs are given as text.
+        Fields of the parameters that take several values, given as text.
     otherwise : str
         What counts where an option is left out.
     """
@@ -240,7 +240,7 @@ class ReadingOptions:
 def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command these options in the place of its argument ``reading``, which becomes :class:`ReadingOptions`.
 
-    With ``--list-channels`` the channels of its logs are printed in the place of all that it does.
+    With ``--list-channels`` the channels of its logs are printed and nothing else is done.
     """
     listing = inspect.Parameter(_LIST, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=ListChannelsOption)
 

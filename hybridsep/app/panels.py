@@ -25,7 +25,7 @@ _PANELS = {
 """Panel of an option by its name; the others are the command's own, the first."""
 
 _KNOWN_OF_A_REPLAY = ("backtest", "report", "cosim", "tune")
-"""Commands that take all parameters of the predictor, those that are known of an axis among them."""
+"""Commands that take all parameters of the predictor, also the entries that are known of an axis."""
 
 EXAMPLES = {
     "fit": (

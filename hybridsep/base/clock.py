@@ -4,7 +4,7 @@ The clock keeps its own time, the compensated sum of the step sizes: the importe
 within ``δ = max(0.05·T_s, 8 ulp(t))`` of a communication point, or half a step where that is less, is at that point,
 and the next one is counted from there: the grid of samples follows the importer's. Elsewhere instants are ``T_s``
 apart. An instant at a step's start belongs to that step, where the inputs of sample ``k`` are latched; the sample is
-executed in the step whose end reaches the next instant. The arithmetic is that of ``hsep_clock.c``, operation by
+executed in the step whose end reaches the next instant. The arithmetic is the same as in ``hsep_clock.c``, operation by
 operation.
 """
 

@@ -76,7 +76,7 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
 
 @contextmanager
 def starting_processes() -> Iterator[None]:
-    """Let processes that are started ignore a terminal's Ctrl-C, which ends this one and with it them.
+    """Let processes that are started ignore a terminal's Ctrl-C: it ends this process, which ends them.
 
     Meanwhile it is ignored here, too. Does nothing outside the main thread.
     """

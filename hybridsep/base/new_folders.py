@@ -8,11 +8,11 @@ from pathlib import Path
 __all__ = ["make_folder", "remove_empty_folders"]
 
 _made: list[Path] = []
-"""Folders that were made, those within others first."""
+"""Folders that were made, inner ones first."""
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, as far as they do not exist.
+    """Make a folder and its parents, as far as they do not exist.
 
     Raises
     ------

@@ -28,7 +28,7 @@ __all__ = ["named_errors", "written_text", "written_whole"]
 _PART = re.compile(r"\.hybridsep-[0-9a-f]{32}\.tmp")
 
 _ORPHAN_AGE = 3600.0
-"""Time without a write after which a file is taken for left behind where there are no locks, on Windows, s."""
+"""Time without a write after which a file counts as left behind, where there are no locks (Windows), s."""
 
 
 @contextmanager
@@ -79,7 +79,7 @@ def _remove_orphans(folder: Path) -> None:
 
 @contextmanager
 def _new_part(folder: Path) -> Iterator[Path]:
-    """Make a file for new content, which :func:`_remove_orphans` of other processes leaves; remove it if it is left."""
+    """Make a file for new content, which other processes' :func:`_remove_orphans` spares; remove it if it stays."""
     while True:
         part = folder / f".hybridsep-{uuid.uuid4().hex}.tmp"
         descriptor = os.open(str(part), os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)

@@ -161,8 +161,8 @@ class PredictorSettings(Settings):
     trust : bool
         Whether the residual model is :class:`~hybridsep.predict.trust.model.TrustedModel`; else it is the paper's.
     effect, noise_std : float
-        With trust: prior standard deviation of the effect of a feature, and that of the measurement noise, m; 0: from
-        the residuals.
+        With trust: prior standard deviation of the effect of a feature, and standard deviation of the measurement
+        noise, m; 0: from the residuals.
     forgetting : float
         With trust: time constant with which samples lose their weight, s; 0: never.
     period : float
@@ -214,7 +214,7 @@ class PredictorSettings(Settings):
     )
     trust: bool = flag(
         True,
-        "whether the residual model is trusted only as far as its variance allows; false: the paper's",
+        "whether the residual is predicted by online model averaging; false: by the paper's model",
         learned=True,
     )
     effect: float = real(
@@ -302,15 +302,16 @@ class CompensatorSettings(Settings):
     spacing : int, optional
         Samples between knots, a divisor of ``Np``: it sets the bandwidth of the change of the command.
     jerk_weight : float
-        Weight of the sum of squares of the change's third differences, against that of the tracking error.
+        Weight of the sum of squares of the change's third differences, relative to the sum of squares of the tracking
+        error.
     limits : Limits, optional
         The drive's limits, which the differences of ``x_dm`` keep; none if left out.
     change_max : float, optional
         Bound on the magnitude of the change, m; none if None. About twice the servo error without compensation: hybrid
         plans that ask for far more end for the run (:func:`~hybridsep.compensate.trusted_plan.runs_away`).
     no_reversal : bool
-        Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
-        has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
+        Whether the velocity of ``x_dm`` keeps the sign of the velocity of ``x_d``: where it turns, friction changes its
+        sign. It has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
     """
@@ -370,7 +371,7 @@ class CompensatorSettings(Settings):
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
-        """Return the parameters, those of the limits included, by their names in FMUs."""
+        """Return the parameters, the limits' included, by their names in FMUs."""
         own = list(super().fmi_parameters().items())
         place = [name for name, _ in own].index("change_max")
         return dict((*own[:place], *Limits.fmi_parameters().items(), *own[place:]))

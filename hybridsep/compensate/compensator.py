@@ -120,14 +120,14 @@ class SepCompensator:
     def change(self, **settings: Any) -> None:
         """Change settings in a run, from the next window on; no command jumps.
 
-        Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at ``x_d``: with
-        ``compensate="off"`` that rest is followed, so the change of the command fades within the preview. Where it is
-        larger than a new ``change_max``, it is bounded by that rest.
+        Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at ``x_d``. With
+        ``compensate="off"`` the command follows that remainder, so its change fades within the preview. Where the
+        remainder is larger than a new ``change_max``, it is the bound.
 
         Parameters
         ----------
         **settings
-            ``compensate`` or ``change_max``, as those of :class:`~hybridsep.base.settings.CompensatorSettings`.
+            ``compensate`` or ``change_max``, as in :class:`~hybridsep.base.settings.CompensatorSettings`.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """Drive limits as linear inequality constraints on a plan's coefficients, and the quadratic programme under them.
 
 Rows are normalised by their limits. The remainder of the last plan is always feasible: it kept the limits when it was
-made. Where ``x_d`` itself exceeds a limit, the bound is relaxed to what that remainder takes.
+made. Where ``x_d`` itself exceeds a limit, the bound is relaxed to the remainder's value.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class DriveBounds:
     change_max : float or None
         Bound on ``|δ|``, m.
     no_reversal : bool
-        Whether the velocity of ``x_dm``, if it is limited, keeps the sign of that of ``x_d`` where that one moves.
+        Whether the velocity of ``x_dm``, if it is limited, keeps the sign of the velocity of ``x_d`` where ``x_d``
+        moves.
     """
 
     def __init__(
@@ -104,9 +105,9 @@ class DriveBounds:
         x_d : (preview,) array, m
             Commanded positions.
         x_d_before, delta_before : (3,) arrays, m
-            Their last three values, and those of the change.
+            Last three commanded positions before the plan, and last three changes of them.
         rest : (3 + n_free,) array, m
-            Coefficients of the rest of the last plan, the decided ones first.
+            Coefficients of the remainder of the last plan, the decided ones first.
         may_turn : bool
             Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
         """
@@ -143,7 +144,7 @@ def solve(
     """Return the minimiser of the cost within the bounds.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
-    ``rest``: a real-time implementation solves for the others while those act.
+    ``rest``: a real-time implementation solves for the others while the pinned ones act.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def solve(
     always : bool
         Whether no plan changes them.
     may_bind : bool
-        Whether the bounds may be active: that takes steps of the interior point.
+        Whether the bounds may be active, which takes steps of the interior-point solver.
     tolerance : Tolerance
         Of these steps.
 
@@ -177,7 +178,7 @@ def solve(
 
 
 def _unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
-    """Return the minimiser of the cost, ``(n,)``, m, with the first ``n_pinned`` coefficients those of ``rest``."""
+    """Return the minimiser of the cost, ``(n,)``, m, with the first ``n_pinned`` coefficients as in ``rest``."""
     left = cost.without(rest[:n_pinned])
     try:
         c = np.asarray(cho_solve(cho_factor(left.P), left.v))
@@ -198,7 +199,7 @@ def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: 
     Parameters
     ----------
     cost, bounds, rest, n_pinned, tolerance
-        As those of :func:`solve`.
+        As in :func:`solve`.
     scale : float, m²
         :func:`_cost_scale`.
     """

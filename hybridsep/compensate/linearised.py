@@ -1,13 +1,13 @@
 """Trusted model over a preview, and its linearisation in the commands.
 
-Disturbances of the commands are no affine functions of them, so a plan follows their slope: at given commands the
-prediction changes with them as an affine map does, friction by ``sech²(v/v_i)``, stiffness by ``2|x|``. Weights, the
-stack's and the shrinking by the variance are held:
+Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is ``sech²(v/v_i)`` for
+friction and ``2|x|`` for stiffness. The weights of the experts and of the stack, and the shrinking by the variance, are
+held constant:
 
 ``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
 
-with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command. An
-expert that doubts earlier runs, D, counts as the one of these whose counterpart it is.
+The expert of the command alone, A, is linear and time-invariant: its features are increments and lags of the command.
+The expert D, which doubts earlier runs, counts as the expert whose counterpart it is.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ class PlanModel:
         Commands between there and the preview, relative to the start.
     start : float, m
     x_d, path : (n,) array, m
-        Commands that the scales of the features and the variances of predictions follow from, and unmodified ones,
-        relative to the start.
+        Commands from which the scales of the features and the variances of predictions follow; and unmodified commands.
+        Both relative to the start.
 
     Attributes
     ----------

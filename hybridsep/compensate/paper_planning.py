@@ -1,4 +1,4 @@
-"""Plans on the paper's model, eq. (3), and on the physics model where that one has none."""
+"""Plans on the paper's model, eq. (3), and on the physics model where the paper's has none."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class PaperPlanning(Planning):
     TOLERANCE: ClassVar[Tolerance] = EXACT
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the plan of the best model that has one, else the rest of the last plan."""
+        """Return the plan of the best model that has one, else the remainder of the last plan."""
         candidates = self._candidates(predictor, most)
         if not candidates:
             return ChosenPlan(SepState.OFF, preview.rest, None)
@@ -66,8 +66,8 @@ def has_stable_poles(w_e: Array) -> bool:
     Schur-Cohn stability test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*,
     Wiley 1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
     polynomial to one of a degree less; all roots are inside if and only if every reflection coefficient is below 1 in
-    magnitude. Without the test the stage's Y axis, cold and free to turn, ends at 2.8 times the error of the physics
-    model's plans instead of 0.8.
+    magnitude. Without the test, plans on the stage's Y axis, cold and free to turn, end at 2.8 times the error of the
+    physics model's plans instead of 0.8 times.
 
     Parameters
     ----------

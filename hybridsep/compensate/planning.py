@@ -32,7 +32,7 @@ class Preview:
     x_d_before, delta_before : (3,) array, m
         Last commanded positions before, and last changes of them.
     rest : (3 + n_free,) array, m
-        Coefficients of the rest of the last plan, the decided ones first.
+        Coefficients of the remainder of the last plan, the decided ones first.
     """
 
     command: Array
@@ -62,7 +62,7 @@ class ChosenPlan(NamedTuple):
 
 
 class PublishedPosition(NamedTuple):
-    """``x_h`` and ``x_h_std``, ``(Np,)``, m; leading samples where ``x_h = x_pb``; those that follow the last plan."""
+    """``x_h``, ``x_h_std``, ``(Np,)``, m; leading samples: in the warm-up (``x_h = x_pb``); following the last plan."""
 
     x_h: Array
     x_h_std: Array
@@ -86,7 +86,7 @@ class Planning(ABC):
     PINNED : int
         Leading samples of a window in which a plan follows the last one.
     ALWAYS : bool
-        Whether every plan does; else those that the drive's limits bound.
+        Whether every plan follows the last one there; else only plans that the drive's limits bound.
     TOLERANCE : Tolerance
         Of the solver.
     """

@@ -3,9 +3,9 @@
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
 of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
-velocity (Levenberg-Marquardt). A plan is made while its first samples act, which follow the last one; steps, tries and
-the solver's steps are limited, so that their work fits into those samples. Predictions are shrunk by their variance, so
-where the model knows nothing the plan is the physics model's.
+velocity (Levenberg-Marquardt). The first samples of a plan follow the last plan, and the plan is made while they act.
+Steps, tries and the solver's steps are limited, so that the work fits into these samples. Predictions are shrunk by
+their variance, so where the model knows nothing the plan is the physics model's.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ rounding tells apart are equal."""
 
 
 _AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
-"""Change of a plan, relative to the largest one, that is at its bound; share of a window in which a plan may be there
-longer than the physics model's; and RMS error that it may leave then, relative to the largest change."""
+"""A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
+model's plan by this share of a window, and may leave this RMS error then, relative to the largest change."""
 
 
 def runs_away(delta: Array, of_physics: Array, error: float, change_max: float) -> bool:
-    """Return whether a plan asks for more than compensation is made for, which shows that its model is wrong.
+    """Return whether a plan asks for a larger change than compensation is made for: its model is wrong then.
 
-    A motor at its limit does not follow, so that the next plan asks for more; and a position loop that is driven so far
-    has a second state, with an error many times larger, in which it stays when compensation ends.
+    A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
+    fall into a second state with an error many times larger, and stays in it when compensation ends.
 
     Parameters
     ----------
@@ -111,12 +111,12 @@ class TrustedPlanner:
         return self._at(coefficients).cost
 
     def plan(self, rest: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
-        """Return the coefficients of the best plan found from the rest of the last one, and its cost, m².
+        """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
 
         Parameters
         ----------
         rest : (3 + n_free,) array, m
-            Coefficients of the rest of the last plan, the decided ones first; they are feasible.
+            Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
         bounds : Bounds
         n_pinned : int
             Coefficients that the plan does not change.

@@ -1,4 +1,4 @@
-"""Plans with the trusted model: the physics model's, or one on the trusted model that it says is better.
+"""Plans with the trusted model: the physics model's plan, or one on the trusted model, which judges it to be better.
 
 Where a plan runs away, the physics model plans the rest of the run.
 """
@@ -27,7 +27,7 @@ class TrustedPlanning(Planning):
     """Plans with the trusted model, which watches itself."""
 
     PINNED: ClassVar[int] = 20
-    """Every plan follows the last one there, as it takes more work than the paper's."""
+    """Every plan follows the last plan in these samples, as it takes more work than a plan on the paper's model."""
 
     ALWAYS: ClassVar[bool] = True
     TOLERANCE: ClassVar[Tolerance] = TOLERANCE
@@ -60,7 +60,8 @@ class TrustedPlanning(Planning):
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.
 
-        It vouches for itself, and what planned the window is not known before its first samples have acted.
+        Its prediction needs no stability test, and which model planned the window is known only after its first samples
+        have acted.
         """
         n_followed, Np = self.n_pinned * self.spacing, len(prediction.x_pb)
         if most is SepState.HYBRID:
@@ -74,7 +75,7 @@ class TrustedPlanning(Planning):
         return runs_away(values @ hybrid, values @ physics, math.sqrt(cost / self.preview), change_max)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
-        """Return the trusted model over the preview, with the scales of the rest of the last plan."""
+        """Return the trusted model over the preview, with the scales of the remainder of the last plan."""
         trusted = predictor.residual
         assert isinstance(trusted, TrustedModel)
         assert predictor.start is not None

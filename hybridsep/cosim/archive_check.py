@@ -15,10 +15,10 @@ __all__ = ["DESCRIPTION", "read_description_text"]
 DESCRIPTION = "modelDescription.xml"
 
 _MEMBERS_MAX = 20_000
-"""Most files of an archive; one with the sources of a large model has thousands."""
+"""Most files of an archive; an archive with the sources of a large model has thousands."""
 
 _SIZE_ANY = 100 * 2**20
-"""Size of the unpacked files up to which any compression is taken, bytes: those of large tools' FMUs have as much."""
+"""Size of the unpacked files up to which any compression is taken, bytes: FMUs of large tools have as much."""
 
 _RATIO_MAX = 50
 """Largest ratio of unpacked to packed size beyond that: libraries and tables have up to 20, a bomb has 1000."""

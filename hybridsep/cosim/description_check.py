@@ -11,7 +11,7 @@ from ..base.errors import FmuError, brief, first_line
 __all__ = ["check_description"]
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
-"""Grammar of a modelIdentifier: that of a name in C (FMI 2.0, section 2.2.1)."""
+"""Grammar of a modelIdentifier: a name in C (FMI 2.0, section 2.2.1)."""
 
 _VERSION = re.compile(r"2\.0|3\.0(\.[0-9]{1,5})?")
 """Versions of FMI that are run."""

@@ -53,7 +53,7 @@ class Driver(ABC):
     prefix : str
         Begin of the functions' names.
     sized : bool
-        Whether they are told the number of values, which is that of variables without arrays.
+        Whether they are told the number of values, which without arrays is the number of variables.
     state, deserialise : str
         What the version's functions call a state, and its deserialisation.
     """

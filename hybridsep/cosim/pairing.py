@@ -54,7 +54,7 @@ def values_to_build(axis: Machine, model: str, values: Mapping[str, Any]) -> dic
 
 
 def check_predictor(axis: Machine, predictor: Path | None, weights: Path | None) -> None:
-    """Check a predictor FMU that is given, or else that the native one can be built.
+    """Check the predictor FMU that is given; where none is, check that the native one can be built.
 
     Raises
     ------

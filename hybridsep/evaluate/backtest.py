@@ -44,8 +44,8 @@ class Batch(NamedTuple):
     x_d, x : (n,) array, m
         Commanded and measured positions, NaN where missing.
     x_pb, x_hold, x_h : (n,) array, m
-        Predictions made before any of ``x`` was known. With a ``measurement_delay`` they, their deviation and ``x_d``
-        are those of the instants that ``x`` was measured at; it counts as missing before the first of them.
+        Predictions made before any of ``x`` was known. With a ``measurement_delay`` they, ``x_h_std`` and ``x_d``
+        belong to the instants at which ``x`` was measured; before the first of these ``x`` counts as missing.
     x_h_std : (n,) array, m
         Standard deviation of ``x − x_h``, as predicted.
     rms_pb, rms_hold, rms_h : float

@@ -23,7 +23,8 @@ ARX_LAGS = (20, 40)
 """Lags of the ARX models."""
 
 LAG_HOLD, FROZEN, REFITTED = "lag + hold", "frozen", "refitted"
-"""Name of the lag whose last residual is held; ARX fitted to what trains, and again before each window."""
+"""Name of the lag whose last residual is held; ways to fit ARX: to the training samples, or again before each
+window."""
 
 _FAR = 10.0
 """Distance of a prediction from its command, in largest commanded or measured distances from the start, beyond which it

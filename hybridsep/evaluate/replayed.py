@@ -25,7 +25,7 @@ def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int
     Np : int
         Samples in a window.
     measurement_delay : int
-        Samples by which measurements arrived late: those from before the log are left out.
+        Samples by which measurements arrived late: measurements from before the log are left out.
     """
     n = max(len(x_meas) - measurement_delay, 0)
     arrived = slice(measurement_delay, None)

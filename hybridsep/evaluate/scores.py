@@ -66,7 +66,7 @@ class Scores:
     Attributes
     ----------
     overall, after_warm_up : Score
-        Over all samples, and over those after the warm-up.
+        Over all samples, and over the samples after the warm-up.
     n_batches : int
         Windows replayed, the last one may be incomplete.
     verdict : Verdict

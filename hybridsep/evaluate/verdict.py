@@ -66,7 +66,8 @@ class Verdict:
     causes : tuple of str
         What explains it where it is worse, as far as the run shows.
     n_rejected, n_missing, n_samples : int
-        Measurements that were not learned, as they were missing or not plausible; those missing; and all of them.
+        Number of measurements that were not learned, as they were missing or not plausible; of missing ones; and of
+        all.
     n_windows : int
         Whole windows with measurements, which were judged.
     """

@@ -33,7 +33,8 @@ COMPENSATE = "physics"
 """Model that a new compensator starts with: the user chooses the hybrid when he has seen it to be better."""
 
 MARGINS = np.array([1.25, 2.0, 5.0])
-"""Limits of velocity, acceleration and jerk relative to a log's largest: those of the machines that come with it."""
+"""Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
+library."""
 
 LIMITS_WORDS = (
     f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "

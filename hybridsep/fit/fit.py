@@ -185,7 +185,7 @@ def fit(
     if options.Np is not None and options.Np > judging:
         raise ParameterError(
             f"--Np must be at most {judging}, got {options.Np}: the first half of each log trains, and the "
-            f"longest stretch of what tests has {judging} samples; give a smaller --Np, or a log of {2 * options.Np} "
+            f"longest stretch for the test has {judging} samples; give a smaller --Np, or a log of {2 * options.Np} "
             "samples or more"
         )
     default = replace(settings_for(Np, T_s, "zoh"), **options.known)

@@ -1,8 +1,8 @@
 """Plant that a fit leaves to try with: modes, friction and stiffness, fitted together to the log (output error).
 
 ``x = G (x_d − d)`` with ``d = f·tanh(v_d/v_friction) + κ·x·|x|``, from the identified model on. It is kept where it is
-better on the last third of what trains, else the identified model alone is the plant. It is no measurement: a
-compensator is tried on a disturbance that it has features for, so what comes out is optimistic.
+better on the last third of the training samples, else the identified model alone is the plant. It is no measurement:
+the compensator has features for just these disturbances, so results on this plant are optimistic.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ _EVALUATIONS = 30
 """Most evaluations of a fit; the example log's needs 30, a third of a second."""
 
 _SETTLED = 0.01
-"""What is left of an initial motion where samples begin to count."""
+"""Share of an initial motion that is left when samples begin to count."""
 
 _TRIED_MAX = 20_000
 """Most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for."""
 
 _MOVES = 0.25
-"""Share of the whole way from which the test part is tried with."""
+"""Share of the whole way that the test part must have to be tried with."""
 
 _AT_REST = 1e-3
 """Velocity at rest, relative to the largest."""
@@ -251,7 +251,7 @@ def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Pi
 
 
 def _noise(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> float:
-    """Return the standard deviation of the measurement noise, m: at least that of the resolution."""
+    """Return the standard deviation of the measurement noise, m, at least the resolution's."""
     discrete = plant.model.discretise(settings.T_s, settings.input_hold)
     found = []
     for piece in pieces:

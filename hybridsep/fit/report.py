@@ -138,7 +138,7 @@ def _write_settings(report: Report, fit: Fit, judged: Judged) -> None:
     ]
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
-        "Errors of causal replays over the later half of what trains. The first row is the default, which stays "
+        "Errors of causal replays over the later half of the training samples. The first row, the default, stays "
         f"unless another is better by {100 * WORTH:g} %.",
         "dim",
     )

@@ -166,14 +166,14 @@ def _mode(row: Mapping[str, Any]) -> float | None:
 
 
 def _change(values: Sequence[float | None]) -> float:
-    """Return the latest value relative to the median of those before, less 1; 0 without both."""
+    """Return the latest value relative to the median of the values before, less 1; 0 without both."""
     *before, last = [value for value in values if value is not None] or [0.0]
     middle = median_high(before) if before else 0.0
     return last / middle - 1.0 if middle else 0.0
 
 
 def _first(axes: Sequence[Course], page: Path, results: Path) -> str:
-    """Return the lists of the axes to look at first, each axis in that of its gravest remark."""
+    """Return the lists of the axes to look at first, each axis in the list of its gravest remark."""
     marked: dict[str, list[Course]] = {kind: [] for kind in _KINDS}
     for axis in axes:
         for kind, _ in axis.remarks()[:1]:
@@ -214,7 +214,7 @@ def _histogram(ratios: Sequence[float]) -> str:
     better = sum(ratio < 1.0 for ratio in ratios)
     middle = median_high(ratios)
     words = (
-        f"The hybrid's error relative to that of the best of physics model, hold and ARX models, latest log of each "
+        f"Error of the hybrid relative to the best of physics model, hold and ARX models, latest log of each "
         f"axis: {better} of {len(ratios)} below 1, median {middle:.2f}."
     )
     box = f"-8 0 {len(counts) * width + 16} {height}"

@@ -33,7 +33,7 @@ class FleetRun:
     Attributes
     ----------
     n_logs, n_unchanged : int
-        Logs, and those of them that were not read, as nothing has changed.
+        Number of logs, and of logs that were not read, as nothing has changed.
     rows : list of dict
         Rows that are new.
     """

@@ -82,7 +82,7 @@ class Looked:
     content : str
         Hash of its content.
     axes : tuple of str
-        Those of its axes that are wanted; one without a name where the format names none.
+        The axes that are wanted; one without a name where the format names none.
     """
 
     log: LogFile

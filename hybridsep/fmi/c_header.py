@@ -45,7 +45,7 @@ _MACROS = {
 
 @dataclass(frozen=True)
 class Layout:
-    """The parts of an FMU's table: single variables, then those of the modes, then windows.
+    """The parts of an FMU's table: single variables, then the modes' variables, then windows.
 
     Attributes
     ----------

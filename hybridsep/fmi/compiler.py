@@ -110,7 +110,7 @@ TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler: its command, and what tells it from others whose libraries may differ."""
+    """A C compiler: its command, and a key that differs where its libraries may differ."""
 
     command: tuple[str, ...]
     name: str

@@ -1,6 +1,6 @@
 """A native FMU run from its own content, before it is an archive: the model of its reference results.
 
-The calls are those of FMI 2.0, which the library of an FMI 3.0 FMU has as well.
+It calls the functions of FMI 2.0, which the library of an FMI 3.0 FMU has as well.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def jobs_of(
         if without and any(name.startswith("SepCompensator") for name in unknown):
             hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
         if fmi == FMI_VERSIONS[0] and any("Fmi3" in name for name in unknown):
-            hint += "; those of FMI 3.0 need --fmi 3"
+            hint += "; FMUs of FMI 3.0 need --fmi 3"
         raise ParameterError(
             f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _, _ in jobs)}{hint}"
         )

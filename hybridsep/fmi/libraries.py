@@ -1,9 +1,9 @@
 """Shared libraries of the native FMUs, one for each kind and platform.
 
 A library serves all FMUs of its kind: what one FMU differs in is read from its resources
-(:mod:`hybridsep.fmi.table_file`). Building a wheel compiles some (``hatch_build.py``): this machine's, of a release
-those of all platforms. Others are compiled when they are first asked for and kept, by a hash of sources and compiler,
-in a checkout's ``build/binaries`` or the user's cache.
+(:mod:`hybridsep.fmi.table_file`). Building a wheel compiles some (``hatch_build.py``): for this machine, in a release
+for all platforms. Others are compiled when they are first asked for and kept, by a hash of sources and compiler, in a
+checkout's ``build/binaries`` or the user's cache.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
 def library_paths(
     wanted: Sequence[Library], on_library: Callable[[Library], object] = lambda _wanted: None
 ) -> dict[Library, Path]:
-    """Return the files of libraries; those that are not there are compiled, and each is kept as soon as it is there.
+    """Return the files of libraries; missing ones are compiled, and each is kept as soon as it is there.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def has_native() -> bool:
 
 
 def default_targets() -> tuple[str, ...]:
-    """Return the targets where none are asked for: those of ``$HYBRIDSEP_TARGETS``, or else :func:`ready_targets`."""
+    """Return the targets where none are asked for: ``$HYBRIDSEP_TARGETS`` if it is set, else :func:`ready_targets`."""
     return (os.environ.get("HYBRIDSEP_TARGETS") and chosen_targets()) or ready_targets()
 
 

@@ -28,7 +28,7 @@ class LookAheadSlave(TableSlave):
     Attributes
     ----------
     model_type : type
-        That of the look-ahead's predictor or planner.
+        Type of the look-ahead's predictor or planner.
     """
 
     command = "x_d_ahead"

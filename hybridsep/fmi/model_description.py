@@ -154,7 +154,7 @@ def add_items(parent: ET.Element, variable: Variable) -> None:
 def variable_attributes(
     variable: Variable, reference: int, *, integers: Sequence[str]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the attributes of a variable, and those of its type.
+    """Return the attributes of a variable, and the attributes of its type.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ def sources(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str,
 
 
 def _licenses() -> dict[str, bytes]:
-    """Return our licence, those of the FMI headers, which they carry in their own comments, and the compiler's."""
+    """Return our licence, the FMI headers' licences, which are in their own comments, and the compiler's."""
     folder = data_folder("fmu_src")
     runtime = [(folder / "c" / "licenses" / file).read_text(encoding="utf-8") for file in ("zig.txt", "mingw-w64.txt")]
     lines = []

@@ -70,7 +70,7 @@ def run_together(
 def _start(
     i: int, command: Sequence[str], folder: Path, running: dict[int, tuple[subprocess.Popen[bytes], IO[bytes]]]
 ) -> None:
-    """Start a process and add it to those that run."""
+    """Start a process and add it to the running ones."""
     complaints = TemporaryFile()  # noqa: SIM115, a file rather than a pipe: nobody has to read it meanwhile
     running[i] = (
         subprocess.Popen(

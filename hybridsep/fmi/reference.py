@@ -3,7 +3,7 @@
 ``reference.exp`` describes it (:mod:`hybridsep.fmi.related_files`). The tables are named and written as the FMI
 cross-check had them: ``<name>_in.csv`` with the inputs at each communication point, ``<name>_ref.csv`` with the outputs
 there, ``<name>_ref.opt`` with the times of the run. All parameters have their start values. The outputs are the FMU's
-own where this machine can run it (:mod:`hybridsep.fmi.host_fmu`), else those of the library
+own where this machine can run it (:mod:`hybridsep.fmi.host_fmu`), else the library's
 (:mod:`hybridsep.fmi.reference_models`); the tests compare both.
 """
 
@@ -169,7 +169,7 @@ def _command(machine: Machine, n: int) -> Array:
 def _csv(times: Sequence[float], kinds: Mapping[str, str], rows: Sequence[Sequence[float]], decimals: int) -> bytes:
     """Write columns over time, numbers so that they read back the same, whole ones and flags without a point.
 
-    ``kinds`` are those of the columns by name.
+    ``kinds`` are the kinds of the columns by name.
     """
     head = ",".join(f'"{name}"' for name in ("time", *kinds))
     real = [kind == "Real" for kind in kinds.values()]

@@ -19,7 +19,7 @@ __all__ = ["CLASSIFICATION", "RESOURCE_DATA_FILE", "resource_data"]
 RESOURCE_DATA_FILE = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
 
 CLASSIFICATION = "hybridsep.fit"
-"""Type of the classification whose entries are those of a fit."""
+"""Type of the classification whose entries describe a fit."""
 
 _SRMD = "http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData"
 _STC = "http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon"

@@ -46,7 +46,7 @@ TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in Pr
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_parameters()
 """Parameters of a SepCompensator besides its predictor's."""
 
-_HOLD = "the same for x_pb plus the residual before the window, held"
+_HOLD = "running RMS of hold since t_init: x_pb plus the last residual measured before the window"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
@@ -255,7 +255,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position(
             "x_h",
             "output",
-            "prediction for now under x_dm: with trust, by its model; else by the one that planned the window",
+            "prediction for now under x_dm, with trust by its model, else by the model that planned the window",
             initially_from=(*ahead, *model),
         ),
         _position(

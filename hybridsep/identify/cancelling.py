@@ -14,14 +14,14 @@ APART = 2.5
 """Least ratio of frequencies between slow parts and the others: a 14 Hz part of an axis of 35 Hz is one of its own."""
 
 CANCELLED = 0.25
-"""Static gain of the slow parts in multiples of the others', below which zeros all but cancel their poles: with 0.25
-these are a quarter apart."""
+"""Static gain of the slow parts, relative to the others', below which zeros all but cancel their poles: with 0.25 zero
+and pole are a quarter apart."""
 
 
 def slow_parts(modes: Sequence[Mode]) -> list[float]:
     """Return the frequencies, Hz, of the slow parts that are nearly cancelled, by each other or by zeros.
 
-    The parts are those of the partial fractions of eq. (15): the modes, an over-damped one as its two real poles.
+    The parts are the partial fractions of eq. (15): the modes, an over-damped mode as its two real poles.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from .uncertainty import Estimate, full_covariance
 __all__ = ["delay_finding", "total_delay"]
 
 APART = 0.5
-"""Deviation of the whole delay in multiples of the dead time's, below which these cannot be told apart."""
+"""Deviation of the whole delay, relative to the dead time's, below which lag and dead time cannot be told apart."""
 
 _STEP = 1e-5
 """Relative step of the differences of the delta method."""

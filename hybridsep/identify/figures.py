@@ -66,7 +66,7 @@ def operation_figure(
 
 
 def _draw_structures(axes: Axes, found: IdentifiedModel, scale: float, unit: str) -> None:
-    """Draw fitted and held-out error of each structure, those with an objection pale."""
+    """Draw fitted and held-out error of each structure, pale where there is an objection."""
     for i, other in enumerate(found.alternatives):
         alpha = 0.35 if other.objection else 1.0
         axes.plot(scale * other.rms_fitted, i, "o", color=HOLD, alpha=alpha, label="fitted part")
@@ -86,7 +86,7 @@ def _draw_structures(axes: Axes, found: IdentifiedModel, scale: float, unit: str
 def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> None:
     """Draw magnitude, phase and error of a frequency response and its fit to a PNG.
 
-    Where no phase was measured there is none, and the error is that of the magnitude.
+    Where no phase was measured, none is drawn, and the error is the magnitude's.
 
     Parameters
     ----------

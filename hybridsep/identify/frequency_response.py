@@ -111,7 +111,7 @@ def identify_frequency_response(
     Parameters
     ----------
     frequency : (n,) array_like, Hz
-        Lines in any order; those at 0 and where the response is 0 or not finite are left out.
+        Lines in any order; lines at 0, and where the response is 0 or not finite, are left out.
     response : (n,) array_like of complex, m/m
     std : (n,) array_like, optional
         Standard deviation of each line's complex error; a constant part of its magnitude if left out.
@@ -125,7 +125,7 @@ def identify_frequency_response(
     dead_time : int
         Whole samples of dead time in the response.
     sampled : bool
-        Whether the response is that of sampled signals, which the hold has a part in.
+        Whether the response was measured on sampled signals, so that it contains the hold.
     progress : callable, optional
         Called with a message and the fraction done.
 

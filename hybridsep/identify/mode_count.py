@@ -24,12 +24,13 @@ DEVIATIONS = 3.0
 """Standard deviations by which a damping ratio is above 0, at least."""
 
 FRICTION_WORTH = 0.6
-"""Ratio of the weighted errors at which modes that do not oscillate, or slow ones that zeros all but cancel, are taken
-beside others: friction in a swept sine leaves 0.9, a real pole that is left out less than 0.1."""
+"""Ratio of the weighted errors, with and without them, at which modes that do not oscillate, or slow modes that zeros
+all but cancel, are taken beside others: modes that fit friction in a swept sine leave 0.9, a true real pole less than
+0.1."""
 
 
 def best_fit(lines: Lines, fits: Sequence[tuple[ModalFit, Complex]]) -> int:
-    """Return the place of the fit to take among those with growing numbers of modes."""
+    """Return the index of the fit to take among fits with growing numbers of modes."""
     n_effective = max(_independent(fit) for fit, _ in fits)  # too few modes leave errors that are alike
     sound = [i for i, (fit, _) in enumerate(fits) if i == 0 or not doubtful_modes(fit, lines)]
     chosen = _by_criterion(lines, fits, sound, n_effective)

@@ -238,7 +238,8 @@ def _findings(
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
     if moving < LITTLE_MOTION:
         findings.append(f"the command moves in {100 * moving:.0f} % of the samples of {part}")
-    # Of the recordings, not of the pieces that are fitted to: the liveliest of a long one start in motion always.
+    # Judged on the recordings, not on the pieces that are fitted to: the liveliest pieces of a long recording always
+    # start in motion.
     started = [starts_in_motion(x_d) for x_d in commands]
     if started[0]:
         findings.append("the recording starts in motion: the state at its start was estimated")
@@ -257,7 +258,7 @@ def _findings(
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
             f"the error on the part that was held out, {shown.words(chosen.rms_held_out)}, is "
-            f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
-            "kind, or the axis is not linear"
+            f"{chosen.rms_held_out / chosen.fit.rms:.1f} times the error of the fit before it: the later motion is of "
+            "another kind, or the axis is not linear"
         )
     return findings

@@ -108,7 +108,7 @@ class _Problem:
         return target - Phi @ linear, linear, offset
 
     def _projected(self, theta: Array, u: Array, y: Array, rows: Indices) -> tuple[Array, Array, Array, Array]:
-        """Return columns and target less what offset and initial state explain, then the means of both.
+        """Return columns and target without the part that offset and initial state explain, then the means of both.
 
         The filters run over every sample; the samples ``rows``, all of them measured, have residuals.
         """

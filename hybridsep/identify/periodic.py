@@ -1,7 +1,8 @@
 """Period of a residual that repeats with the position, as by cogging or a screw's pitch: Lomb-Scargle over position.
 
-Evidence is what one half of the motion, its phase included, predicts of the other: friction, misfits of the model and
-vibrations of one frequency in time leave lines in the spectrum, too, but none whose phase the position decides.
+Evidence is the share of one half of the motion that a line fitted to the other half predicts, phase included: friction,
+misfits of the model and vibrations of one frequency in time leave lines in the spectrum, too, but their phase does not
+follow the position.
 """
 
 from __future__ import annotations

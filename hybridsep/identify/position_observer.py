@@ -30,7 +30,8 @@ class PositionObserver:
     T_s : float
         Sampling interval, s.
     crossover : float
-        Frequency above which the accelerometer decides, Hz: below the first mode, above what the sensor drifts with.
+        Frequency above which the accelerometer decides, Hz: below the first mode, above the frequencies of the sensor's
+        drift.
     position, velocity, bias : float
         Position, m, velocity, m/s, and the sensor's offset, m/s², at the first sample.
 

@@ -48,10 +48,10 @@ class Lines:
     sigma : (n,) array
         Standard deviations up to a factor.
     relative : bool
-        Whether they are a part of the magnitude, which the fitted one is then the better measure of.
+        Whether they are proportional to the magnitude; the fitted magnitude is then the better weight.
     unit_gain : bool
     sampling : (float, str) or None
-        Sampling interval and hold, where the response is that of sampled signals.
+        Sampling interval and hold, where the response was measured on sampled signals.
     """
 
     omega: Array
@@ -81,7 +81,7 @@ class Lines:
         return fit, part
 
     def criterion(self, fit: ModalFit, n_effective: float | None = None) -> float:
-        """Return the Bayesian information criterion; of as many independent values where they are fewer."""
+        """Return the Bayesian information criterion, of ``n_effective`` independent values if errors are correlated."""
         n = 2 * len(self.omega)
         counted = n if n_effective is None else n_effective
         return float(counted * np.log(max(fit.cost, 1e-300) / n) + fit.parameters.size * np.log(counted))

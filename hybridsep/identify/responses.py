@@ -62,7 +62,7 @@ def sections_of(structure: Structure, theta: Array, T_s: float, input_hold: str)
 def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Array:
     """Return the responses whose weighted sum is the position, ``(n, n_columns)``, m.
 
-    Those of modes and lag with a static gain of 1 come first, then those of the modes' zeros.
+    First the responses of modes and lag, with a static gain of 1, then the responses of the modes' zeros.
 
     Parameters
     ----------

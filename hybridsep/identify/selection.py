@@ -41,12 +41,13 @@ SPREAD_MAX = 0.5
 """Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
 
 FITTED_BETTER = 0.7
-"""Ratio of the fitted errors at which a larger structure is taken though the held-out ones are alike: what no structure
-explains, such as a first reversal, may be most of these."""
+"""Ratio of the fitted errors at which a larger structure is taken though the held-out errors are alike: most of the
+held-out error may be what no structure explains, such as a first reversal."""
 
 CANCELLING_WORTH = 0.6
-"""Ratio of the errors, geometric mean of the fitted and the held-out ones, at which a model with a slow part that its
-zeros all but cancel is taken: of friction and cables such parts leave 0.64 to 0.85, of a drive's loops less."""
+"""Ratio of the errors, geometric mean of fitted and held-out ones, at which a model with a slow part that its zeros all
+but cancel is taken: a slow part that fits friction and cables leaves 0.64 to 0.85, one that is in the drive's loops
+less."""
 
 GROWTH = 2
 """Orders above the best one that are tried before the search ends."""
@@ -140,9 +141,9 @@ def held_out(segment: Segment) -> Indices:
 def choose(candidates: Sequence[Candidate]) -> Candidate:
     """Return the simplest candidate whose held-out error equals the best one's within its standard error.
 
-    A larger one of these is taken where it fits the first part much better. Of two that differ in whether the static
-    gain is 1, the one with the estimated gain is taken if its error is smaller on the first part and no larger on the
-    later one.
+    A larger one within it is taken where it fits the first part much better. Of two that differ only in whether the
+    static gain is 1, the candidate with the estimated gain is taken if its error is smaller on the first part and no
+    larger on the later part.
     """
     usable = [candidate for candidate in candidates if not candidate.objection] or list(candidates[:1])
     chosen = _chosen_of(usable)

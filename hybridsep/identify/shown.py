@@ -11,7 +11,7 @@ __all__ = ["deviation_words", "shown_estimates"]
 
 
 def deviation_words(std: float, sign: str = "") -> str:
-    """Return a standard deviation as text; that of a parameter that was not estimated is no figure."""
+    """Return a standard deviation as text; "fixed" for a parameter that was not estimated."""
     return f"{sign}{std:.2g}" if std > 0 else "fixed"
 
 

@@ -2,7 +2,8 @@
 
 ``cov = (JᵀJ)⁻¹ (Σ_b s_b s_bᵀ) (JᵀJ)⁻¹`` with ``s_b = Σ_{k in b} J_k r_k`` over consecutive batches ``b``, which holds
 whatever the correlation of the residual within a batch is; friction and the like leave it far from white. The dead
-time is a whole number of samples: the others' deviations are those with it as chosen, its own is that with all free.
+time is a whole number of samples: the deviations of the other parameters hold for the dead time as chosen, its own
+deviation with all parameters free.
 """
 
 from __future__ import annotations

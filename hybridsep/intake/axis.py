@@ -35,28 +35,28 @@ _LATE_COMMAND = -1.0
 """Lag of the measured position, samples, up to which the command is the later column."""
 
 _PERHAPS_LATE_COMMAND = 0.5
-"""Lag, samples, up to which it may be."""
+"""Lag, samples, up to which it may be the later column."""
 
 _LEFT_BY_DRIVE = 0.3
 """Share of the variance that a drive may leave if it is to explain one column by the other."""
 
 _NOISY = -0.5
-"""Correlation of neighbouring fifth differences, -5/6 in white noise, above which they are those of a motion."""
+"""Correlation of neighbouring fifth differences above which the signal is a motion; in white noise it is -5/6."""
 
 _VELOCITY_SHARE = 0.5
 """Share of the variance that a velocity must explain at least."""
 
 _VELOCITY_LEFT = 0.3
-"""Share that it may leave of what the position leaves."""
+"""Largest part that it leaves unexplained, relative to the part that the position leaves."""
 
 _OFFSET_TRAVEL = 0.02
-"""Offset, in travels, from which it is no servo error."""
+"""Offset, relative to the travel, from which it is no servo error."""
 
 _OFFSET_SPREAD = 6.0
-"""The same in spreads of the error around it."""
+"""The same, relative to the spread of the error around it."""
 
 _OFFSET_REST = 2.0
-"""Offset, in what the gain leaves of the travel, below which an axis at rest may have it."""
+"""Offset, relative to the travel that the gain leaves out, below which an axis at rest may have it."""
 
 _DELAY_MIN = 3.0
 """Dead time, in samples, below which a drive may have it."""
@@ -72,7 +72,7 @@ class _DelayRule(NamedTuple):
     lags : float
         It is this many times the mode's lag at least.
     left : float
-        It leaves this share at most of what a mere lag leaves: further modes look like a dead time, too.
+        It leaves at most this share of the squared residual of a mere lag: further modes look like a dead time, too.
     """
 
     gain: float
@@ -109,10 +109,10 @@ _MODEL_DELAY = 0.4
 """Delay against a known model, in samples, from which it is noted."""
 
 _MODEL_SHARE = 0.4
-"""The same in the model's own lag."""
+"""The same, relative to the model's own lag."""
 
 _MODEL_GAIN = 10.0
-"""What its correction must divide the squared error by."""
+"""Factor by which its correction must reduce the squared error."""
 
 
 def check_same(log: Log) -> Iterator[Finding]:
@@ -130,8 +130,8 @@ def check_same(log: Log) -> Iterator[Finding]:
 def check_swapped(log: Log) -> Iterator[Finding]:
     """Find a commanded position that is noisy and late where the measured one is smooth: the columns are swapped.
 
-    All of it must be so, as an exchange makes nonsense of a good log: noise, lateness, and a drive that explains the
-    exchanged columns and not the given ones. Noise alone is noted.
+    All three signs must be there, as an exchange makes nonsense of a good log: noise, lateness, and a drive that
+    explains the exchanged columns and not the given ones. Noise alone is only noted.
     """
     part = stretch(log)
     x_d, x = log.x_d[part], log.x_meas[part]
@@ -298,6 +298,6 @@ def _smooth(x: Array) -> Array:
 
 
 def _is_noise(x: Array) -> bool:
-    """Return whether the fifth differences of a signal are those of noise, and not of a motion."""
+    """Return whether a signal is noise and no motion, by its fifth differences."""
     steps = np.diff(x, 5)
     return bool(steps[1:] @ steps[:-1] < _NOISY * float(steps @ steps))

@@ -129,7 +129,7 @@ def check(log: Log, machine: Machine | None = None, *, bridged: int = BRIDGED_MA
 
 
 def apply(log: Log, findings: Iterable[Finding]) -> Log:
-    """Return the log with the fixes of the findings applied, in their order; those without one change nothing.
+    """Return the log with the fixes of the findings applied, in their order; findings without a fix change nothing.
 
     Parameters
     ----------

@@ -30,43 +30,46 @@ _SHARE = 0.01
 """Share of the samples at limits below which nothing is lost."""
 
 _BEYOND, _LEFT = 6.0, 3.0
-"""Distance that the command would take the position beyond the limit, in the noise, and in what the motion leaves of
-it elsewhere (RMS)."""
+"""Least distance of the expected motion beyond the limit, relative to the noise, and relative to the error of the
+expected motion elsewhere (RMS)."""
 
 _ENDS = 0.5
-"""The same where a run begins and ends, in the largest of the run, at most: a clipped position meets its limit where
-it would pass it; an axis that sticks or has play stops at its turning point."""
+"""Largest such distance where a run begins and ends, relative to the largest in the run: a clipped position meets its
+limit where it would pass it; an axis that sticks or has play stops at its turning point."""
 
 _AT_REST = 0.05
-"""Distance beyond the limit, in the travel, of a stretch at the log's beginning or end: half of its play may keep an
-axis at rest from its command."""
+"""Least distance beyond the limit, relative to the travel, of a stretch at the log's beginning or end: an axis at rest
+may be off its command by half of its play."""
 
 _RUNS = 0.6
 """Share of the samples at a limit that must be in such runs."""
 
 _CLOSER, _BESIDE = 3.0, (10, 200)
-"""Distance beyond the limit in what the axis missed just before and after (RMS, over as many samples as the run has,
-within these): an axis that stands by friction or load misses its command by as much before it stands."""
+"""Distance beyond the limit, relative to the error of the axis just before and after (RMS, over as many samples as the
+run has, within these bounds): an axis that stands by friction or load is off its command by as much before it
+stands."""
 
 _FAR = 20.0
-"""The same from which on the axis need not meet its limit at speed: it followed far too closely to stand there."""
+"""The same ratio, from which on the axis need not meet its limit at speed: it followed too closely to stand there."""
 
 _LEAST = 0.02
-"""Distance beyond the limit, in the travel, below which a stretch tells nothing: corners of a command are rounded."""
+"""Distance beyond the limit, relative to the travel, below which a stretch tells nothing: corners of a command are
+rounded."""
 
 _SPEED, _STEPS = 0.3, 3
-"""Speed with which the position meets and leaves the limit, over so many samples, in its largest among those."""
+"""Least speed with which the position meets and leaves the limit, relative to its largest nearby; and samples over
+which a speed is taken."""
 
 _TIMES = 3
-"""Separate times at one limit from which it is one of the sensor; twice an axis stops at one place by chance."""
+"""Separate times at one limit from which it is the sensor's limit: an axis may stop twice at one place by chance."""
 
 _REACH, _TAPS = 400, 20
-"""Samples of the command before that determine a position, and the means of it that are taken of them: a swept sine
+"""Past samples of the command that a position is fitted to, and number of means that they are reduced to: a swept sine
 has another lag at each of its frequencies."""
 
 _RCOND = 1e-4
-"""Smallest singular value of that regression, in the largest, that is not left out: what the motion hardly excites
-would tell anything of what is beyond the limit."""
+"""Smallest singular value of that regression, relative to the largest, that is kept: directions that the motion hardly
+excites would give arbitrary values beyond the limit."""
 
 _ROWS = 50_000
 """Samples, evenly spread, that the expected motion is fitted to at most."""
@@ -89,9 +92,9 @@ class _Limit:
 def check_clipped(log: Log, bridged: int = 1) -> Iterator[Finding]:
     """Find a measured position that stays at one limit while its command, and so the axis, goes beyond it.
 
-    An axis that stands by friction or load, short of its command, does so as well, again and again at one place where
-    its command repeats. So a log is refused where it stays at two limits, or many times at one, and had followed
-    closer before; the rest is a note.
+    An axis that stands by friction or load, short of its command, stays at one place too, again and again where its
+    command repeats. So a log is refused only where the position stays at two limits, or many times at one, and had
+    followed closer before; anything less is a note.
 
     Parameters
     ----------
@@ -146,7 +149,7 @@ def check_clipped(log: Log, bridged: int = 1) -> Iterator[Finding]:
 
 
 def filled_by_command(log: Log) -> Log:
-    """Interpolate missing measurements in what they differ by from the command's line; linearly where few are known.
+    """Interpolate the difference of measured and expected motion where missing; the position itself if few are known.
 
     A straight line across what was clipped would look as clipped.
     """
@@ -211,7 +214,7 @@ def _is_fast(x: Array, begin: int, end: int) -> bool:
 
 
 def _followed_closer(x: Array, expected: Array, held: NDArray[np.bool_], begin: int, end: int) -> float:
-    """Return how far the command goes beyond an upper limit, in what the axis missed of it just before and after (RMS).
+    """Return how far the command goes beyond an upper limit, relative to the axis' error just before and after (RMS).
 
     0 where that is too little of the travel to tell anything. ``held``, (n,), are the samples in runs at limits.
     """

@@ -19,7 +19,8 @@ DRIVE_GAINS = (0.15, 1.05)
 its command."""
 
 NO_BETTER = 4.0
-"""What a fault must leave of the variance at most, in what a drive leaves: else the drive explains it as well."""
+"""Largest variance that a fault may leave unexplained, relative to the variance that a drive leaves: else the drive
+explains the motion as well."""
 
 _OMEGA, _ZETA, _DEAD_TIME = np.geomspace(4e-3, 1.5, 12), (0.1, 0.4, 1.0, 4.0), (0.0, 4.0)
 """Natural frequencies, rad a sample, damping ratios and dead times, samples, that the search begins with."""
@@ -28,7 +29,7 @@ _DEAD_TIME_MAX = 8.0
 """Largest dead time, samples: with a longer one any phase of a sine is a drive's."""
 
 _SEARCHES, _EVALUATIONS = 3, 60
-"""Best beginnings that are searched on from, and evaluations of each."""
+"""Best initial values from which the search goes on, and evaluations from each."""
 
 
 def drive_explaining(x_d: Array, x: Array, gains: tuple[float, float] = DRIVE_GAINS) -> DeadTime:

@@ -17,12 +17,12 @@ from .stretch import averaged, over_time, stretch
 __all__ = ["check_following_error"]
 
 _TRAVEL, _POSITION_LEFT = 0.5, 0.3
-"""Range of the column, in travels, from which it is no following error, and share of its variance that the command may
-leave: less is left of a position in another unit."""
+"""Range of the column, relative to the travel, from which it is no following error; and share of its variance that the
+command must leave unexplained at least: it explains more of a position in another unit."""
 
 _EXPLAINED, _OTHER = 0.3, 3.0
-"""Share of the following error's variance that a drive behind the command may leave, and what one of the other sign
-must leave at least, in that."""
+"""Share of the following error's variance that a drive may leave unexplained; and least variance that a drive of the
+other sign must leave, relative to it."""
 
 
 def check_following_error(log: Log) -> Iterator[Finding]:

@@ -20,29 +20,29 @@ from .stretch import against_command, averaged, stretch
 __all__ = ["check_scale", "check_sign", "runs_against"]
 
 _EXPLAINED, _OPPOSITE = 0.15, 4.0
-"""Share of the variance that a mode may leave if its gain's sign is to count, and what one of the opposite sign must
-leave at least, in that: over swept sines of drives of 10 to 60 Hz the wrong sign leaves five times as much and more
-where the right one leaves so little, over random drives eight times."""
+"""Share of the variance that a mode may leave unexplained if its gain's sign is to count; and least variance that a
+mode of the opposite sign must leave, relative to it: where the right sign leaves so little, the wrong one leaves at
+least five times as much over swept sines of drives of 10 to 60 Hz, eight times over random drives."""
 
 _LOOSE = 0.7
 """Share of the variance that is left where the measured position hardly follows the command."""
 
 _LEFT_BY_DRIVE = 0.3
-"""The same where a drive far above its bandwidth does not follow either: what it leaves there is its friction's."""
+"""The same for a drive far above its bandwidth, which does not follow either: friction causes what it leaves there."""
 
 _LATE = 4.0
-"""Dead time, in samples, that a search for one begins with."""
+"""Dead time, in samples, with which its search begins."""
 
 _LEFT_BY_MODE, _GAIN_OTHER = 0.25, 0.2
-"""Share of what a line leaves that a mode must leave, and relative distance of their gains, from which the mode's
-static gain counts: along a swept sine no lag is the right one for all frequencies."""
+"""The mode's static gain counts if the mode leaves less than this share of the variance that a line leaves, and their
+gains differ by this much, relatively: along a swept sine no lag is right for all frequencies."""
 
 _GAINS = (0.15, 5.0)
 """Gains outside which no position loop is: a small servo under load was recorded at 0.25."""
 
 _GAIN_CLOSE, _LEFT_CLOSE = 0.15, 3e-3
-"""Distance from 1 of the gain of an axis that follows its command within this share of the variance. One that reaches
-further than its command is in another unit; one that reaches less far may be a servo under load."""
+"""Largest distance from 1 of the gain of an axis that follows its command within this share of the variance. An axis
+that moves further than its command is in another unit; one that moves less far may be a servo under load."""
 
 _KNOWN_GAINS = {
     1e3: "measured in mm, commanded in m",
@@ -68,10 +68,10 @@ _KNOWN_WITHIN = 0.03
 def runs_against(x_d: Array, x: Array) -> DeadTime | None:
     """Return the mode of negative static gain that explains the motion of a flipped position; None if it is not one.
 
-    The regression at the best lag is no judge of it: above a drive's bandwidth a correct position is late by half a
-    period, and one that is flipped looks like one that is late. A mode has the phase of its static gain where it is
-    slow. Where a drive of positive gain explains the motion, driven far above its bandwidth for example, nothing is
-    wrong with the sign.
+    The regression at the best lag cannot judge it: above a drive's bandwidth a correct position is late by half a
+    period, so a flipped position looks like a late one. A mode has the phase of its static gain at low frequencies.
+    Where a drive of positive gain explains the motion, driven far above its bandwidth for example, nothing is wrong
+    with the sign.
 
     Parameters
     ----------

@@ -16,14 +16,14 @@ from .relation import noise_std
 __all__ = ["check_jumps"]
 
 _USUAL, _TIMES = 0.98, 8.0
-"""Quantile of what steps differ by from the median of the four around them, and how many of it a jump has: where the
-command consists of steps, they are usual."""
+"""Quantile of the steps' differences from the median of the four steps around each; and least difference of a jump, in
+multiples of it: where the command consists of steps, they are usual."""
 
 _ALONE = 3.0
-"""Size of a jump in the largest of the two before it and after it: a fast motion lasts."""
+"""Least size of a jump, relative to the largest of the two steps before and the two after it: a fast motion lasts."""
 
 _TRAVEL, _NOISE = 0.005, 20.0
-"""Size of a jump in the travel, and in the noise, at least."""
+"""Least size of a jump, relative to the travel, and relative to the noise."""
 
 
 def check_jumps(log: Log) -> Iterator[Finding]:

@@ -16,13 +16,13 @@ from .finding import ERROR, Finding, Fix, Picture
 __all__ = ["check_lost_rows"]
 
 _ALIKE = 0.35
-"""Relative distance from the local step of the steps beside it, at most."""
+"""Largest relative difference between the local step and the steps beside it."""
 
 _WHOLE = 0.15
-"""Distance of a step from a whole number of local ones, two at least."""
+"""Largest distance of a step from a whole multiple, two or more, of the local step."""
 
 _MOST = 4
-"""Rows lost in a row, at most, that a step is looked at for."""
+"""Most rows lost together that a step is tested for."""
 
 _RESOLVED, _ONE_SIZE, _MOVING = 8.0, 0.4, 0.1
 """Local step, in the command's smallest change of a step, from which it is judged, or below the inverse of the second

@@ -34,19 +34,19 @@ _NOISE_TIMES = 3.0
 """Travel of the mean of 25 samples, in standard deviations of the noise, below which noise is all there is."""
 
 _START = 0.25
-"""Velocity between the first samples, in the largest one, from which a start is in motion; EMPS, 0.12, is not."""
+"""Velocity between the first samples, relative to the largest, from which a start is in motion; EMPS has 0.12."""
 
 _FIRST = 10
 """Samples whose mean velocity must say so as well: at rest a command may flicker by one count."""
 
 _LARGEST = {"travel": (20.0, "m"), "velocity": (20.0, "m/s"), "acceleration": (500.0, "m/s²")}
-"""What a feed axis travels and does at most; more of it is read in too large a unit."""
+"""Largest travel and motion of a feed axis; a log with more was read in too large a unit."""
 
 _PER_PERIOD = 4.0
 """Samples a period of the fastest mode below which its motion is not resolved."""
 
 _DECAYED = 0.05
-"""Share of a mode's motion that one sample leaves, below which it does not oscillate between samples."""
+"""Share of a mode's motion that is left after one sample, below which it does not oscillate between samples."""
 
 
 def moves(log: Log) -> NDArray[np.bool_]:

@@ -85,7 +85,7 @@ def shifted(u: Array, lag: float) -> Array:
 
 
 def line(u: Array, x: Array, lag: float = 0.0, known: NDArray[np.bool_] | None = None) -> Line:
-    """Return the regression of ``x``, (n,), on ``u``, (n,), at a lag, over all samples or those ``known``, (n,)."""
+    """Return the regression of ``x``, (n,), on ``u``, (n,), at a lag, over all samples or the ``known`` ones, (n,)."""
     moved = shifted(u, lag)
     if known is not None:
         moved, x = moved[known], x[known]

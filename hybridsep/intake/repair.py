@@ -29,7 +29,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     logs : sequence of Log
         Read with ``uniform=False``.
     fix : bool
-        Whether every fix is applied, also those that change what the columns mean. Missing measurements stay missing.
+        Whether every fix is applied, also fixes that change what the columns mean. Missing measurements stay missing.
 
     Raises
     ------

@@ -18,10 +18,10 @@ __all__ = ["check_missing", "check_outliers", "check_repeated", "check_stuck", "
 _COLUMNS = {"x_d": "commanded position", "x_meas": "measured position"}
 
 _OUTLIER = 5.0
-"""Distance from the median of five, in its 95 % quantile, that no noise reaches."""
+"""Distance from the median of five, relative to its 95 % quantile, that no noise reaches."""
 
 _TURN = 5.0
-"""The same in the acceleration of the rest, per sample squared: 4 is what a triangle's corner has."""
+"""The same relative to the acceleration elsewhere, per sample squared: a triangle's corner has 4."""
 
 _STUCK = 5
 """Equal values in a row that a moving axis does not show unless its sensor holds them."""
@@ -33,7 +33,7 @@ _MOVING_MIN = 50
 """Samples of fast motion below which their share means nothing."""
 
 _STEPS = 3.0
-"""Motion per sample, in resolution steps, at which a repeated value is no matter of resolution."""
+"""Motion per sample, in resolution steps, from which a repeated value is not due to the resolution."""
 
 
 def resolution(x: Array) -> float:

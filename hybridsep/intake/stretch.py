@@ -15,7 +15,7 @@ from .relation import Line, shifted
 __all__ = ["against_command", "averaged", "over_time", "stretch"]
 
 _STRETCH = 8000
-"""Samples that relations are fitted to: those with most motion."""
+"""Number of samples, with most motion, that relations are fitted to."""
 
 _SPAN = 10 * _STRETCH
 """Samples whose averages relations are fitted to at most: means of ten still show a mode of 50 Hz at 1 kHz."""

@@ -18,14 +18,14 @@ __all__ = ["check_turns"]
 _TURN = 2 * math.pi
 
 _STEPS = 3.0
-"""Steps between samples, in the largest of those that are no jump, that a jump may be off a whole turn."""
+"""Largest difference of a jump from a whole turn, relative to the largest step between samples that is no jump."""
 
 _SPAN = 1.05
-"""Range, in turns, of a position modulo one turn and its noise; one that goes further is not recorded so."""
+"""Largest range, in turns, of a position modulo one turn with its noise; a wider one was not recorded modulo a turn."""
 
 
 def check_turns(log: Log) -> Iterator[Finding]:
-    """Find jumps of one whole turn in the positions of a rotary axis, which are those of a position modulo 360 deg."""
+    """Find jumps of one whole turn in the positions of a rotary axis: they were recorded modulo 360 deg."""
     if log.unit != "rad" or len(log.t) < 2:
         return
     jumps = {"commanded": _jumps(log.x_d), "measured": _jumps(log.x_meas)}

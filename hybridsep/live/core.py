@@ -1,7 +1,7 @@
 """Native core on a stream: an FMU that is given each sample as in a co-simulation, and what it said of it.
 
-A stream of commands that the drive gets now has none ahead: its measured positions are held back by a look-ahead, so
-that the FMU sees what it would in the controller, and all that is shown is as much older.
+Where a stream has the commands that the drive gets now, and none ahead, its measured positions are held back by a
+look-ahead. So the FMU sees what it would see in the controller, and all that is shown is older by the look-ahead.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class LiveCore:
     experts : tuple of str
         Experts whose shares the FMU tells.
     n_samples, n_missing : int
-        Samples taken in; those without a measured position.
+        Number of samples taken in, and of samples without a measured position.
     times : StepTimes
         Of the FMU's steps.
     """
@@ -116,7 +116,7 @@ class LiveCore:
         Raises
         ------
         SignalError
-            If its command is ahead and those before were not, or the other way round.
+            If its command is ahead and the commands before were not, or the other way round.
         FmuError
             If the FMU refuses it.
         """

@@ -53,7 +53,7 @@ class Order:
         self.n_repeated = self.n_late = 0
 
     def take(self, sample: Sample) -> list[Sample]:
-        """Take a sample in; return those whose turn it is, with their numbers.
+        """Take a sample in; return the samples whose turn it is, with their numbers.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Order:
             raise self._gap()
 
     def _number(self, sample: Sample) -> int:
-        """Return a sample's number: its own, or that of the place of its time on a grid of ``T_s`` that follows."""
+        """Return a sample's number: its own, or its place in time on a grid of ``T_s``, which follows the times."""
         if sample.k is not None or sample.t is None:
             return sample.k or 0
         if self._next is None:

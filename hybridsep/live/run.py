@@ -1,4 +1,4 @@
-"""Run of the native core on a source: samples in order, rows to those who show or send them."""
+"""Run of the native core on a source: samples in order, rows to the sinks that show or send them."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def run_live(
     sinks : sequence of Sink
         They get every row, and are told of the end, by an error too.
     ends : tuple of type
-        Exceptions, such as that of Ctrl-C, which end a run as its source would.
+        Exceptions, such as Ctrl-C's, which end a run as its source would.
     watch : callable, optional
         Sampling interval, s, and samples in a window → what checks the first seconds.
 

@@ -24,7 +24,7 @@ class LiveSource(ABC):
     name : str
         What it is, for messages.
     file_unit : str
-        Unit in which positions are shown, empty for that of the machine.
+        Unit in which positions are shown, empty for the machine's.
     """
 
     name: str

@@ -109,8 +109,8 @@ def choose_columns(
 def _name(source: Source, role: str, given: str | None) -> str | None:
     """Return the file's name of a role's column, None if there is none.
 
-    A given name is the file's own, or that without its unit; otherwise the format's own choice counts, then the known
-    names as they are, then those without units and in any spelling.
+    A given name is the file's own, with its unit or without; otherwise the format's own choice counts, then the known
+    names as they are, then the known names without units and in any spelling.
     """
     plain = {name: stated_unit(name)[0] for name in source.names}
     if given is not None:

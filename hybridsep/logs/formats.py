@@ -114,8 +114,7 @@ def _reader(path: Path, head: bytes) -> type[Source]:
     known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
     if named and path.name.lower().endswith(_TEXT):
         raise LogError(
-            f"{path}: is binary, though its name is that of a text: none of the formats that are read "
-            f"({known}); {_SAVE}"
+            f"{path}: is binary, though its name says text: none of the formats that are read ({known}); {_SAVE}"
         )
     if named:
         return named[-1]  # its message says what is damaged

@@ -52,7 +52,7 @@ def gap_starts(t: Array, T_s: float) -> Indices:
 def mean_interval(t: Array) -> tuple[float, float]:
     """Return the mean interval, s, gaps and times out of order aside, and its relative standard error; NaN without any.
 
-    Without gaps it is ``(t_end − t_0)/(n − 1)``. The error is that of times which scatter independently.
+    Without gaps it is ``(t_end − t_0)/(n − 1)``. The error holds for times that scatter independently.
     """
     increasing = np.unique(t)
     steps = np.diff(increasing)
@@ -70,7 +70,7 @@ def mean_interval(t: Array) -> tuple[float, float]:
 
 
 def row_interval(t: Array, T_s: float) -> float:
-    """Return the mean interval, s, of rows whose distinct times are ``T_s`` apart; those that repeat are rounded."""
+    """Return the mean interval, s, of rows whose distinct times are ``T_s`` apart; times that repeat are rounded."""
     return T_s * len(np.unique(t)) / len(t)
 
 

@@ -29,7 +29,7 @@ _TIME = "t"
 """Name of the time column, which is made from the period."""
 
 _COMMANDED, _MEASURED = ("motor-pos-cmd", "pos-cmd"), ("motor-pos-fb", "pos-fb")
-"""Ends of the names of HAL pins with positions of a joint, those at the motor first: between them lies the servo."""
+"""Ends of the names of HAL pins with positions of a joint, at the motor first: between the two lies the servo."""
 
 _UNIT = "halscope states no unit: positions are in the machine's, which unit='mm' or 'in' (--unit) says"
 

@@ -13,7 +13,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class Hdf5Source(ArraysSource):
-    """The vectors of an HDF5 file; those in groups or structs are ``group.name``."""
+    """The vectors of an HDF5 file; in groups or structs they are called ``group.name``."""
 
     format = "MATLAB v7.3 (HDF5)"
     endings = (".mat", ".h5", ".hdf5")
@@ -40,7 +40,7 @@ class Hdf5Source(ArraysSource):
 
     @staticmethod
     def recognises(head: bytes) -> bool:
-        """Return whether it begins with HDF5's signature, or with that of MATLAB 7.3 before it."""
+        """Return whether it begins with HDF5's signature, or with MATLAB 7.3's before it."""
         return head.startswith((_SIGNATURE, b"MATLAB 7.3 MAT-file"))
 
     def without_library(self) -> str:

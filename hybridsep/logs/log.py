@@ -41,8 +41,8 @@ _BLOCK = 10_000
 class Log:
     """A recorded log.
 
-    Positions are in metres, those of a rotary axis in radians; ``unit`` says which. The library's metres stand for
-    radians there: λ is in rad², a limit in rad/s.
+    Positions are in metres, of a rotary axis in radians; ``unit`` says which. Where the library says metres, it means
+    radians then: λ is in rad², a limit in rad/s.
 
     Attributes
     ----------
@@ -323,10 +323,11 @@ def open_log(
         with its date in a column beside it or without; the only such column is ``"t"`` whatever its name.
     unit : str, optional
         Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
-        one, ``0.1um``, such as an encoder's count. If left out, that of the columns' names (``x [mm]``), otherwise m.
+        one, ``0.1um``, such as an encoder's count. If left out, the unit in the columns' names (``x [mm]``), otherwise
+        m.
     T_s : float, optional
-        Sampling interval, s; needed only if the file has no time column or an index in its place, checked against that
-        if it has.
+        Sampling interval, s; needed only if the file has no time column or an index in its place; otherwise it is
+        checked against the times.
     axis : str, optional
         Axis of a file that holds several, such as ``"X1"``.
     uniform : bool

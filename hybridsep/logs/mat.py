@@ -15,7 +15,7 @@ _TYPE_MAX = 4052
 
 
 class MatSource(ArraysSource):
-    """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; those in structs are ``struct.field``."""
+    """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; in structs they are called ``struct.field``."""
 
     format = "MATLAB"
     endings = (".mat",)

@@ -146,7 +146,7 @@ class _Resampled(Source):
 
 @dataclass(frozen=True)
 class _Where:
-    """Location of sample ``i`` of those that are taken from a block."""
+    """Location of sample ``i`` of the samples taken from a block."""
 
     block: Block
     inside: np.ndarray[tuple[int], np.dtype[np.intp]]

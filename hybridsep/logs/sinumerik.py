@@ -166,7 +166,7 @@ class _Held:
             self._values = np.concatenate([self._values, values])
 
     def at(self, k: Array) -> Array:
-        """Return the samples of increasing numbers; those before them are forgotten."""
+        """Return the samples of increasing numbers; earlier samples are forgotten."""
         found: Array = self._values[np.searchsorted(self._k, k, side="right") - 1]
         keep = max(int(np.searchsorted(self._k, k[-1], side="right")) - 1, 0)
         self._k, self._values = self._k[keep:], self._values[keep:]

@@ -26,7 +26,7 @@ _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 
 
 class TdmsSource(RecordsSource):
-    """The channels of a TDMS file; those of a waveform get a column of times from its ``wf_`` properties.
+    """The channels of a TDMS file; a waveform's channels get a column of times from its ``wf_`` properties.
 
     A name that occurs once in the file is the channel's own; otherwise the group is put before it, ``group.x``. See
     "NI-TDM waveform properties" in NI's description of the format.

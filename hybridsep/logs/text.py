@@ -120,7 +120,7 @@ class TextSource(Source):
         return _FALLBACK if self._encoding == "utf-8-sig" else "replace"
 
     def _block(self, lines: list[str], numbers: list[int], use: list[int], clocks: Mapping[int, Clock]) -> Block:
-        """Return a block of the columns ``use``, those of timestamps as seconds."""
+        """Return a block of the columns ``use``, timestamps as seconds."""
         dates = {i: self._dates[i] for i in clocks if i in self._dates}
         read = [*use, *dates.values()]
         found = dict(zip(read, self._columns(lines, numbers, read, {*clocks, *dates.values()}), strict=True))
@@ -133,7 +133,7 @@ class TextSource(Source):
         return Block([found[i] for i in use], where)
 
     def _columns(self, lines: list[str], numbers: list[int], use: list[int], stamps: Set[int]) -> list[NDArray[Any]]:
-        """Return the columns ``use``, those of ``stamps`` as text."""
+        """Return the columns ``use``, ``stamps`` among them as text."""
         mark, expected = self._layout.delimiter, len(self._layout.names)
         if self._layout.decimal_comma:
             lines = [decimal_points(text) for text in lines]
@@ -157,7 +157,7 @@ class TextSource(Source):
         return [np.ascontiguousarray(rows[name]) for name in types.names or ()]
 
     def _convert(self, text: str, number: int, use: list[int], stamps: Set[int]) -> tuple[float | bytes, ...]:
-        """Return the numbers, and texts of ``stamps``, of one line in those of the columns ``use`` that it has."""
+        """Return the numbers, and texts of ``stamps``, of one line in the columns ``use``, as far as it has them."""
         fields = split(text.strip(" \r\n"), self._layout.delimiter)
         row: list[float | bytes] = []
         for i in use:
@@ -190,7 +190,7 @@ def bounded_lines(path: Path, file: IO[str]) -> Iterator[str]:
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
-    """Return names that occur once, ``Time#2`` for the second ``Time``, and those by the name that they had."""
+    """Return names that occur once, ``Time#2`` for the second ``Time``; and these, by the name that they had."""
     own: list[str] = []
     twins: dict[str, list[str]] = {}
     for i, name in enumerate(names):

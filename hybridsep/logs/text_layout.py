@@ -42,7 +42,7 @@ class Layout:
     first : int
         Line number from which numbers are read.
     clocks : mapping
-        Index of a column of timestamps with a time of day → that of the column with their dates, None if they hold
+        Index of a column of timestamps with a time of day → index of the column with their dates, None if they hold
         them or there are none.
     """
 

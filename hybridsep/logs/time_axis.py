@@ -23,7 +23,7 @@ and 1 kHz, 5 % of an interval are 4 µm of travel, comparable to encoder noise.
 """
 
 TIME_MAX = 1e15
-"""Largest time, s: that of a clock in ns since 1970 that is read in ms; differences of larger ones may overflow."""
+"""Largest time, s, about a clock in ns since 1970 that is read in ms; differences of larger times may overflow."""
 
 COUNTED = 10
 """Fewest times that count samples before they are taken for an index: a log with an interval of 1 s is none yet."""

@@ -145,7 +145,7 @@ class Clock:
         return times, days
 
     def _matched(self, text: bytes, where: Callable[[int], str]) -> re.Match[str]:
-        """Return the parts of a timestamp, sample 0, which are those of the first one of all."""
+        """Return the parts of a timestamp, sample 0; every later one must have the same parts as the first."""
         match = _STAMP.fullmatch(text.decode("latin-1"))
         if match is None or len(text) == CELL.itemsize:
             many = re.search(rb":\d\d[.,]\d{10}", text)

@@ -38,14 +38,14 @@ _FILETIME, _TICK, _MS = 1e12, 1e-7, 1e-3
 
 @dataclass(frozen=True)
 class _Place:
-    """Column: its field in a line, and that of its times."""
+    """Column: its field in a line, and the field of its times."""
 
     field: int
     time: int
 
 
 class TwinCatSource(Source):
-    """The channels of an export of TwinCAT Scope; those that are sampled more slowly end in an earlier line.
+    """The channels of an export of TwinCAT Scope; channels that are sampled more slowly end in an earlier line.
 
     Where slow channels are filled with their previous value, the lines in which their time repeats are left out. The
     rows of scale factors and offsets are not applied: whether the export has scaled the values, its settings decide.

@@ -100,7 +100,7 @@ _SHOWN = {
 def shown_of(file_unit: str, si: str) -> Shown:
     """Return the units in which positions in ``si``, m or rad, of a file in ``file_unit`` are shown.
 
-    They are those of the file, or SI where the file's is empty or of the other kind.
+    They are the file's, or SI where the file's unit is empty or of the other kind.
     """
     unit = position_unit(file_unit)
     return shown_in(unit.name if unit is not None and unit.si == si else si)

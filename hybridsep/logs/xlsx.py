@@ -52,7 +52,7 @@ class _Place:
 
 
 class XlsxSource(Source):
-    """The columns of a workbook below a row of names; those of further sheets are ``Sheet.name``.
+    """The columns of a workbook below a row of names; columns of further sheets are ``Sheet.name``.
 
     A row of units below the names is read; dates with a time of day become seconds since the first one. Cells with
     formulas have the value that Excel saved with them.

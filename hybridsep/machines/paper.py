@@ -1,6 +1,6 @@
 """The paper's own settings of the predictor, with which its figures are made.
 
-The machines it comes with start, as every machine, with a residual model that is trusted as far as its variance allows.
+By default the bundled machines, as every machine, have ``trust = true`` instead: online model averaging.
 """
 
 from __future__ import annotations

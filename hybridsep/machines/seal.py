@@ -41,6 +41,6 @@ def is_as_written(path: Path) -> bool:
 
 
 def edited_since(path: Path) -> str:
-    """Return what has happened to a machine file that a command wrote, in words; empty if none did."""
+    """Return what has happened to a machine file that a command wrote, in words; empty if no command wrote it."""
     seal, _ = _seal_of(path)
     return f"has been edited since `{seal['command']}` wrote it" if seal else ""

@@ -170,7 +170,7 @@ class StageSection(Section):
 
 
 class IdentifiedSection(Section):
-    """A plant to try with, no measurement: modes, those of ``[physics]`` if left out, and disturbances of a log."""
+    """A plant to try with, no measurement: modes, by default ``[physics]``'s, and the disturbances of a log."""
 
     kind: Literal["identified"]
     f: Number = PARAMETERS["f"].default

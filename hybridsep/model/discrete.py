@@ -59,7 +59,7 @@ class DiscreteModel:
         return self._n + self.dead_time
 
     def rest(self, *m: int) -> Array:
-        """Return the state of a drive at rest at position 0, ``(n_state,)``, or that of ``m`` drives."""
+        """Return the state of a drive at rest at position 0, ``(n_state,)``; of ``m`` drives, ``(n_state, m)``."""
         return np.zeros((self.n_state, *m))
 
     def forced_response(self, state: Array, x_d: Array) -> tuple[Array, Array]:

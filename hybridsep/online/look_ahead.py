@@ -1,10 +1,10 @@
 """Look-ahead buffer between interpolator and drive, sample by sample.
 
-Timing contract, that of the FMUs. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs
-are those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is the planner's preview: ``Np`` with a predictor
-alone, which is the planner that changes nothing (:mod:`hybridsep.online.planner`). When ``k + 1`` is a multiple of
-``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights are solved
-and the window is planned in that sample.
+The timing contract is the same as the FMUs'. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it
+the outputs belong to ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is the planner's preview: ``Np`` with a
+predictor alone, which is the planner that changes nothing (:mod:`hybridsep.online.planner`). When ``k + 1`` is a
+multiple of ``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights
+are solved and the window is planned in that sample.
 
 During the first fill (``k < delay``) the commanded position is the start. A predictor alone neither predicts nor learns
 it. A compensator plans from the beginning, so that it can act ahead of a move within its preview; it does not learn
@@ -73,7 +73,7 @@ class LookAhead:
         late = self.predictor.settings.measurement_delay
         self._first_scored = self._first_compared + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(4)
-        self._residual = 0.0  # of the last sample measured, as published; 0 before any but those of the first fill
+        self._residual = 0.0  # of the last sample measured, as published; 0 until one after the first fill is measured
         # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
         self._compared = np.full((4, late + self.Np), self.start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
@@ -281,7 +281,7 @@ class LookAhead:
             self._compare()
         except SignalError as error:
             self.diverged = str(error)
-            self.k -= 1  # the sample is refused, and outputs stay those of the last one
+            self.k -= 1  # the sample is refused, and outputs stay as they were
             raise
 
     def _compare(self) -> None:

@@ -23,7 +23,7 @@ class PublishedWindow:
     x_d, x_dm : (Np,) arrays, m
         Commanded position, and the modified command sent to the drive; the same without a planner.
     x_pb, x_h : (Np,) arrays, m
-        Physics-based prediction under ``x_dm``, and that of the best available model.
+        Predictions under ``x_dm`` by the physics model and by the best available model.
     x_h_std : (Np,) array, m
         Standard deviation of the error of ``x_h``; 0 where it is not known.
     state : int
@@ -31,8 +31,8 @@ class PublishedWindow:
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
     n_followed, state_before : int
-        Leading samples that follow the plan before, in which a real-time implementation makes this one, and the model
-        that planned them.
+        Number of leading samples that follow the plan before, while a real-time implementation makes this plan; and the
+        model that planned them.
     """
 
     SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")

@@ -1,7 +1,8 @@
 """Engines that work on many tasks: Dask distributed, a cluster of this machine or a running one, else joblib.
 
 Dask blames every task that is assigned to a worker as it dies. So no worker has more than one, and one that is blamed
-is repeated alone before it is reported: what took the process down twice is the log itself, by its memory for example.
+is repeated alone before it is reported: if the process ends twice, the log itself is the cause, by its memory for
+example.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ _ALONE = 2
 """Attempts alone of a task that is blamed: it may not even have run, as it waited behind another."""
 
 _COUNTED = 1.0
-"""Time for which a number of workers is taken as it was, s."""
+"""Time for which a count of workers is kept before they are counted again, s."""
 
 _REACHED = 10.0
 """Time within which a scheduler answers, s."""

@@ -2,7 +2,7 @@
 
 Friction offsets the command by ``f·tanh(v/v_s)``, and modes with ``β ≠ 0`` answer a command with a velocity at once:
 ``v = w − b f tanh(v/v_s)`` with ``w``, the velocity without friction, and ``b = Σβ``. For ``b f < −v_s`` there are two
-stable solutions; the drive stays on the one of its present direction until that one ends: hysteresis.
+stable solutions; the drive stays on the solution of its present direction until it ends: hysteresis.
 """
 
 from __future__ import annotations

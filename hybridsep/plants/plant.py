@@ -101,7 +101,7 @@ def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = 
 
 
 def internal_steps(h: float, rate: float) -> int:
-    """Return the number of internal steps in a step of ``h``, s; ``rate``, 1/s, is that of the fastest mode."""
+    """Return the number of internal steps in a step of ``h``, s; ``rate``, 1/s, is the fastest mode's."""
     return max(1, math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6))
 
 

@@ -21,8 +21,9 @@ class StageDrive:
     backward difference of ``x_d`` over ``T_s``, or the velocity of ``x`` itself.
 
     Without a dead time and held, a command acts at once; else it is sampled at the instants ``k·T_s``. A first-order
-    hold goes from the command before to that of now while there is a dead time, one sample of which this takes, and is
-    then that of the physics model; without one, which would need the next command, it goes on as it came.
+    hold with a dead time goes from the last command to this one, which takes one sample of the dead time, and is then
+    the physics model's hold. Without a dead time that would need the next command, so the command goes on with its last
+    slope.
 
     Parameters
     ----------

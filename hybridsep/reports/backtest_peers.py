@@ -31,7 +31,7 @@ class BacktestPeers:
     active : (n,) array of bool
         Whether the warm-up is over.
     verdict : Verdict
-        That of the replay, with these peers.
+        Verdict on the replay, with these peers.
     """
 
     errors: Mapping[str, Array | None]

@@ -24,8 +24,8 @@ _STANDSTILL = 1e-3
 
 
 _LEARNS = 0.8
-"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of what tests, below which a
-longer log is said to help."""
+"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of the test samples, below
+which a longer log is said to help."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def recommendation(judged: Judged) -> str:
         )
     by = f"judged by {counted(n)}"
     if ratio < 1.0 - ALIKE:
-        return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best of the others, {by}."
+        return f"Use the hybrid: its error is {ratio:.2f} × the error of {peer}, the best of the others, {by}."
     if ratio <= 1.0 + ALIKE:
         return f"The hybrid is neither better nor worse here: {ratio:.2f} × the error of {peer}, {by}."
     plain = min(others[:2], key=lambda one: one.rms)  # physics model and hold, which need no other model
@@ -103,7 +103,7 @@ def recommendation(judged: Judged) -> str:
             f"{_more_motion(judged)}.{_what_would_help(judged)}"
         )
     return (
-        f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, and {against:.2f} × that of "
+        f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, {against:.2f} × the error of "
         f"{_IN_WORDS[plain.name]}, {by}{_more_motion(judged)}.{_what_would_help(judged)}"
     )
 
@@ -141,7 +141,7 @@ def _what_would_help(judged: Judged) -> str:
     early, late = _ratios(judged)
     if late < _LEARNS * early:
         hints.append(
-            f"a longer log: its error falls from {early:.2f} to {late:.2f} × that of the best from half to half"
+            f"a longer log: its error falls from {early:.2f} to {late:.2f} × the error of the best from half to half"
         )
     if judged.period:
         hints.append(judged.period)
@@ -149,7 +149,7 @@ def _what_would_help(judged: Judged) -> str:
 
 
 def _ratios(judged: Judged) -> tuple[float, float]:
-    """Return the hybrid's error in that of the best of the others over both halves of what tests."""
+    """Return the hybrid's error relative to the best of the others over each half of the test samples."""
     best, hybrid = judged.replay.best().errors, judged.replay.scored()[-1].errors
     known = ~np.isnan(best) & ~np.isnan(hybrid)
     halves = [np.array_split(one[known] ** 2, 2) for one in (hybrid, best)]

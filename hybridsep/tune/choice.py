@@ -52,8 +52,8 @@ class Tried:
     ----------
     settings : PredictorSettings
     rms_h : float
-        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The
-        earlier half says who learns fastest, but machines run warm.
+        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The earlier
+        half shows which learns fastest, but machines run warm.
     """
 
     settings: PredictorSettings
@@ -150,7 +150,7 @@ def _train_rms(model: ModalModel, settings: PredictorSettings, recordings: Seque
 
 
 def window_sizes(Np: int, n_samples: int) -> list[int]:
-    """Return the windows over which the error is shown: the controller's, and those that a log is long enough for."""
+    """Return the windows over which the error is shown: the controller's, and others that a log is long enough for."""
     sizes = dict.fromkeys(max(1, round(share * Np)) for share in _WINDOWS)
     return [size for size in sizes if size <= max(n_samples, Np)]
 

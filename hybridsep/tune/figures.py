@@ -22,7 +22,7 @@ _VALUES_NAMED = 10
 """Values that are named below a panel, the first and the last among them."""
 
 _SHOWN = 0.95
-"""Share of the candidates that the span of the errors is chosen for; those beyond it are at its edge."""
+"""Share of the candidates that the span of the errors is chosen for; candidates beyond it are at its edge."""
 
 
 def tuning_figure(

@@ -66,7 +66,7 @@ class Tuning:
 
     @property
     def ratio_pb(self) -> float:
-        """The same of the physics model."""
+        """The same for the physics model."""
         return joint_ratio(self.rms_pb, self.rms_hold)
 
     @cached_property

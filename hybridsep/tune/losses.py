@@ -29,7 +29,7 @@ _AT_ONCE = 100_000
 
 @dataclass(frozen=True)
 class Losses:
-    """RMS errors against the measured position over a log, m; those of a backtest without :func:`n_unjudged` samples.
+    """RMS errors against the measured position over a log, m, as of a backtest without :func:`n_unjudged` samples.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Losses:
 def n_unjudged(x_d: Array, Np: int) -> int:
     """Return how many leading samples of a piece are not scored: the first window, if the piece begins in motion.
 
-    No model knows the state of the axis there, so that its error says nothing of a candidate and rules the RMS.
+    No model knows the state of the axis there, so its error says nothing of a candidate, but would dominate the RMS.
     """
     return Np if len(x_d) > Np and starts_in_motion(x_d) else 0
 

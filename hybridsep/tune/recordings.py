@@ -125,7 +125,8 @@ class Replay:
     Np : int
         Samples in a window.
     delay : int
-        Samples by which the measurements are late; as many at a recording's beginning are of before it, and missing.
+        Samples by which the measurements are late; as many measurements at a recording's beginning are from before it,
+        and count as missing.
     offset : float
         Measured minus modelled position, m, identified beside the physics model and tested with it.
     peers : tuple of Peer
@@ -149,7 +150,7 @@ class Replay:
         return self._parts([getattr(result, name) for result in self.results], training)
 
     def commands(self) -> Array:
-        """Return the commanded position over all samples that judge, ``(n,)``, m."""
+        """Return the commanded position over all test samples, ``(n,)``, m."""
         return self._parts([recording.x_d for recording in self.recordings], False)
 
     def errors(self, *, training: bool = False) -> Array:

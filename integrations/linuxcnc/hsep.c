@@ -10,10 +10,10 @@
  * (cmd, fb) is processed: cmd is the command that the drive is to have in `look-ahead` periods, fb the position
  * measured at the begin of this period. So a log of out and fb, sampled in one thread, is what hybridsep fit expects.
  *
- * Real time: axis_step allocates nothing, locks nothing and opens no file; its cost is that of hsep_compensator_sample
+ * Real time: axis_step allocates nothing, locks nothing and opens no file; it costs as much as hsep_compensator_sample
  * (hsep.h). A begin (active rises, or the command jumps) costs some 100 us more: the state is filled anew.
  *
- * Never larger than the joint's limits: the plan's limits are those of the axis' machine file, a plan that cannot keep
+ * Never larger than the joint's limits: the plan's limits come from the axis' machine file, a plan that cannot keep
  * them is not used, and where the model fails (fault) the change of the command fades within HSEP_FADE periods.
  */
 #pragma GCC optimize("O3") /* LinuxCNC compiles for size */

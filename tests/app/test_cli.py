@@ -241,7 +241,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["build", "--flavour", "cobol"], "flavour must be one of"),
         (["build", "--fmi", "4"], "--fmi must be one of 2, 3, both, got '4'"),
         (["build", "--fmi", "both", "--flavour", "python"], "--fmi both is for native FMUs, pythonfmu's are of FMI 2"),
-        (["build", "FeedDriveFmi3", "--target", "host"], "; those of FMI 3.0 need --fmi 3"),
+        (["build", "FeedDriveFmi3", "--target", "host"], "; FMUs of FMI 3.0 need --fmi 3"),
         (
             ["cosim", "-m", "emps", "--flavour", "python"],
             "machine emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant",

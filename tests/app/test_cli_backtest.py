@@ -102,7 +102,7 @@ def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(out)["rms_h_um"] == pytest.approx(of_whole["rms_h_um"], rel=0.1)
     status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "false", "--fix", "--json")
     assert status == 0
-    assert "as the model has trust = false; with trust (--trust true) those of at most 10 samples are bridged" in err
+    assert "as the model has trust = false; with trust (--trust true) gaps of at most 10 samples are bridged" in err
     assert "segments the longest" in err
 
 
@@ -257,7 +257,7 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
 
 
 def test_clock_timestamps(hybridsep: Run, tmp_path: Path) -> None:
-    """The figures are those of the log with seconds; times of a tenth of a second repeat and are refused."""
+    """The figures are the same as for the log with seconds; times of a tenth of a second repeat and are refused."""
     good = json.loads(hybridsep("backtest", write_log(tmp_path / "log.csv"), *MACHINE, "--json")[1])
     header, *rows = (tmp_path / "log.csv").read_text().splitlines()
     at = np.datetime64("2026-03-05T23:59:59", "ms")  # midnight is passed

@@ -1,4 +1,4 @@
-"""``hybridsep report``: one page about a replay, its figures those of backtest, charts for print, steps of an FMU."""
+"""``hybridsep report``: one page about a replay, with backtest's figures, charts for print, steps of an FMU."""
 
 from __future__ import annotations
 

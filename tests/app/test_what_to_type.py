@@ -37,7 +37,7 @@ def test_a_binary_file_says_what_it_is(tmp_path: Path, hybridsep: Run) -> None:
     log.write_bytes(np.random.default_rng(0).bytes(5000))
     status, _, err = hybridsep("fit", log)
     assert status == 2
-    assert "axis.csv: is binary, though its name is that of a text" in err
+    assert "axis.csv: is binary, though its name says text" in err
 
 
 def test_a_log_without_names_says_what_to_put_above(tmp_path: Path, hybridsep: Run) -> None:

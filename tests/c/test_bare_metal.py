@@ -64,7 +64,7 @@ def fmu_program(target: Target, folder: Path, *options: str, weights: Path | Non
 
 
 def names(target: Target, path: Path) -> set[str]:
-    """Return the names of the functions in a program, those of newlib's reentrant ones without their prefix."""
+    """Return the names of the functions in a program, newlib's reentrant ones without their prefix."""
     listed = subprocess.run([target.nm, path], capture_output=True, text=True, check=True).stdout
     return {line.split()[-1].strip("_").removesuffix("_r") for line in listed.splitlines()}
 

@@ -13,7 +13,7 @@ LOOPS = [
     # change_max of 0.1 mm: nearly every plan is bounded by it
     *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (202, 225)),
     (261, "als25010_x", {"change_max": 1e-4}),
-    # and others, with limits of the drive that are those of the trajectory, or anything between
+    # and others, with the trajectory's limits for the drive, or anything between
     *((seed, "spring_mass_damper", {}) for seed in (38, 256)),
     # with trust
     (4, "als25010_y", {"trust": 1}),

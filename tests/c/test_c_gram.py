@@ -131,7 +131,7 @@ def test_rows_may_be_forgotten_altogether() -> None:
 
 def test_no_pivot_is_below_its_penalty_where_rows_are_alike() -> None:
     # All columns are one: what distinguishes their weights is the penalty alone, 1e-13 of the sums of squares. A
-    # prediction and its variance are those of that one column: 1e-6 relative.
+    # prediction and its variance are the same as with one column alone: 1e-6 relative.
     n, rng = 40, np.random.default_rng(0)
     column = rng.normal(size=1000)
     rows, target = np.tile(column[:, None], n), 3.0 * column
@@ -143,7 +143,7 @@ def test_no_pivot_is_below_its_penalty_where_rows_are_alike() -> None:
 
 
 def test_digits_do_not_wear_off() -> None:
-    # 10^6 rows, against exact sums: half a unit in the last place, that of the last addition, and a few of four
+    # 10^6 rows, against exact sums: half a unit in the last place by the last addition, and a few by four
     # products. Sums that do not carry what rounding takes are off by 5e-13.
     n_rows, repetitions = 200, 5000
     rng = np.random.default_rng(1)

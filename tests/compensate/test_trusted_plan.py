@@ -105,7 +105,7 @@ def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
 
 @pytest.mark.slow
 def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
-    """Sines of the position of the user's own are those of the period, and plans with them the same."""
+    """Sines of the position given by the user act as the period's own: plans with them are the same."""
     turns = 2.0 * np.pi / 2e-3
 
     def sine(x: Array, v: Array) -> Array:

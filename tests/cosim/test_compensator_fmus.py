@@ -80,7 +80,7 @@ def short(python_pair: Pair) -> Run:
 
 
 def until_its_end_is_seen(run: Run) -> int | None:
-    """Return for how many samples a run is that of the whole staircase; None for all."""
+    """Return for how many samples a run equals the run of the whole staircase; None for all."""
     n = len(run.x_d)
     return None if n == len(staircase()) else n - int(MACHINE.fmi_compensator_parameters()["preview"])
 

@@ -76,7 +76,7 @@ Apart = Callable[[str], dict[str, Array]]
 def apart(folder: Path, moved: Path, tmp_path_factory: pytest.TempPathFactory) -> Apart:
     """Return a function that gives what an importer does in a process of its own, by key of the system.
 
-    Each runs all systems that it can, those of a moved start (``MOVED``) among them, one after the other and once.
+    Each runs all systems that it can once, one after the other, systems with a moved start (``MOVED``) too.
     """
 
     @cache

@@ -47,9 +47,9 @@ def array_bytes() -> int:
     """Return the size of the arrays that eqs. (2) to (6) need, counted from the paper's parameters, not from the code.
 
     ``n = 2 + p + q`` features; the upper triangle of the factor of ``[phi | target]``, each entry with what rounding
-    took from it; five windows; the past of ``x_pb`` and ``e_pb`` behind a window; the weights, those of ``e_pb`` also
-    in the order of their use; for the uncertainty two windows and one of each of its seven components; per mode a
-    matrix, two vectors, the feed-through and the state; and one number for each FMI variable.
+    took from it; five windows; the past of ``x_pb`` and ``e_pb`` behind a window; the weights, and the weights of
+    ``e_pb`` once more in the order of their use; for the uncertainty two windows and one of each of its seven
+    components; per mode a matrix, two vectors, the feed-through and the state; and one number for each FMI variable.
     """
     machine = paper_machine("spring_mass_damper")
     values = machine.fmi_parameters()

@@ -51,7 +51,7 @@ def test_the_documents_keep_to_the_schemas(archive: Path) -> None:
 
 
 def test_the_structure_is_that_of_the_fmus(archive: Path, tmp_path: Path) -> None:
-    """Connectors, units and parameters are those of the FMUs, whose start values the sets repeat."""
+    """Connectors, units and parameters are the FMUs', whose start values the sets repeat."""
     files = content(archive)
     root = etree.fromstring(files["SystemStructure.ssd"])
     wired = {(wire.get("endElement"), wire.get("endConnector")) for wire in root.iter(f"{SSD}Connection")}

@@ -54,7 +54,7 @@ def test_fmpy_gets_the_communication_step_size() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
+@pytest.mark.skipif(sys.platform == "win32", reason="the lines are for a POSIX shell")
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_the_pages_run_from_first_to_last(
     whole: bool, hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -97,7 +97,7 @@ def line(text: str, hybridsep: Run) -> None:
 
 
 def assert_the_row_of_the_readme(results: Path) -> None:
-    """Compare the README's prediction errors with those of the fit, µm."""
+    """Compare the README's prediction errors with the fit's, µm."""
     judged = json.loads(results.read_text(encoding="utf-8"))["judged"]
     (row,) = re.findall(rf"^\| prediction: `{FIT}` \|(.*)\|$", PAGES[0].read_text(encoding="utf-8"), re.MULTILINE)
     best_of_arx = min(rms for name, rms in judged["peers"].items() if name.startswith("ARX"))

@@ -90,7 +90,7 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
 
 
 def test_archives_are_deflated_and_the_same_every_time(fmus: BuiltFmus) -> None:
-    """At one level of zlib; the figures are those of HybridPredictor for this machine: 1.2 MB stored, with a double."""
+    """At one level of zlib; the figures are for HybridPredictor on this machine: 1.2 MB stored, with a double."""
     path = fmus("HybridPredictor")
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()

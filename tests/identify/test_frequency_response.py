@@ -172,7 +172,7 @@ def test_table_1_from_a_swept_sine(axis: str) -> None:
     assert relative_error(found, truth).max() < 0.012
     for ours, other in zip(found.model.modes, truth.modes, strict=True):
         assert abs(ours.f_n - other.f_n) < 0.2
-    assert 0.7 < found.noise < 1.3  # the coherence's deviations are those of the lines
+    assert 0.7 < found.noise < 1.3  # the deviations from the coherence are true of the lines
 
 
 def test_acceleration_over_acceleration_is_the_same_ratio() -> None:

@@ -55,7 +55,7 @@ def test_the_sign_of_a_late_swept_sine(dead_time: int, gain: float) -> None:
 
 
 def test_the_scale_of_a_swept_sine() -> None:
-    """The gain is the static one, not that of where the drive no longer follows."""
+    """The gain is the static one, not the gain at frequencies where the drive no longer follows."""
     (finding,) = check(swept(0.5, 80.0, 30.0, 0.45, gain=1e3)).findings
     assert finding.name == "scale"
     assert "measured in mm, commanded in m" in finding.words

@@ -1,6 +1,6 @@
 """The HAL component in a running LinuxCNC, on simulated drives; ``hybridsep hal`` without it.
 
-LinuxCNC's own tests are those of the night: they need its package with the headers, root to install the component, and
+The tests in a running LinuxCNC run at night: they need its package with the headers, root to install the component, and
 an ordinary user that LinuxCNC runs as.
 """
 
@@ -54,7 +54,7 @@ class TestWithoutLinuxCnc:
         assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
         assert not (tmp_path / "x" / "weights.bin").exists()
         status, _, err = hybridsep("hal", *AXES, *given)
-        assert (status, "--weights are those of one axis" in err) == (2, True)
+        assert (status, "--weights belong to one axis" in err) == (2, True)
 
     def test_a_compensator_needs_limits_a_predictor_does_not(self, hybridsep: Run, tmp_path: Path) -> None:
         status, _, err = hybridsep("hal", "emps", "--out", str(tmp_path))

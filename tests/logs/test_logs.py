@@ -146,7 +146,7 @@ def test_the_interval_of_a_clock_that_jitters(
     t[n // 2 :] += 7.77  # recording stopped, and went on
     path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
     T_s = read_log(path, uniform=False).T_s
-    # Standard error of the mean: that of two ends for each piece between gaps, √2 · 0.1 ms
+    # Standard error of the mean: by two ends for each piece between gaps, √2 · 0.1 ms
     assert T_s == pytest.approx(1e-3, rel=5 * 0.1414 * np.sqrt(rows_lost + 2) / (n - rows_lost))
     if rows_lost == 0 and n > 15_000:
         assert T_s == 1e-3 or abs(T_s - 1e-3) > 2e-8

@@ -64,7 +64,7 @@ def test_penalised_solves_the_stacked_system(
     direct = np.linalg.lstsq(stacked, np.concatenate((target, np.zeros(m))), rcond=None)[0]
     truth = exact(rows[:, :m], target, penalties)
     size = np.linalg.norm(truth)
-    # An error of the direct solution is that of the problem's condition: no worse than ten times that.
+    # The error of the direct solution follows from the problem's condition: ours may be ten times as large.
     error, unavoidable = np.linalg.norm(solution.weights - truth), np.linalg.norm(direct - truth)
     assert error <= 10.0 * unavoidable + 1e-10 * size
     least = stacked_cost(truth, rows[:, :m], target, penalties)

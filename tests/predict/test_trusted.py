@@ -40,7 +40,7 @@ def test_a_residual_that_is_a_feature_is_predicted_to_the_noise() -> None:
 
 
 def test_what_was_learned_is_kept_while_the_velocity_grows() -> None:
-    """Without that, physics alone is left in the window whose velocity outgrows that of the first one."""
+    """Otherwise only physics is left in the window whose velocity outgrows the first window's."""
     k = np.arange(4500.0)
     x_d = np.asarray(5e-3 * (k / 4500.0) ** 1.8 * np.sin(2.0 * np.pi * 2e-3 * k))
     velocity = np.abs(np.diff(x_d))
@@ -130,7 +130,7 @@ def test_a_first_reversal_falls_back() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("n", "measured"), [(250, None), (37, None), (100, 30), (1, None), (100, 1)])
 def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
-    """What is learned does not depend on the windows: the rows are those of the measured samples."""
+    """What is learned does not depend on the windows: there is one row for each measured sample."""
     x_d, x_pb, x = with_friction(600, noise=1e-6)
     usual, other = trusted(Np=60, p=20), trusted(Np=60, p=20)
     run(usual, x_d, x, 60)

@@ -23,7 +23,7 @@ def x_meas() -> Array:
 
 
 def changed(x_meas: Array, fault: str, seed: int) -> tuple[Array, NDArray[np.intp], int]:
-    """Return the faulty measurement, indices of changed samples, and that of the last faulty one."""
+    """Return the faulty measurement, indices of changed samples, and the index of the last faulty one."""
     before = x_meas.copy()
     faulty, last = FAULTS[fault](x_meas, T_S, np.random.default_rng(seed))
     assert np.array_equal(x_meas, before)

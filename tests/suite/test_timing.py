@@ -48,7 +48,7 @@ def steps_of(pattern: str) -> list[Fraction]:
 
 
 def in_steps(new_stream: StreamMaker, sizes: list[Fraction], start: float) -> tuple[Clock, list[list[float]]]:
-    """Return the communication points, in samples, and the outputs at each; inputs are those of the step's start."""
+    """Return the communication points, in samples, and the outputs at each; inputs are read at the step's start."""
     stream = new_stream()
     initialise(stream, start)
     points, outputs = [Fraction(0)], [stream.outputs()]

@@ -57,7 +57,8 @@ def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, t
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=TOLERANCE)
     assert state.tolist() == column(expected, "sep_state").tolist()
     delta = np.abs(x_dm - x_d)
-    # Row i is after sample i, that of sample i + 1: off in the window that begins at 140, gone a preview later,
+    # Row i is written after sample i and holds the outputs of sample i + 1: off in the window that begins at 140, gone
+    # a preview later,
     assert np.max(delta[100:139]) > 2e-5
     assert np.all(state[130:139] > 0)
     assert np.all(state[159:259] == 0)

@@ -29,7 +29,7 @@ FMI3 = [name for name, (_, _, fmi) in _FMUS.items() if fmi == "3"]
 
 
 def each_kind(values: Sequence[str] | Sequence[tuple[str, ...]]) -> list[Any]:
-    """Return names of FMUs, or tuples that end in one, as pytest parameters; those of some machines run at night.
+    """Return names of FMUs, or tuples that end in one, as pytest parameters; some machines' run at night.
 
     The stage's Y drive differs from its X drive in numbers alone, and the rotary machine from the default one.
     """

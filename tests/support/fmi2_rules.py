@@ -1,6 +1,6 @@
 """Rules of FMI 2.0.x, section 2.2, that the schema of ``modelDescription.xml`` cannot say; sections as in 2.0.
 
-They are those of VDMCheck2 (INTO-CPS, a formal model of the standard), and what the standard asks beyond them: base
+They are the rules of VDMCheck2 (INTO-CPS, a formal model of the standard), and what the standard asks beyond them: base
 types of references, nominal values, display units, dependencies.
 """
 

@@ -55,7 +55,7 @@ class Variable:
         return set() if self.type is None else {float(item.get("value", "nan")) for item in self.type}
 
     def own(self, name: str) -> str | None:
-        """Return an attribute of the variable, without that of its type."""
+        """Return an attribute of the variable itself, not its type's."""
         return self.kind.get(name)
 
     def number(self, name: str) -> float | None:

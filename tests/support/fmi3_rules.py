@@ -116,7 +116,7 @@ def model_types(archive: Archive) -> Iterator[str]:
 
 @_rule
 def shared_with_fmi_2(archive: Archive) -> Iterator[str]:
-    """Units, log categories and the default experiment are those of FMI 2.0."""
+    """Units, log categories and the default experiment follow the rules of FMI 2.0."""
     for rule in (fmi2_rules.units, fmi2_rules.categories_and_tools, fmi2_rules.default_experiment):
         yield from rule(archive.model)
 
@@ -198,7 +198,7 @@ def combinations(archive: Archive) -> Iterator[str]:
 
 
 def _bounds(archive: Archive, variable: ET.Element) -> tuple[float, float]:
-    """Return the least and the largest value, those of the type where a variable names none."""
+    """Return the least and the largest value, the type's where a variable names none."""
     least, most = -float("inf"), float("inf")
     if variable.tag in INTEGERS or variable.tag == "Enumeration":
         sign, bits = INTEGERS.get(variable.tag, ("", 64))

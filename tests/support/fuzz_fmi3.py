@@ -1,4 +1,4 @@
-"""Random calls of an FMU's FMI 3.0 functions, with the checks of those of FMI 2.0.
+"""Random calls of an FMU's FMI 3.0 functions, with the checks of the program for FMI 2.0.
 
 Run as a program: ``python tests/support/fuzz_fmi3.py LIBRARY MODEL_DESCRIPTION RESOURCES --seconds 600 --seed 1``.
 Memory that is not given back is found in a library that is compiled with ``-include tests/c/counted.h``.

@@ -54,11 +54,11 @@ class ClosedSystem:
     reported : tuple of str
         Its own figures, errors since ``t_init``.
     figures : tuple of str
-        Those of ``reported`` that the guide states.
+        Figures of ``reported`` that the guide states.
     errors : tuple of (str, str)
         Minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states.
     suffix : str
-        What the names of the FMUs end in: Fmi3 of those of FMI 3.0.
+        Ending of the FMUs' names: Fmi3 for FMI 3.0.
     n_samples : int
         Of the trajectory, as far as it is played.
     """

@@ -1,6 +1,6 @@
 """MQTT 3.1.1 broker of one client: it takes a subscription and sends what it is given, as far as the tests need it.
 
-Packets are those of the OASIS standard MQTT 3.1.1, sections 3.1 to 3.9.
+Packets are as in the OASIS standard MQTT 3.1.1, sections 3.1 to 3.9.
 """
 
 from __future__ import annotations

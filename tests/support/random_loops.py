@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 MACHINES = ("spring_mass_damper", "als25010_x", "als25010_y")
 
 LIMITS = {"trajectory": (0.08, 8.0, 1000.0), "drive": (0.1, 16.0, 5000.0)}
-"""v_max, a_max and j_max: those of the trajectory, so that nearly every plan is bounded, and the usual ones."""
+"""v_max, a_max and j_max: the trajectory's, so that nearly every plan is bounded, and the usual ones."""
 
 for _name in MACHINES:
     _table = table_of(load_machine(_name), "SepCompensator", f"compensator_{_name}")

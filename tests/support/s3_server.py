@@ -25,7 +25,7 @@ def s3_server(patch: pytest.MonkeyPatch, bucket: str) -> Iterator[str]:
         ("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}"),
     ):
         patch.setenv(name, value)
-    fsspec.get_filesystem_class("s3").clear_instance_cache()  # those of an earlier server
+    fsspec.get_filesystem_class("s3").clear_instance_cache()  # instances for an earlier server
     fsspec.filesystem("s3").mkdir(bucket)
     try:
         yield f"s3://{bucket}"

@@ -1,4 +1,4 @@
-"""Losses of candidates: those of backtests."""
+"""Losses of candidates equal the errors of backtests."""
 
 from __future__ import annotations
 

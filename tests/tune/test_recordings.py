@@ -1,4 +1,4 @@
-"""Recordings in two parts: what trains, what judges, and the figures of their replay."""
+"""Recordings in two parts, training and test samples, and the figures of their replay."""
 
 from __future__ import annotations
 

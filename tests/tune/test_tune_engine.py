@@ -1,4 +1,4 @@
-"""Tuning by the engine of a fleet: the losses are those of one process."""
+"""Tuning by the engine of a fleet: the losses are the same as in one process."""
 
 from __future__ import annotations
 

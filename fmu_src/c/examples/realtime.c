@@ -2,8 +2,9 @@
  *
  *     realtime [SECONDS]
  *
- * Times of a step are those of hsep_compensator_sample and _read. With the right to do so (root, or CAP_SYS_NICE and
- * CAP_IPC_LOCK) it runs as SCHED_FIFO; on a kernel without PREEMPT_RT how late a period begins says little.
+ * The time of a step is the time of hsep_compensator_sample and _read together. With the right to do so (root, or
+ * CAP_SYS_NICE and CAP_IPC_LOCK) it runs as SCHED_FIFO; on a kernel without PREEMPT_RT how late a period begins says
+ * little.
  */
 #define _GNU_SOURCE
 

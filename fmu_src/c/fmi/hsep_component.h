@@ -46,8 +46,8 @@ typedef struct {
 /* The phases, short, for the columns of a table of calls. */
 enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_STEPPING, HSEP_T = HSEP_TERMINATED };
 
-/* Make an instance of what is filled in of it: words, memory functions, hand, logger and environment. On refusal return
- * NULL and log why. token: what must be that of modelDescription.xml; resources as hsep_open takes them. */
+/* Make an instance. filled: its words, memory functions, hand, logger and environment; token: must equal the token of
+ * modelDescription.xml; resources: as hsep_open takes them. On refusal return NULL and log why. */
 HSEP_API hsep_component *hsep_component_new(
     const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on);
 

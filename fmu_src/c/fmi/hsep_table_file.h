@@ -21,9 +21,9 @@
 #error "the table of this FMU is in its resources, which HSEP_NO_FILES leaves out: take the header of a source FMU"
 #endif
 
-/* Read the file from the instance's resources, or where there is none from those beside the library, which then are the
- * instance's; fill the context, but its resources. Fails if there is none, or it is not one of this binary, damaged or
- * out of a range; HSEP_WARNED: the instance's resources had none. */
+/* Read the file from the instance's resources; where there is none, from the resources beside the library, which then
+ * become the instance's; fill the context, but its resources. Fails if there is none, or it is not one of this binary,
+ * damaged or out of a range; HSEP_WARNED: the instance's resources had none. */
 HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, char message[]);
 
 #endif

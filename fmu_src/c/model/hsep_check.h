@@ -1,4 +1,4 @@
-/* Messages and checks that every model shares; the wording is that of the Python library.
+/* Messages and checks that every model shares, worded as in the Python library.
  * Reentrant; allocates nothing; every message fits into HSEP_MESSAGE_SIZE bytes, cut off at a whole character. */
 #ifndef HSEP_CHECK_H
 #define HSEP_CHECK_H
@@ -49,7 +49,7 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
 /* Check the size of a communication step, s. */
 HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 
-/* Check that a step begins at t where the last one ended, at end, s; tolerance as that of hsep_clock_follows. */
+/* Check that a step begins at t where the last one ended, at end, s; tolerance as in hsep_clock_follows. */
 HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[]);
 
 /* Check that the step from t by h, s, comes next, and count it. */

@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     hsep_clock_step counted;
     hsep_input x_d_ahead, x_meas;
-    int64_t n_latched, n_executed; /* of those that the step has */
+    int64_t n_latched, n_executed; /* of the instants that the step has */
     int pending;                   /* whether the inputs of the next sample are latched */
 } hsep_inputs_step;
 

@@ -39,7 +39,7 @@ typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL, HSEP_INDEPEN
 typedef struct {
     const char *name;
     const char *unit;         /* "" if it has none */
-    const char *angular_unit; /* that of a rotary axis */
+    const char *angular_unit; /* the unit for a rotary axis */
     hsep_kind kind;
     hsep_causality causality;
     int tunable;      /* a parameter that may be set while the simulation runs */

@@ -71,7 +71,7 @@ HSEP_API hsep_status hsep_state_check(
         hsep_message_add(
             message, "the state must be of version %d, got %.0f", HSEP_STATE_VERSION, (double)header.version);
     } else if (header.size != size || header.parameters != state_hash(context, values)) {
-        hsep_message_add(message, "the state was saved with other parameters than those of this instance");
+        hsep_message_add(message, "the state was saved with other parameters than this instance has");
     } else {
         return HSEP_OK;
     }

@@ -21,7 +21,8 @@ HSEP_ASSERT_WORDS(hsep_state_header, 4);
 
 #define HSEP_FNV_BEGIN UINT64_C(0xCBF29CE484222325)
 
-/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991), of bytes behind those that gave hash; HSEP_FNV_BEGIN before the first. */
+/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991), of further bytes, hash being the hash of the bytes before; HSEP_FNV_BEGIN
+ * at first. */
 HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size);
 
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */

@@ -8,7 +8,7 @@
 /* The numbers of the modes are read in place. */
 HSEP_ASSERT(numbers_of_a_mode, sizeof(hsep_mode) == HSEP_MODE_NUMBERS * sizeof(double));
 
-/* Variables before the windows, which are those with a start value. */
+/* Number of variables before the windows: the variables with a start value. */
 static size_t table_before_windows(const hsep_context *context)
 {
     return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;

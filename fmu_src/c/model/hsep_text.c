@@ -107,7 +107,7 @@ HSEP_API int hsep_text_digits(double value, int *exponent)
     return digits;
 }
 
-/* Put value >= 0 with so many digits behind the point; those behind the 17th are 0. */
+/* Put value >= 0 with so many digits behind the point; digits behind the 17th are 0. */
 static void text_put_fixed(text_sink *sink, double value, int decimals)
 {
     int exponent = 0, zeros = 0;   /* zeros: of the whole part, for which number has no room */

@@ -19,8 +19,8 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
     }
 }
 
-/* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
- * has not is 0 here; modes that only one side has are told by their number. */
+/* Read the settings of the file and compare them with the table's; return 0 if the file is damaged. A setting that the
+ * table does not have counts as 0; modes that only one side has show in the number of modes. */
 static int weights_compare_settings(
     hsep_learned_source *source, const hsep_context *context, const double values[], uint64_t n_settings,
     char message[])

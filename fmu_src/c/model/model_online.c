@@ -1,7 +1,7 @@
 /* HybridPredictor and SepCompensator: sizes, initialization, steps and states.
  *
- * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached;
- * the arithmetic is the core's. If the resources hold weights (hsep_weights.h), it starts with them.
+ * Inputs are latched at the instants t_k that lie in a step, outputs belong to the last instant that was reached; the
+ * core does the arithmetic. If the resources hold weights (hsep_weights.h), it starts with them.
  */
 #include "hsep_online.h"
 

@@ -1,6 +1,6 @@
 /* ReferenceTrajectory: a source of commands, to be wired to HybridPredictor.x_d_ahead.
  *
- * The samples are those of the resource trajectory_<n>.bin, n being the parameter trajectory:
+ * The samples come from the resource trajectory_<n>.bin, n being the parameter trajectory:
  *   "HSEPTRJ1", their number as uint64, T_s as double, s, then the samples as doubles, m, all little-endian.
  * Sample k is the output from instant k on (hsep_clock.h); after the last one it stays. The samples are part of the
  * state, so a state's size follows from the file.
@@ -174,7 +174,7 @@ HSEP_API hsep_status hsep_model_check_state(
     }
     memcpy(&head, state, sizeof head);
     const double before = (double)(sizeof head - sizeof head.trajectory);
-    /* The size is that of the file's samples, so it bounds the state's own count. */
+    /* size follows from the number of samples in the file, so it bounds the state's own count. */
     if (!hsep_clock_valid(&head.clock) || head.clock.T_s != values[HSEP_VR_T_s] ||
         before + hsep_trajectory_size(head.trajectory.count) != (double)size) {
         return hsep_state_damaged(message);

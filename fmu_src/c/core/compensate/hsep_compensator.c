@@ -138,8 +138,8 @@ static void compensator_publish(hsep_compensator *self, hsep_word last)
     hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
-/* Do parts of a plan with trust, an equal share of what may be left for the samples before it is due,
- * at least one of them; return whether it is made. */
+/* Do parts of a plan with trust, at least one: this sample's equal share of the work that may be left until the plan is
+ * due. Return whether the plan is made. */
 static int compensator_advance(hsep_compensator *self, hsep_word samples)
 {
     hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
@@ -192,7 +192,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     return status;
 }
 
-/* Begin a plan by the paper's model, or by the physics model where that one is not trusted. */
+/* Begin a plan on the paper's model, or on the physics model where the paper's is not trusted. */
 static void compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -208,7 +208,7 @@ static void compensator_plan(hsep_compensator *self)
     self->solving = status == HSEP_PLAN_BOUNDED;
 }
 
-/* Begin a plan by the residual model that can be trusted; what planned the window is known when it is made. */
+/* Begin a plan on the residual model with trust; which model planned is known when the plan is made. */
 static void compensator_plan_trusted(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);

@@ -1,20 +1,21 @@
 /* Servo error pre-compensation, sample by sample: a predictor (hsep_predictor.h) with commands modified by a planner
  * (hsep_planner.h); eqs. (2) to (6).
  *
- * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs are those of k + 1. When k + 1 is a multiple
+ * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs belong to k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
- * while the command follows the last plan. With trust every plan is, over HSEP_PINNED_WITH_TRUST samples: each of them
- * takes an equal share of the work that may be left, counted in multiply-adds (hsep_trusted_planner_left).
+ * while the command follows the last plan. With trust every plan is solved so, over HSEP_PINNED_WITH_TRUST samples:
+ * each of these does an equal share of the work that may be left, counted in multiply-adds (hsep_trusted_planner_left).
  *
- * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
- * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the
- * hybrid plan fails, and a copy of the dead time. While a plan is being solved that of hsep_interior_advance, six times
- * in each of the 8 samples that follow; where so many are not pinned (Np < 16, or spacing > 8) more often, or
- * 2 HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
+ * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
+ * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
+ * twice if the hybrid plan fails, and a copy of the dead time. While a plan is being solved, each of the 8 samples that
+ * follow calls hsep_interior_advance six times; where fewer than 8 samples are pinned (Np < 16, or spacing > 8), more
+ * often, or 2 HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real
+ * time.
  *
- * With trust and a late measurement the plan is as dear, and late^2 / 2 multiply-adds for each expert come on top in
- * two of the samples of a window: nothing to speak of up to 100 samples, 2 ms of a desktop's core for 1000.
+ * With trust a late measurement adds late^2 / 2 multiply-adds for each expert in two samples of a window: negligible up
+ * to 100 samples, 2 ms on a desktop's core for 1000.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window, as
@@ -51,7 +52,7 @@ struct hsep_compensator {
     hsep_word spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
     hsep_word trial;     /* the physics model of a trial */
     hsep_word planner, predictor;
-    hsep_word trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
+    hsep_word trusted; /* the planner on the residual model with trust; 0: the paper's */
 };
 
 HSEP_ASSERT_WORDS(hsep_compensator, 15);
@@ -73,7 +74,7 @@ HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self);
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
 /* Whether a block, in any alignment and of hsep_compensator_block_size(parameters) bytes, is a valid state for these
- * parameters at sample k: its layout is that of hsep_compensator_block_init, and every index lies within it. */
+ * parameters at sample k: hsep_compensator_block_init would lay it out so, and every index lies within it. */
 HSEP_API int hsep_compensator_block_valid(
     const void *block, const hsep_compensator_parameters *parameters, hsep_word k);
 

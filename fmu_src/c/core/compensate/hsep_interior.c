@@ -95,8 +95,8 @@ static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
 
-/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, its rounding
- * would outgrow P. */
+/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, rounding in
+ * it would outgrow P. */
 static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_word n)
 {
     hsep_real largest = 0.0;

@@ -79,14 +79,14 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parame
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
 }
 
-/* Place of the weights of the disturbances among those of an expert. */
+/* Index of a disturbance's first weight among the weights of an expert. */
 static hsep_word linearised_first(const hsep_linearised *self, const hsep_trusted *model)
 {
     return model->n_static - 2 * self->count;
 }
 
-/* Gains of an expert, (n,) each: what friction, position and damping give of a change of v_d, x and v, and what the
- * differences of these give, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
+/* Gains of an expert, (n,) each, from a change of v_d, x and v to its prediction: of friction, position and damping and
+ * of their differences, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
 static void linearised_gains(const hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[])
 {
     const hsep_real *slopes = hsep_at_const(self, self->slopes);
@@ -119,7 +119,7 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
     }
 }
 
-/* What the features of x_pb, it and its differences, give of a change behind G_pb. */
+/* Answer of the features of x_pb, x_pb itself and its differences, to a change behind G_pb. */
 static void linearised_pass(
     const hsep_real weights[], hsep_word count, const hsep_real passed[], hsep_word n, hsep_real to[])
 {
@@ -163,7 +163,7 @@ static hsep_real linearised_left(const hsep_expert *expert, hsep_word j)
     return unshrunk == 0.0 ? hsep_at_const(expert, expert->kept)[j] : hsep_at_const(expert, expert->e_h)[j] / unshrunk;
 }
 
-/* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
+/* Share of an expert in the stack, sample after sample, after shrinking and bounds. */
 static void linearised_shrink(
     const hsep_linearised *self, hsep_trusted *model, hsep_word place, hsep_real weight, hsep_real shrink[])
 {
@@ -173,7 +173,7 @@ static void linearised_shrink(
     }
 }
 
-/* What an expert of the command makes of the increments of a change, from rest, (preview,). */
+/* Answer of an expert of the command to the increments of a change, from rest, (preview,). */
 static void linearised_of_increments(
     hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_word dead_time,
     hsep_real to[])
@@ -193,8 +193,8 @@ static void linearised_of_increments(
     }
 }
 
-/* What of a change is neither friction nor stiffness: it behind G_pb and after the dead time, and what the experts of
- * the command make of it. */
+/* Part of a change that is neither friction nor stiffness: the change behind G_pb and after the dead time, and the
+ * answer of the experts of the command to it. */
 static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
 {
     const hsep_word dead_time = hsep_trusted_command(model)->dead_time;
@@ -273,7 +273,7 @@ HSEP_API void hsep_linearised_at(
     }
 }
 
-/* The disturbances that a change makes of expert i where it begins at sample first, as column c of those abreast. */
+/* Disturbances in expert i by a change that begins at sample first, as column c of the columns abreast. */
 static void linearised_disturbance(hsep_linearised *self, hsep_word i, hsep_word first, hsep_word c)
 {
     const hsep_word n = self->n, count = self->preview - first, moves = self->moves < count ? self->moves : count;
@@ -325,8 +325,8 @@ static void linearised_take_lags(hsep_linearised *self, const hsep_expert *exper
 }
 
 /* The recursion of an expert with p lags from rest for columns abreast, e(u) := drive(u) + own(u) + sum_i w_i e(u - i),
- * some samples together: what was before them is loaded once for all. e, drive: (count, HSEP_PHYSICS_ABREAST); own:
- * (count,), what the features of x_pb give. */
+ * some samples together, so that earlier samples are loaded once for all of them. e, drive: (count,
+ * HSEP_PHYSICS_ABREAST); own: (count,), the part by the features of x_pb. */
 static void linearised_run(
     const hsep_real lags[], hsep_word p, const hsep_real drive[], const hsep_real own[], hsep_real e[], hsep_word count)
 {
@@ -348,7 +348,7 @@ static void linearised_run(
                 }
             }
         }
-        for (int s = 0; s < LINEARISED_TOGETHER; s++) { /* what they give each other */
+        for (int s = 0; s < LINEARISED_TOGETHER; s++) { /* samples of this group feed the later ones */
             for (int l = 0; l < HSEP_OF_FOUR; l++) {
                 for (int i = s; i > 0; i--) {
                     sums[s][l] += w[i - 1] * sums[s - i][l];
@@ -359,7 +359,7 @@ static void linearised_run(
     }
 }
 
-/* What of a change does not pass through the disturbances, where it begins at sample first. */
+/* Part of a change that does not pass through the disturbances; the change begins at sample first. */
 static void linearised_begin_column(
     const hsep_linearised *self, const hsep_trusted *model, hsep_word first, hsep_real column[])
 {

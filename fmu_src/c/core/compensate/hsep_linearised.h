@@ -1,14 +1,14 @@
-/* Linearisation of the residual model that can be trusted in the commands, over a preview.
+/* Linearisation of the residual model with trust (online model averaging) in the commands, over a preview.
  *
- * Disturbances of the commands are no affine functions of them, so a plan follows their slope: at given commands the
- * prediction changes with them as an affine map does, friction by sech^2(v / v_i), stiffness by 2 |x|. Weights,
- * the stack's and the shrinking by the variance are held:
+ * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
+ * for friction and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,
+ * are held constant:
  *
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
- * with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command.
- * An expert that doubts earlier runs, D, counts as the one of these whose counterpart it is.
- * Memory is one block, without pointers. Reentrant; allocates nothing.
+ * The expert of the command alone, A, is linear and time-invariant: its features are increments and lags of the
+ * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is. Memory is one block,
+ * without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
@@ -25,18 +25,18 @@ typedef struct {
     hsep_word preview; /* and its last ones, which a change may reach: all but what is late */
     hsep_word count;   /* disturbances */
     hsep_word moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
-    /* Offsets in words from the beginning of the struct; oldest first; of experts: those of the physics model's
-     * residual, behind each other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
+    /* Offsets in words from the beginning of the struct; oldest first; of experts: of the three experts of the physics
+     * model's residual, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
     hsep_word slopes;      /* (n, count) slopes of the disturbances, sample after sample */
-    hsep_word gains;       /* (5, n) of experts: what disturbances and their differences give of v_d now and a sample
-                           * before, of x now and in the two samples before */
-    hsep_word shrink;      /* (n,) of experts: part of each one in the stack, */
-    hsep_word kept;        /* (2, n) and of those of the command */
+    hsep_word gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
+                           * before, from x now and in the two samples before */
+    hsep_word shrink;      /* (n,) of experts: share of each one in the stack, */
+    hsep_word kept;        /* (2, n) and share of each expert of the command */
     hsep_word velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
     hsep_word position;    /* (2 + preview,) and it behind G_pb */
     hsep_word base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    hsep_word of_command;  /* (2, preview) and what the experts of the command make of it */
-    hsep_word passed;      /* (preview + 3,) of experts: what the features of x_pb give of it */
+    hsep_word of_command;  /* (2, preview) and the answer of the experts of the command to it */
+    hsep_word passed;      /* (preview + 3,) of experts: the answer of the features of x_pb to it */
     hsep_word run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
     hsep_word lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
     hsep_word disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */

@@ -14,7 +14,7 @@ typedef struct {
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     /* Offsets in words from the beginning of the struct */
     hsep_word c;      /* (3 + n,) m, coefficients */
-    hsep_word total;  /* (4 preview,) rows of x_dm under the rest of the last plan, in shares */
+    hsep_word total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
     hsep_word moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
     hsep_word third;  /* (preview,) m, third differences of what is decided */
     hsep_word P;      /* triangle of n rows */

@@ -164,7 +164,7 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     }
 }
 
-/* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
+/* Hand the bounded problem over: x are the splines after the pinned ones, its bounds what the pinned ones leave. */
 static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);

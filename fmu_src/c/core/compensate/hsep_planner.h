@@ -29,7 +29,7 @@ typedef struct {
     hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
-    hsep_word pinned;             /* samples that follow the last plan: one of those above, or less if half of Np is */
+    hsep_word pinned;             /* samples that follow the last plan: HSEP_PINNED or _WITH_TRUST, or Np / 2 if less */
 } hsep_planner_parameters;
 
 typedef enum {
@@ -47,10 +47,11 @@ HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *paramete
 
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
-/* Another largest |delta| from the next plan on, m; where the rest of the last plan is larger, that bounds it. */
+/* Set another bound on |delta| from the next plan on, m; where the remainder of the last plan is larger, it is the
+ * bound. */
 HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);
 
-/* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
+/* Samples that a bounded plan leaves as they are: the time to solve it in. */
 HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self);
 
 /* The part of delta at sample k that is decided before a plan is made, m. */
@@ -62,37 +63,37 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 /* Let plans of this window turn where no_reversal forbids it: their model follows the friction. */
 HSEP_API void hsep_planner_let_turn(hsep_planner *self);
 
-/* Count the pinned splines to what is decided, in hsep_planner_third. */
+/* Treat the pinned splines as decided, in hsep_planner_third. */
 HSEP_API void hsep_planner_decide_pinned(hsep_planner *self);
 
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
- * (preview,); target: x_d minus the model's response to x_d with what is decided of delta, m, (preview,). Cost:
+ * (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
  * n preview multiply-adds. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
-/* Make that cost one of the splines that are not pinned. */
+/* Reduce that cost to the splines that are not pinned. */
 HSEP_API void hsep_planner_pin(hsep_planner *self);
 
-/* The cost 1/2 c' P c - v' c of the splines first ... n - 1, to be set otherwise: the triangle P of n - first rows, and
- * v, (n - first,), m; hsep_planner_regularise makes P definite. The third differences of what is decided, (preview,),
- * m. */
+/* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
+ * first rows, and v, (n - first,), m; hsep_planner_regularise makes P positive definite. hsep_planner_third: the third
+ * differences of the decided part of delta, (preview,), m. */
 HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_word first);
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first);
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 
-/* Coefficients of the plan, (3 + n,), m; before one is made those of the rest of the last one. */
+/* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
 
-/* Plan at this cost, which is used up. pinned: whether the first samples, hsep_planner_pinned, stay as they are in any
- * case, and the cost is that of the others; else in a bounded plan only, which is solved within the tolerance. Cost:
- * n^3 / 6 multiply-adds. */
+/* Plan at this cost, which is used up. pinned: whether the first samples (hsep_planner_pinned) stay as they are in
+ * every plan, and the cost is of the other splines alone; otherwise they stay in a bounded plan only. A bounded plan is
+ * solved within the tolerance. Cost: n^3 / 6 multiply-adds. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
-/* Do half a step of a bounded plan; return whether it is made. Cost: that of hsep_interior_advance. */
+/* Do half a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
-/* Steps that the last bounded plan took so far; whether half of the last one is to be done. */
+/* Steps that the last bounded plan took so far; whether the second half of the last step is still to be done. */
 HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self);
 HSEP_API int hsep_planner_within_step(const hsep_planner *self);
 

@@ -29,7 +29,7 @@ HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost)
     }
 }
 
-/* Values of four rows, which are added to and compared with those of the next four, and one of the rows left over. */
+/* Sums or maxima of rows, four side by side, and of the rows left over. */
 typedef struct {
     hsep_lanes of_four[HSEP_OF_FOUR];
     hsep_real left;

@@ -179,7 +179,7 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
     }
 }
 
-/* Weights of the rows of an order, (preview,), so that those of samples spacing apart are neighbours. */
+/* Sort the weights of the rows of an order, (preview,): samples that are spacing apart become neighbours. */
 static void splines_sort(const hsep_splines *self, const hsep_real weights[], hsep_real sorted[])
 {
     for (hsep_word phase = 0; phase < self->spacing; phase++) {
@@ -191,8 +191,8 @@ static void splines_sort(const hsep_splines *self, const hsep_real weights[], hs
 
 #define SPLINES_TOGETHER 8 /* splines whose products with another one are summed side by side */
 
-/* sums, (count,), count <= SPLINES_TOGETHER: of splines i ... i + count - 1 with those d behind them. sorted: (4,
- * preview). */
+/* sums, (count,), count <= SPLINES_TOGETHER: products of splines i ... i + count - 1, each with the spline d behind it.
+ * sorted: (4, preview). */
 static void splines_products(
     const hsep_splines *self, const hsep_real sorted[], hsep_word i, hsep_word count, hsep_word d, hsep_real sums[])
 {

@@ -1,8 +1,9 @@
 /* Cubic B-spline basis of the change of the command, delta(k) = sum_j c_j b(k - j spacing), over a plan.
  *
  * Spline j begins at sample j spacing and ends 4 spacings later; the last one ends so that the last four samples of a
- * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. What a drive limits are the
- * differences of delta, order 0 to 3, in shares of a limit: the "rows", of order o at sample k at place o preview + k.
+ * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. The drive limits the
+ * differences of delta of orders 0 to 3. Each of them, as a share of its limit, is a "row": order o at sample k is row
+ * o preview + k.
  *
  * Memory is one block: the struct, then its tables of numbers; no pointers. Reentrant; allocates nothing.
  */
@@ -19,7 +20,7 @@
 typedef struct {
     hsep_word preview, spacing;
     hsep_word n;                  /* splines that begin in a plan */
-    hsep_real share[HSEP_ORDERS]; /* what one metre of difference is of its limit, 1/m */
+    hsep_real share[HSEP_ORDERS]; /* 1 / limit of an order, 1/m */
     /* Offsets in words from the beginning of the struct */
     hsep_word shape;                    /* (4 spacing,) b */
     hsep_word differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
@@ -27,7 +28,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_splines, 12);
 
-/* Splines that begin in a plan: those that end four samples before it does. preview >= 4 spacing + 3. */
+/* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
 HSEP_API hsep_word hsep_splines_count(hsep_word preview, hsep_word spacing);
 
 /* Bytes of the block, counted as a number. */
@@ -41,8 +42,8 @@ HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real l
 
 HSEP_API int hsep_splines_valid(const void *block, hsep_word preview, hsep_word spacing);
 
-/* What the first count splines give at sample k, with coefficients c, (count,), those of the splines -3, -2, -1 first.
- * 4 multiply-adds. */
+/* Sum of the first count splines at sample k, with coefficients c, (count,), which begin with splines -3, -2, -1. 4
+ * multiply-adds. */
 HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_word count, hsep_word k);
 
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
@@ -52,7 +53,7 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
 HSEP_API void hsep_splines_touched(
     const hsep_splines *self, hsep_word first, unsigned order, hsep_word *begin, hsep_word *end);
 
-/* g, (n - first,), += what rows, weighted, say of each coefficient: the transpose of hsep_splines_rows. The rows are
+/* g, (n - first,), += A' rows: the transpose of hsep_splines_rows, whose matrix is A. The rows are
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_word first, hsep_real g[]);
 
@@ -64,15 +65,15 @@ HSEP_API void hsep_splines_gram(
 /* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
 HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
 
-/* The triangle of n rows := W' W of the splines behind a filter, W's columns being shifts of the filtered spline,
- * (preview,), by one spacing. Each diagonal is a running sum: cost n preview / 2 multiply-adds. */
+/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
+ * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
 /* The triangle of n rows += weight D' D with the differences D of an order of n splines behind each other, m. */
 HSEP_API void hsep_splines_difference_gram(
     const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[]);
 
-/* What weight D' D, of hsep_splines_difference_gram, makes of coefficients: y, (n,), += weight D' D c. */
+/* Multiply coefficients by the matrix of hsep_splines_difference_gram: y, (n,), += weight D' D c. */
 HSEP_API void hsep_splines_difference_product(
     const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, const hsep_real c[], hsep_real y[]);
 

@@ -21,8 +21,8 @@ static const hsep_tolerance trusted_planner_tolerance = {1e-4, 1e-2, HSEP_TRUSTE
  * rounding tells apart are equal. */
 static const hsep_real trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
 
-/* Change of a plan, relative to the largest one, that is at its bound; share of a window in which a plan may be there
- * longer than the physics model's; and RMS error that it may leave then, relative to the largest change. */
+/* A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
+ * model's plan by this share of a window, and may leave this RMS error then, relative to the largest change. */
 static const hsep_real trusted_planner_at_bound = 0.97, trusted_planner_bound_share = 0.2, trusted_planner_left = 0.3;
 
 /* Whether a plan costs less than another; not if it is NaN. */
@@ -52,7 +52,7 @@ static void trusted_planner_command(
 }
 
 /* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. varied: samples
- * whose variance is computed; 0: it is that under the rest of the last plan. */
+ * whose variance is computed; 0: the variance under the remainder of the last plan is kept. */
 static hsep_real trusted_planner_predict(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
 {
@@ -73,7 +73,7 @@ static hsep_real trusted_planner_predict(
     return error + task->planner->jerk_weight * jerk;
 }
 
-/* The same of the commands of a plan. */
+/* The same for the commands of a plan. */
 static hsep_real trusted_planner_at(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
 {
@@ -96,7 +96,7 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
     }
 }
 
-/* Begin the physics model's plan; without one the rest of the last plan goes on. */
+/* Begin the physics model's plan; without one the remainder of the last plan goes on. */
 static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb);
@@ -146,7 +146,7 @@ HSEP_API void hsep_trusted_planner_begin(
     }
 }
 
-/* Variances of some of the samples under the rest of the last plan. */
+/* Variances of some of the samples under the remainder of the last plan. */
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_word all = self->preview + self->late, left = all - self->varied;
@@ -203,8 +203,8 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
     self->stage = self->columns < self->n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
 }
 
-/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term, of the splines that are not pinned:
- * what the others do to x_h is in where it is linearised. */
+/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term, for the splines that are not pinned;
+ * the plan that is linearised at has the pinned ones in it. */
 static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
@@ -290,9 +290,9 @@ static hsep_real trusted_planner_bounded(
     return bounded / (hsep_real)self->Np;
 }
 
-/* Whether the best plan asks for more than compensation is made for. A motor at its limit does not follow, so that the
- * next plan asks for more; and a position loop that is driven so far has a second state, with an error many times
- * larger, in which it stays when compensation ends. */
+/* Whether the best plan asks for a larger change than compensation is made for. A motor at its limit does not follow,
+ * so that the next plan asks for more. A position loop that is driven so far may fall into a second state with an error
+ * many times larger, and stays in it when compensation ends. */
 static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);

@@ -1,14 +1,15 @@
-/* Planner on the residual model that can be trusted, by Newton steps that follow the slope of its disturbances.
+/* Planner on the residual model with trust, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower
- * the cost is repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that
- * of the physics model, and the better one is taken. Where a plan asks for more than compensation is made for,
- * which shows that the trusted model is wrong, the physics model plans the rest of the run.
+ * the cost is repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with the
+ * physics model's plan, and the better one is taken. Where a plan asks for a larger change than compensation is made
+ * for, the trusted model is wrong, and the physics model plans the rest of the run.
  *
- * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
- * that is, hsep_trusted_planner_left how much all that is left may be, both counted in multiply-adds from the sizes, so
- * that samples which share it have equal parts. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * The work is cut into short parts: hsep_trusted_planner_advance does the next part, hsep_trusted_planner_next tells
+ * its work, hsep_trusted_planner_left the most that all parts left may take. Both are counted in multiply-adds from the
+ * sizes, so that samples can share the work equally. Memory is one block, without pointers. Reentrant; allocates
+ * nothing.
  */
 #ifndef HSEP_TRUSTED_PLANNER_H
 #define HSEP_TRUSTED_PLANNER_H
@@ -25,15 +26,15 @@
 #define HSEP_TRUSTED_TRIES 6    /* tries of each, */
 #define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
 #define HSEP_TRUSTED_SOLVER 34  /* solver steps after which no bounded try is begun, */
-#define HSEP_TRUSTED_SOLVED 10  /* and those of one programme at most */
+#define HSEP_TRUSTED_SOLVED 10  /* solver steps of one programme at most */
 #define HSEP_TRUSTED_VARIED 8   /* samples whose variances are computed in a part */
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
-    HSEP_TRUSTED_VARY,    /* variances under the rest of the last plan are to be computed */
+    HSEP_TRUSTED_VARY,    /* variances under the remainder of the last plan are to be computed */
     HSEP_TRUSTED_BEGIN,   /* the physics model's plan begins, */
     HSEP_TRUSTED_PHYSICS, /* it is bounded and being solved */
-    HSEP_TRUSTED_REST,    /* the rest of the last plan is to be judged */
+    HSEP_TRUSTED_REST,    /* the remainder of the last plan is to be judged */
     HSEP_TRUSTED_STEP,    /* a Newton step begins, */
     HSEP_TRUSTED_COLUMN,  /* changes of x_h by the splines are to be computed, */
     HSEP_TRUSTED_PRODUCT, /* and their products */
@@ -47,11 +48,11 @@ typedef enum {
 typedef struct {
     hsep_word preview, p, Np;
     hsep_word late;         /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_word n, n_pinned;  /* splines of a plan, and those of them that stay as they were */
+    hsep_word n, n_pinned;  /* splines of a plan, and the first ones, which stay as they were */
     hsep_word stage;        /* hsep_trusted_stage */
     hsep_word follows;      /* whether the trusted model may plan */
     hsep_word steps;        /* Newton steps begun */
-    hsep_word varied;       /* samples whose variance under the rest of the last plan is computed */
+    hsep_word varied;       /* samples whose variance under the remainder of the last plan is computed */
     hsep_word columns;      /* splines that are pinned, or whose change of x_h is computed */
     hsep_word tries;        /* of this step, and */
     hsep_word tries_in_all; /* of all */
@@ -62,9 +63,9 @@ typedef struct {
     hsep_real penalty;      /* on the change of velocity, in the unit of the jerk's weight */
     hsep_real start;        /* m, position of rest */
     /* Offsets in words from the beginning of the struct */
-    hsep_word rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
-    hsep_word best;       /* (3 + n,) m, those of the best plan so far */
-    hsep_word of_physics; /* (3 + n,) m, those of the physics model's */
+    hsep_word rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
+    hsep_word best;       /* (3 + n,) m, coefficients of the best plan so far */
+    hsep_word of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
     hsep_word command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     hsep_word x_pb;       /* (preview + late,) m, their prediction by the physics model, */
     hsep_word e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
@@ -99,7 +100,7 @@ HSEP_API void hsep_trusted_planner_init(
 HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
-/* What is before a window. */
+/* State before a window. */
 typedef struct {
     const hsep_physics *physics; /* G_pb at its beginning */
     const hsep_real *late_command,
@@ -107,20 +108,20 @@ typedef struct {
     const hsep_real *residuals; /* (p,) m, the last ones measured, newest first */
 } hsep_trusted_before;
 
-/* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
- * Only the samples that the plan leaves as they are, and the late ones before them, have their variance then. Cost:
- * that of hsep_trusted_forecast; with a late measurement its variances, late^2 / 2 multiply-adds for each
- * expert, here and in the last part. */
+/* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
+ * trusted. It computes variances only of the samples that the plan leaves as they are and of the late ones before them.
+ * Cost: as hsep_trusted_forecast; a late measurement adds late^2 / 2 multiply-adds for each expert, here and in the
+ * last part, for variances. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, hsep_word best);
 
-/* Multiply-adds of the part that is next; 0: the plan is made and predicted. */
+/* Multiply-adds of the next part; 0: the plan is made and predicted. */
 HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, const hsep_trusted_task *task);
 
-/* Multiply-adds that it and all that follow take at most. */
+/* Multiply-adds that the next part and all after it take at most. */
 HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, const hsep_trusted_task *task);
 
-/* Do that part. */
+/* Do the next part. */
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);
 
 #endif

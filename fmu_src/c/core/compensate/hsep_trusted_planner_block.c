@@ -1,4 +1,4 @@
-/* Memory of a planner on the residual model that can be trusted: its layout, beginning and check. */
+/* Memory of a planner on the residual model with trust: its layout, beginning and check. */
 #include "hsep_trusted_planner.h"
 
 #include "hsep_cholesky.h"

@@ -1,12 +1,12 @@
-/* Work of the parts of a plan on the residual model that can be trusted, in multiply-adds, counted from the sizes: no
- * processor is asked, and samples that share it by these counts have equal parts. */
+/* Work of the parts of a plan on the residual model with trust, in multiply-adds, counted from the sizes and
+ * not timed, so that samples can share it equally on any processor. */
 #include "hsep_trusted_planner.h"
 
 #include "hsep_cholesky.h"
 
-/* What counts as so many multiply-adds: a tanh; what the halves of an interior-point step do for a sample of a plan
- * besides their matrices, with its rows of 4 orders and 2 sides; what beginning one does; what a linearisation does
- * for a sample besides recursions and tanh; and what a prediction does for a sample of an expert. */
+/* Multiply-adds that these count for: a tanh; the two halves of an interior-point step besides their matrices, for a
+ * sample of a plan with its rows of 4 orders and 2 sides; the beginning of such a step; a linearisation besides
+ * recursions and tanh, for a sample; a prediction, for a sample of an expert. */
 static const hsep_real work_tanh = 40.0, work_residuals = 200.0, work_slacks = 400.0, work_bounds = 550.0,
                        work_sample = 550.0, work_of_expert = 270.0;
 

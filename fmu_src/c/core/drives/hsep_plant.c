@@ -85,7 +85,7 @@ static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage
     self->n_modes = n_modes;
     self->n_line = settings->dead_time;
     if (settings->input_hold == HSEP_FIRST_ORDER_HOLD && settings->dead_time > 0) {
-        self->n_line -= 1; /* the way from the command before to that of now takes a sample */
+        self->n_line -= 1; /* from the last command to this one takes a sample */
     }
     self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
     self->z = hsep_take(&end, 2.0 * (double)n_modes);
@@ -168,7 +168,7 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double dist
     }
 }
 
-/* The command after the carriage's friction, d = f tanh(v_d / v_friction), if it is that of the commanded velocity. */
+/* The command after the carriage's friction, d = f tanh(v_d / v_friction), if it follows the commanded velocity. */
 static double plant_disturbed(const hsep_stage *s, double r, double v_d)
 {
     const hsep_stage_settings *of = &s->settings;

@@ -62,9 +62,9 @@ typedef struct {
 } hsep_stage_settings;
 
 /* x = G_pb (x_d - d) with d = f tanh(v_f / v_friction) + kappa x|x|; v_f is the velocity of the friction. Without a
- * dead time and held, a command acts at once; else it is sampled at the instants. A first-order hold goes from the
- * command before to that of now while there is a dead time, one sample of which this takes; without one it goes on as
- * it came. */
+ * dead time and held, a command acts at once; else it is sampled at the instants. A first-order hold with a dead time
+ * goes from the last command to this one, which takes one sample of the dead time; without a dead time it goes on with
+ * the last slope. */
 typedef struct {
     hsep_stage_settings settings;
     double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */

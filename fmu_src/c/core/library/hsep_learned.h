@@ -31,8 +31,8 @@ HSEP_ASSERT(learned_setting, sizeof(hsep_learned_setting) == 32);
 typedef struct hsep_learned_source hsep_learned_source;
 struct hsep_learned_source {
     size_t (*read)(hsep_learned_source *self, void *to, size_t size);
-    const unsigned char *bytes; /* those in memory, */
-    size_t left;                /* so many */
+    const unsigned char *bytes; /* bytes in memory, */
+    size_t left;                /* their number */
     void *file;                 /* or what another source reads from */
 };
 

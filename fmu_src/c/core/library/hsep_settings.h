@@ -27,7 +27,7 @@
     SETTING(hsep_word, dead_time)
 
 #define HSEP_TRUST_SETTINGS(SETTING) \
-    /* whether the residual model is trusted only as far as its variance allows; false: the paper's */ \
+    /* whether the residual is predicted by online model averaging; false: by the paper's model */ \
     SETTING(hsep_word, trust) \
     /* prior standard deviation of a feature's effect, with trust; 0: from the residuals, m */ \
     SETTING(hsep_real, effect) \

@@ -25,7 +25,8 @@ static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *le
 /* Rows of a triangle that are finished together. */
 #define CHOLESKY_PANEL 8
 
-/* Finish count rows, from row k of n on, of which those above have been taken; return whether they have pivots. */
+/* Finish count rows, from row k of n on, from which the rows above have been subtracted; return whether they have
+ * pivots. */
 static int cholesky_panel(
     hsep_real *const rows[CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
 {

@@ -38,8 +38,8 @@ HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
 
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self) { return hsep_at(self, self->rows) + (self->n + 1) * self->waiting; }
 
-/* Add row a of the products of four rows, from its diagonal on, to the sums: with what rounding takes from them in the
- * carries, which is given back next time (Kahan 1965). */
+/* Add row a of the products of four rows, from its diagonal on, to the sums; their rounding errors are kept in the
+ * carries and added back next time (Kahan 1965). */
 static void gram_add_row(
     hsep_real *restrict sums, hsep_real *restrict carries, const hsep_real a[4], const hsep_real *restrict x0,
     const hsep_real *restrict x1, const hsep_real *restrict x2, const hsep_real *restrict x3, hsep_word n)

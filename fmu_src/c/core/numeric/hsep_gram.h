@@ -2,10 +2,10 @@
  *
  * w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2
  *
- * What rows come to is the same at every sample, and a solution is one Cholesky factor, a third of the work of a
- * triangular factor that is carried. It squares the condition of the rows, which the penalties bound: no pivot is less
- * than its penalty. What rounding takes from an entry is carried along and given back with the next rows, so that the
- * digits do not wear off.
+ * A row costs the same at every sample, and a solution one Cholesky factor, which is a third of the work of updating a
+ * triangular factor. The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot is less
+ * than its penalty. The rounding error of an entry is kept and added back with the next rows (compensated summation),
+ * so that errors do not pile up.
  *
  * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */
@@ -16,8 +16,8 @@
 #include "hsep_layout.h"
 #include "hsep_real.h"
 
-/* Least pivot, m2, where a penalty underflows; that of the target, relative to its square; and what rounding leaves
- * unresolved of the sum of squares, relative to that of the targets'. */
+/* Least pivot, m2, where a penalty underflows; least pivot of the target, relative to its sum of squares; and the part
+ * of the sum of squares that rounding leaves unresolved, relative to the targets' sum of squares. */
 #ifdef HSEP_FLOAT32
 #define HSEP_GRAM_LEAST 1e-36F
 #define HSEP_GRAM_OF_TARGET 6e-8F
@@ -57,15 +57,15 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
- * rows of a factor are worth those it comes from, whose number the caller sets. Fails, and returns 0, if an entry is
- * not finite or a diagonal entry of R is 0. Cost: that of hsep_gram_fold. */
+ * rows of a factor stand for the rows that it was made from, whose number the caller sets. Fails, and returns 0, if an
+ * entry is not finite or a diagonal entry of R is 0. Cost: as hsep_gram_fold. */
 HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 
-/* Add the rows that wait to the sums now, so that a solution need not: before the last row of a window comes. */
+/* Add the rows that wait to the sums now, so that hsep_gram_solve need not; called before the last row of a window. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
 /* Sum of the squares of the targets, m2. */
@@ -80,8 +80,8 @@ HSEP_API hsep_real hsep_gram_solve(
     hsep_real factor[], hsep_real least[], hsep_real w[]);
 
 /* phi' (R' R)^-1 phi of HSEP_GRAM_ABREAST rows phi, entry after entry side by side in rows, which is used up: the
- * variances of w' phi relative to that of the noise. factor: that of hsep_gram_solve. Cost: m^2 / 2 multiply-adds for
- * each. */
+ * variances of w' phi relative to the variance of the noise. factor: from hsep_gram_solve. Cost: m^2 / 2 multiply-adds
+ * for each. */
 HSEP_API void hsep_gram_leverages(
     const hsep_real factor[], hsep_word m, hsep_real rows[], hsep_real leverages[HSEP_GRAM_ABREAST]);
 

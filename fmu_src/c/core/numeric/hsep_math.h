@@ -1,4 +1,4 @@
-/* Functions of C's library for hsep_real: with HSEP_FLOAT32 those for float. */
+/* Functions of C's library for hsep_real: with HSEP_FLOAT32 the functions for float. */
 #ifndef HSEP_MATH_H
 #define HSEP_MATH_H
 

@@ -27,7 +27,8 @@ typedef struct {
     hsep_word n;
 } hsep_range;
 
-/* Whether numbers, (n,), are in these ranges, one behind the other, which are those of all n. */
+/* Whether numbers, (n,), are in their ranges: each range holds for its n numbers, in order, and all ranges together for
+ * n. */
 static inline int hsep_in_ranges(const hsep_real numbers[], hsep_word n, const hsep_range *range)
 {
     int within = 1;

@@ -43,7 +43,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real
 
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
-/* u := u + change with what rounding takes from it kept in carry, and given back next time (Kahan 1965). */
+/* u := u + change; its rounding error is kept in carry and added back next time (Kahan 1965). */
 static inline void regression_add(hsep_real *restrict u, hsep_real *restrict carry, hsep_real change)
 {
     const hsep_real wanted = change + *carry, sum = *u + wanted;
@@ -128,7 +128,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
      * v, and with it every division, is not needed for the x of the next pivot: they run beside the sweeps.
-     * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
+     * The last form is the cheapest and its rounding error is a Givens rotation's divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     hsep_real v = 1.0;
     hsep_word rows = self->n;

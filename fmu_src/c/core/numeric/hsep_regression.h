@@ -4,9 +4,9 @@
  *
  * The QR factor [R z; 0 rho] of all rows [phi | target] so far, with sqrt(lambda) I as its first R, is updated by
  * Givens rotations without square roots (Gentleman 1973): R = D^(1/2) U with a unit triangle U. Weights and data
- * never meet as normal equations, so nothing is squared but single numbers. Error bound: that of ordinary Givens
- * rotations times at most sqrt(2), see hsep_regression.c; and what rounding takes from an entry is carried along and
- * given back with the next row, so that the digits do not wear off over 10^8 rows.
+ * never meet as normal equations, so nothing is squared but single numbers. Error bound: at most sqrt(2) times the
+ * bound of ordinary Givens rotations, see hsep_regression.c. The rounding error of an entry is kept and added back with
+ * the next row (compensated summation), so that errors do not pile up over 10^8 rows.
  *
  * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
  */

@@ -3,8 +3,8 @@
  * The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
  * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
  * vectors of a tile's rows without knowing how long they are. Columns behind the target are 0 for ever.
- * Each tile is followed by its carry: what rounding took from the entries, to be given back with the next row. Without
- * it an entry walks away at random, by half a unit in its last place a row. */
+ * Each tile is followed by its carry: the rounding errors of its entries, to be added back with the next row. Without
+ * it an entry drifts at random, by half a unit in its last place a row. */
 #ifndef HSEP_TILES_H
 #define HSEP_TILES_H
 

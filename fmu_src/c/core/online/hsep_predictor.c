@@ -27,7 +27,7 @@ static int predictor_settled(hsep_predictor *self)
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     const hsep_word i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
-    /* What was measured is that of late samples ago. */
+    /* x_meas was measured late samples ago. */
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
@@ -172,7 +172,7 @@ HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, 
     }
 }
 
-/* Take in commands and x_pb of the window that begins as they came, eq. (2), behind those that are not measured yet. */
+/* Take in commands and x_pb of the window that begins as they came, eq. (2), behind the late samples' values. */
 static void predictor_open(hsep_predictor *self)
 {
     const hsep_word Np = self->Np;
@@ -187,7 +187,7 @@ static void predictor_open(hsep_predictor *self)
     }
 }
 
-/* Predict the next samples of the window; those that are not measured yet with the first of them. */
+/* Predict the next samples of the window; with the first of them also the late samples, which are not measured yet. */
 static void predictor_go_on(hsep_predictor *self)
 {
     const hsep_word late = self->late, published = self->n_published, left = self->Np - published;

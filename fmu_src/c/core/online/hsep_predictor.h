@@ -1,22 +1,22 @@
 /* Hybrid predictor, sample by sample; eqs. (2) to (6).
  *
  * It is the look-ahead buffer between the interpolator and the drive: sample k brings x_d_ahead = r(k) and x_meas =
- * x(k); after it the outputs are those of k + 1, and x_d(k) = r(k - preview). When k + 1 is a multiple of Np, the next
+ * x(k); after it the outputs belong to k + 1, and x_d(k) = r(k - preview). When k + 1 is a multiple of Np, the next
  * window and every measurement before it have arrived: the weights are solved and the window is predicted in that
  * sample. Over the first fill (k < preview) the commanded position is the start; what is measured then is not learned.
  *
- * Where the measurement is late by some samples, x_meas = x(k - late): a window is predicted with the samples before it
- * that are not measured yet, n = Np + late of them, and what is learned over it are the first Np.
+ * Where the measurement is late by some samples, x_meas = x(k - late): the late samples before a window, which are not
+ * measured yet, are predicted with it: n = Np + late samples. The first Np of these are learned when the window ends.
  *
  * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
- * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
- * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust that of
- * hsep_gram_fold, twice, and at the end of a window hsep_trusted_learn, hsep_trusted_forecast, which leaves most of the
- * window that begins to the next samples, hsep_residual_part of it to each; at the end of a first window whose commands
- * begin in motion all its rows at once.
+ * Cost of a sample, with n features: as much as hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end
+ * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust a sample
+ * costs two hsep_gram_fold, and the end of a window hsep_trusted_learn and hsep_trusted_forecast. The latter leaves
+ * most of the window that begins to the next samples: each of them does one hsep_residual_part. At the end of a first
+ * window whose commands begin in motion all its rows are folded at once.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
@@ -81,7 +81,7 @@ HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Whether a block, in any alignment and of hsep_predictor_block_size(parameters) bytes, is a valid state for these
- * parameters at sample k: its layout is that of hsep_predictor_block_init, and every index lies within it. */
+ * parameters at sample k: hsep_predictor_block_init would lay it out so, and every index lies within it. */
 HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_word k);
 
 /* The residual model, and its parameters. */
