@@ -77,9 +77,10 @@ def test_what_a_contributors_run_leaves_out_runs_every_night(pytestconfig: pytes
     assert {*LEFT_OUT, "hypothesis"} == set(chosen.split(" or "))
     assert set(LEFT_OUT) < {line.partition(":")[0] for line in pytestconfig.getini("markers")}
     assert any("schedule" in str(rule) for rule in content(GITLAB)["nightly"]["rules"])
-    controllers = content(GITHUB[1])["jobs"]["controllers"]["steps"]
-    assert ".ci/controllers" in [step.get("run") for step in controllers]
-    assert ".ci/controllers" in content(GITLAB)["controllers"]["script"]
+    for job in ("controllers", "linuxcnc"):
+        steps = content(GITHUB[1])["jobs"][job]["steps"]
+        assert f".ci/{job}" in [step.get("run") for step in steps]
+        assert f".ci/{job}" in content(GITLAB)[job]["script"]
     assert re.search(r"^  schedule:$", GITHUB[1].read_text(encoding="utf-8"), re.MULTILINE)
 
 

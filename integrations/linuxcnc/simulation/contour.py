@@ -25,10 +25,20 @@ from hybridsep.base.signals import Array
 
 HERE = Path(__file__).resolve().parent
 AXES = ("x", "y")
-CASES = {"off": {"ENABLE": 0}, "physics": {"MODEL": 1}, "hybrid cold": {}, "hybrid warm": {}}
-"""Cases by name, with the entries of machine.ini's [HSEP] that they change."""
+CASES: dict[str, dict[str, int]] = {
+    "without": {},
+    "off": {"ENABLE": 0},
+    "physics": {"MODEL": 1},
+    "hybrid cold": {},
+    "hybrid warm": {},
+}
+"""Cases by name, with the entries of machine.ini's [HSEP] that they change; the first one is without the component."""
 
-COLUMNS = ("n", *(f"{axis}_{name}" for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in AXES))
+COLUMNS = (
+    "n",
+    *(f"{axis}_{name}" for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in AXES),
+    "overruns",
+)
 REACH = 80
 """Samples to either side among which the nearest part of the path is looked for."""
 
@@ -43,8 +53,8 @@ class Samples:
         Command to the drives, the command as it came, and measured and true positions.
     state : (n, 2) array
         The component's.
-    n_lost : int
-        Samples that the sampler has lost.
+    n_lost, n_late : int
+        Samples that the sampler has lost, and periods that began half a period late or more.
     """
 
     out: Array
@@ -53,6 +63,7 @@ class Samples:
     pos: Array
     state: Array
     n_lost: int
+    n_late: int
 
     @classmethod
     def read(cls, path: Path) -> Samples:
@@ -66,7 +77,8 @@ class Samples:
         moving = np.flatnonzero(np.abs(np.diff(pairs["delayed"], axis=0)).sum(axis=1) > 0.0)
         part = slice(moving[0], moving[-1] + REACH)
         n_lost = int(table[-1, 0] - table[0, 0]) + 1 - len(table)
-        return cls(**{name: pair[part] for name, pair in pairs.items()}, n_lost=n_lost)
+        late = columns["overruns"][part]
+        return cls(**{name: pair[part] for name, pair in pairs.items()}, n_lost=n_lost, n_late=int(late[-1] - late[0]))
 
     def contour_errors(self) -> Array:
         """Return the distance of each true position to the commanded path, ``(n,)``, mm."""
@@ -92,14 +104,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     install(given.out)
     print("| contour error, µm: RMS (largest) | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
     found: dict[str, dict[str, Array]] = {}
+    late: dict[str, list[str]] = {}
     for program in given.programs:
         samples = run_cases(program, given.out, given.user)
         found[program] = {case: one.contour_errors() for case, one in samples.items()}
         cells = [f"{1e3 * rms(error):.1f} ({1e3 * largest(error):.0f})" for error in found[program].values()]
         print(f"| {program} | " + " | ".join(cells) + " |", flush=True)
+        late[program] = [f"{one.n_late} of {len(one.pos)}" for one in samples.values()]
         lost = sum(one.n_lost for one in samples.values())
         if lost:
             print(f"{lost} samples were lost", file=sys.stderr)
+    print("\n| periods that began late | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
+    for program, cells in late.items():
+        print(f"| {program} | " + " | ".join(cells) + " |")
     draw(found, given.out / "contour.png")
 
 
@@ -118,7 +135,7 @@ def run_cases(program: str, out: Path, user: str | None) -> dict[str, Samples]:
         log = out / f"{program}_{case.replace(' ', '_')}.txt"
         if case == "hybrid warm":
             train(out / f"{program}_hybrid_cold.txt", out)
-        run(f"{program}.ngc", log, out, entries, user)
+        run(f"{program}.ngc", log, out, entries, user, component=case != "without")
         found[case] = Samples.read(log)
         if case == "hybrid warm":
             for axis in AXES:
@@ -135,8 +152,10 @@ def train(log: Path, out: Path) -> None:
         hybridsep("hal", machine, "--out", str(out / "hal"), "--weights", state)
 
 
-def run(program: str, log: Path, out: Path, entries: Mapping[str, int], user: str | None) -> str:
-    """Run LinuxCNC once, with entries of [HSEP] changed; return what it printed."""
+def run(
+    program: str, log: Path, out: Path, entries: Mapping[str, int], user: str | None, *, component: bool = True
+) -> str:
+    """Run LinuxCNC once, with entries of [HSEP] changed or without the component; return what it printed."""
     folder = out.resolve() / "run"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(HERE, folder)
@@ -145,6 +164,8 @@ def run(program: str, log: Path, out: Path, entries: Mapping[str, int], user: st
     text = (folder / "machine.ini").read_text(encoding="utf-8")
     for name, number in entries.items():
         text = re.sub(rf"^{name} = .*$", f"{name} = {number}", text, flags=re.MULTILINE)
+    if not component:
+        text = text.replace("HALFILE = component.hal", "HALFILE = without.hal")
     (folder / "machine.ini").write_text(text, encoding="utf-8")
     environment = {**os.environ, "HSEP_PROGRAM": program, "HSEP_SAMPLES": str(folder / "samples.txt")}
     command = ["linuxcnc", "-r", "machine.ini"]

@@ -4,6 +4,7 @@ command; the encoder has a resolution and noise that is the same in every run.""
 pin in float cmd "commanded position, machine units";
 pin out float fb "measured position, machine units";
 pin out float pos "true position, machine units";
+pin out s32 overruns "periods that began half a period late or more";
 param rw float fn = 25.0 "natural frequency, Hz";
 param rw float zeta = 0.3 "damping ratio";
 param rw float friction = 0.02 "friction, as a deviation of the command, machine units";
@@ -13,6 +14,7 @@ variable double x;
 variable double v;
 variable unsigned seed = 1;
 variable int begun;
+variable rtapi_s64 at;
 function _ fp;
 license "BSD";
 author "the authors of hybridsep";
@@ -35,10 +37,14 @@ static double drive_noise(unsigned *state)
 FUNCTION(_)
 {
     const double w = 2.0 * 3.14159265358979323846 * fn, h = 1e-9 * (double)period / SUBSTEPS;
+    const rtapi_s64 now = rtapi_get_time(); /* ns */
     if (!begun) {
         x = cmd;
         begun = 1;
+    } else if (now - at > period + period / 2) {
+        overruns += 1;
     }
+    at = now;
     /* What is measured at the begin of the period, then its motion under the command */
     pos = x;
     fb = resolution * floor((x + noise * drive_noise(&seed)) / resolution + 0.5);

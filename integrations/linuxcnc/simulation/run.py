@@ -20,7 +20,8 @@ import linuxcnc
 COLUMNS = ["n"] + [
     axis + "_" + name for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in ("x", "y")
 ]
-"""Names of what axes.hal samples, mm."""
+COLUMNS.append("overruns")
+"""Names of what the HAL files sample: a number, mm, the component's state, and periods that began late so far."""
 
 WAIT = 60.0
 """Time after which what is waited for will not come, s."""
@@ -102,7 +103,7 @@ def main() -> None:
                 machine.start(program)
                 machine.finish()
             time.sleep(0.3)
-            subprocess.run(["halcmd", "show", "param", "hsep.*.tmax"], check=True)
+            subprocess.run(["halcmd", "show", "param", "*.tmax"], check=True)
         finally:
             sampler.terminate()
             sampler.wait()
