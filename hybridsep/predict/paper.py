@@ -129,7 +129,7 @@ def free_run(state: PaperModel, x_pb: Array) -> Array:
 
 
 def impulse_response(state: PaperModel, g_pb: Array) -> Array:
-    """Return that of the hybrid model, ``(n,)``, from that of ``G_pb``: the first column of ``G_h`` of eq. (3)."""
+    """Return the hybrid model's impulse response, ``(n,)``, from ``G_pb``'s: the first column of ``G_h`` of eq. (3)."""
     # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
     w, w_e = state.regression.weights, state.lag_weights
     return np.asarray(g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb))

@@ -160,7 +160,7 @@ class HybridPredictor:
         Parameters
         ----------
         learned, regressions : Learned and tuple of RidgeRegression
-            Those of its residual model.
+            Of its residual model.
         uncertainty : Uncertainty
 
         Raises
@@ -184,7 +184,7 @@ class HybridPredictor:
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
         scales : FeatureScales, optional
-            With trust: scales of the features, in a compensator; those of ``x_d`` if left out.
+            With trust: scales of the features, in a compensator; from ``x_d`` if left out.
 
         Returns
         -------
@@ -209,7 +209,7 @@ class HybridPredictor:
     def _with_error(self, forecast: Forecast) -> PredictedWindow:
         """Return the window of a forecast with what is known of its error, pending measurement.
 
-        With a ``measurement_delay`` the window begins so many samples earlier, with those not measured yet.
+        With a ``measurement_delay`` the window begins so many samples earlier: they are not measured yet.
         """
         x_pb, n = forecast.window.x_pb, len(forecast.e_h)
         active = np.arange(n) >= self._warm_up(n, late=len(self.state.late))
@@ -272,7 +272,7 @@ class HybridPredictor:
         """
         residual = self.state.residual
         if not isinstance(residual, PaperModel):
-            raise ParameterError("the operator is that of the paper's model: it needs trust = false")
+            raise ParameterError("the operator needs the paper's model, trust = false")
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")

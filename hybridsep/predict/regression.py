@@ -2,8 +2,8 @@
 
 ``w(j) = argmin_w Σ_{k < j·Np} [e_pb(k) − wᵀφ(k)]² + λ‖w‖²``
 
-Neighbouring lags of a smooth position are nearly collinear: the condition number of Φ is 1e6 to 1e12, that of the
-normal equations its square, and the textbook covariance update loses the weights or reaches NaN. Here the QR factor of
+Neighbouring lags of a smooth position are nearly collinear: the condition number of Φ is 1e6 to 1e12, the normal
+equations have its square, and the textbook covariance update loses the weights or reaches NaN. Here the QR factor of
 all rows so far, ``[√λ·I; Φ] = Q R``, is updated by each block of rows (Golub and Van Loan, *Matrix Computations*, 4th
 ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of constant size.
 """
@@ -72,7 +72,7 @@ class PenalisedSolution(NamedTuple):
     residual_sum: float
 
     def leverage(self, rows: Array) -> Array:
-        """Return ``φᵀ(RᵀR)⁻¹φ`` of rows φ, ``(k, m)``: the variance of ``wᵀφ`` relative to that of the noise."""
+        """Return ``φᵀ(RᵀR)⁻¹φ`` of rows φ, ``(k, m)``: the variance of ``wᵀφ`` relative to the noise's."""
         solved, _ = lapack.dtrtrs(self.triangle, rows.T, trans=1)
         return np.asarray(np.einsum("ij,ij->j", solved, solved))
 
@@ -191,7 +191,7 @@ class RidgeRegression:
         """Solve for the weights of the first ``m`` features, each with a penalty of its own.
 
         They minimise ``Σ (target − wᵀφ)² + Σ_i penalties_i w_i²`` over the rows so far: the triangle of all features
-        holds that of the first ones, so a QR update with ``m`` rows of penalties suffices.
+        holds the triangle of the first ones, so a QR update with ``m`` rows of penalties suffices.
 
         Parameters
         ----------

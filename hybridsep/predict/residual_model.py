@@ -1,4 +1,4 @@
-"""Model of the residual ``e_pb = x − x_pb``: the paper's, or with trust the one that can be trusted.
+"""Model of the residual ``e_pb = x − x_pb``: the paper's, or with trust the trusted one.
 
 Each function calls its counterpart of the two. A state is a record; each function returns another one.
 """

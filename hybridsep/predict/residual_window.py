@@ -34,9 +34,9 @@ class FeatureScales(NamedTuple):
     velocity : float, m/s
         Velocity scale of the friction features.
     largest : (n_static,) array
-        Largest magnitudes of the static features, those ahead included.
+        Largest magnitudes of the static features, ahead, too.
     step : float, m
-        Largest change of the command from sample to sample, those ahead included.
+        Largest change of the command from sample to sample, ahead, too.
     """
 
     velocity: float

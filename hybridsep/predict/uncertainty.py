@@ -3,8 +3,8 @@
 The variance at sample ``k`` of a window is a sum of three components, ``v(k) = Σ_i θ_i f_i(k)``, of what errors come
 with: measurement noise; timing, the squared difference of ``x_pb`` from sample to sample; and what the residual model
 knows of itself, the variance of the mixture of its experts. All are known before the window is measured, so that the
-variance is small at standstill and large in motion. Timing and that variance are felt after they have happened, and for
-a while: they are averaged over the samples before, from the last measured one on. The published standard deviation is
+variance is small at standstill and large in motion. Timing and that variance act on
+later samples, too: each is averaged over the samples since the last measured one. The published standard deviation is
 ``c(k)·√v``.
 
 After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
@@ -31,7 +31,7 @@ from ..base.signals import PREDICTION_MAX, Array
 __all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
 
 _SHARES = (4.0, 2.0)
-"""First variance of the error relative to that of its causes: timing, variance of the experts."""
+"""First variance of the error relative to its causes' own: timing, variance of the experts."""
 
 N_COMPONENTS = 1 + len(_SHARES)
 """Of the variance."""
@@ -100,7 +100,7 @@ class Uncertainty:
     Attributes
     ----------
     theta : (N_COMPONENTS,) array
-        ``θ``: variance of the noise, m², and those relative to their causes.
+        ``θ``: variance of the noise, m², and of the others relative to their causes.
     evidence : (N_COMPONENTS,) array
         Windows that each stands on, faded.
     factor : float

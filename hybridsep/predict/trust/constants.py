@@ -28,11 +28,11 @@ class TrustConstants:
         the worst drives are worse.
     lags_of_command : int
         Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead
-        of 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the
+        of 20 errors are 2 % less on drives of modes, 8 % more on drives of two masses, and a third less where the
         physics model is bad; more than 36 cost more than four million instructions in the dearest sample.
     last_lag : float
-        Prior variance of the weight of the last lag, and of the command's last increment, relative to that of the
-        first: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
+        Prior variance of the weight of the last lag, and of the command's last increment, relative to the
+        first one's: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
     least_noise : float
         Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
         would prevent any learning.
@@ -95,4 +95,4 @@ class TrustConstants:
 
 
 CONSTANTS = TrustConstants()
-"""Those of the product."""
+"""The product's."""

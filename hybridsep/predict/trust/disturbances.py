@@ -29,7 +29,7 @@ Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
 N_FRICTION, N_LASTING, N_PERIODIC = 6, 8, 2
-"""Disturbances by friction, with stiffness and damping, and those that repeat with the position."""
+"""Disturbances by friction, with stiffness and damping, and what repeats with the position."""
 
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
@@ -76,9 +76,9 @@ class StaticFeatures:
     period : float, m
         Of a disturbance that repeats with the position; 0: none.
     own : tuple of Disturbance
-        Those of the user's own.
+        The user's own.
     damping_of_motion : bool
-        Whether the damping is that of the position's own velocity; else that of ``x_pb``. Behind a compensator ``x_pb``
+        Whether the position's own velocity is damped; else the velocity of ``x_pb``. Behind a compensator ``x_pb``
         turns with every change of the command, and is far from the motion.
     """
 
@@ -168,7 +168,7 @@ class StaticFeatures:
         state : StaticState
         window : ResidualWindow
         x : (n,) array, m
-            Position that the stiffness acts at, and the damping where it is that of the motion.
+            Position that the stiffness acts at, and whose velocity is damped with ``damping_of_motion``.
         velocity_scale : float
             Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
 

@@ -45,7 +45,7 @@ class Evidence:
         return Evidence.init(self.this.n_features)
 
     def believe_earlier(self) -> Evidence:
-        """Go on with all rows as with those of this run."""
+        """Go on with all rows as rows of this run."""
         return replace(self.forget(), this=self.all())
 
     def forget_earlier(self) -> Evidence:
@@ -62,7 +62,7 @@ class Evidence:
         return replace(self.forget(), earlier=everything.discount(most / max(everything.n_rows, most)))
 
     def all(self, kept: float = 1.0) -> RidgeRegression:
-        """Return all rows, those of earlier runs weighed by ``kept``."""
+        """Return all rows, the rows of earlier runs weighed by ``kept``."""
         if self.earlier.n_rows == 0.0:
             return self.this
         earlier = self.earlier.discount(kept)

@@ -189,7 +189,7 @@ def solve(
     Parameters
     ----------
     evidence : RidgeRegression
-        Rows whose first features are those of the expert.
+        Rows whose first features are the expert's.
     errors : ExpertErrors
     scales : (n_static,) array
         Prior standard deviations of the weights of the features without lags, the first ones of a row.

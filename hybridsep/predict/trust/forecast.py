@@ -45,7 +45,7 @@ class TrustedForecast(Forecast):
 
 
 def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
-    """Return the scales of the features, those of the next window included.
+    """Return the scales of the features, with the next window's.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales 
     state : TrustedModel
     window : ResidualWindow
     scales : FeatureScales, optional
-        Those of :func:`scales_of` its commands if left out; a compensator's follow from its preview.
+        By :func:`scales_of` from its commands if left out; a compensator takes its preview's.
     """
     scales = scales_of(state, window) if scales is None else scales
     return forecast_by(state, solved(state, scales), window, scales)

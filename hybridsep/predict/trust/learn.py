@@ -74,7 +74,7 @@ def _folded(
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
-    """Return residuals with those not accepted interpolated between accepted ones; ``last`` is before the first."""
+    """Return residuals, interpolated where they are not accepted; ``last`` is before the first."""
     known = np.flatnonzero(accepted)
     places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
     return np.asarray(np.interp(np.arange(len(measured)), places, values))

@@ -29,7 +29,7 @@ class Reach:
     n_missing : int
         Samples since the last one that was believed.
     n_beyond : int
-        Of these, values out of reach, less those within it that followed.
+        Of these, values out of reach, less the values within reach that followed.
     """
 
     n_missing: int = 0

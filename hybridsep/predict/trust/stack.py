@@ -15,7 +15,7 @@ __all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "N_EXPERTS", "STATIC", "Stac
 
 HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
 """Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
-the one of these with lags that led, with little weight of earlier runs."""
+a counterpart of LAGGED or COMMAND, whichever led, that gives earlier runs little weight."""
 
 N_EXPERTS = 5
 """All of them."""

@@ -38,7 +38,7 @@ class MotionBefore(NamedTuple):
     state : (n_state,) array, m
         Of ``G_pb`` at the beginning of the first window.
     x_d : (n,) array, m
-        Commands of the window; 0 but for those before the run, whose measurement was late.
+        Commands of the window: 0, but before the run, where measurements are late.
     x_pb : (n,) array, m
         Response to both.
     """
@@ -63,7 +63,7 @@ def motion_before(
     """Return the motion that a run began in; None if it is more likely to have begun at rest.
 
     The residuals decide, between rest and a motion at the first commanded velocity; the state is then the one that they
-    are explained by best, near that of this motion.
+    are explained by best, near this motion's.
 
     Parameters
     ----------

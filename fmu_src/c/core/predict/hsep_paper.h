@@ -21,7 +21,7 @@ typedef struct {
 
 typedef struct {
     hsep_word p, q;     /* lags of e_pb and of x_pb */
-    hsep_word n;        /* samples of a prediction, with those that are late */
+    hsep_word n;        /* samples of a prediction, with the late ones */
     hsep_word features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
     /* Offsets in words from the beginning of the struct */
     hsep_word weights; /* (features,) w */
@@ -36,7 +36,7 @@ HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *
 
 HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);
 
-/* Fold the row of a sample into the regression; eqs. (5) and (6). Cost: that of hsep_regression_fold. */
+/* Fold the row of a sample into the regression; eqs. (5) and (6). Costs a hsep_regression_fold. */
 HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample);
 
 /* Begin a window: the weights, eq. (6). Cost: n^2 / 2 multiply-adds. */

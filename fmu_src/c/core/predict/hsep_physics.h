@@ -46,7 +46,7 @@ HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word 
 /* Begin with a state: (2 n_modes + dead_time,), m, of the modes, then the commands within the dead time, oldest first. */
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);
 
-/* Add the state of another one with the same parameters: the responses are those to the sum of the commands. */
+/* Add the state of another one with the same parameters: it responds to the sum of both commands then. */
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
 
 /* Response x_pb, (n,), m, to n commands x_d, (n,), m, relative to the initial position; eq. (2).

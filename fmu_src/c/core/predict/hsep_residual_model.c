@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Parts in which the one that can be trusted predicts a window: its variances are dear. */
+/* Parts in which the trusted model predicts a window, as variances are dear. */
 static const hsep_word residual_parts = 25;
 
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
@@ -54,7 +54,7 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
 }
 
-/* Gram matrix of a factor of the one that can be trusted. */
+/* Gram matrix of a factor of the trusted model. */
 static hsep_gram *residual_gram(hsep_residual_model *self, hsep_word factor)
 {
     return hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(self), factor));

@@ -1,4 +1,4 @@
-/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the one that can be trusted (hsep_trusted.h); as
+/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the trusted one (hsep_trusted.h); as
  * predict/residual_model.py.
  *
  * The block holds one of them, and each function calls its counterpart. For a window: hsep_residual_begin; _predict,
@@ -12,7 +12,7 @@
 #include "hsep_trusted.h"
 
 typedef struct {
-    hsep_word Np, late, n; /* samples of a window, those not measured yet before it, both together */
+    hsep_word Np, late, n; /* samples of a window, late samples before it, both */
     hsep_word planned;     /* whether a compensator decides the commands */
     hsep_word learning;    /* whether the window is learned */
     /* Offsets in words from the beginning of the struct; one of them is 0 */
@@ -32,7 +32,7 @@ HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
 HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
- * one of them. The first one is that of the physics model's residual. */
+ * one of them. The first one has the rows of the physics model's residual. */
 HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self);
 HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor);
 

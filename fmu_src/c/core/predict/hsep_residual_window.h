@@ -14,8 +14,7 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     hsep_word n_modes;
-    hsep_word
-        n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
+    hsep_word n; /* samples of a prediction: of a window, or a compensator's preview, and before it the late ones */
     int planned; /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 
@@ -30,7 +29,7 @@ typedef struct {
 typedef struct {
     hsep_word i;            /* sample of the window, 0 ... Np - 1 */
     hsep_real relative;     /* m, measured position relative to the start */
-    const hsep_real *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
+    const hsep_real *x, *e; /* the window's x_pb and e from this sample on, and before it */
     int settled;            /* whether the window's commands and x_pb will not change any more */
 } hsep_residual_sample;
 

@@ -73,7 +73,7 @@ static void uncertainty_at(
 {
     const hsep_real *x_pb = signals->x_pb;
     const hsep_word n = self->n;
-    /* The difference of the first sample is that of the second. */
+    /* The first sample has the difference of the second. */
     const hsep_word newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
     const int stacked = signals->variance != NULL && n - 1 - j >= signals->n_physics;
     f[0] = 1.0;

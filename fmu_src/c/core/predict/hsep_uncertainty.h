@@ -16,14 +16,13 @@
 
 typedef struct {
     hsep_word Np;
-    hsep_real theta[HSEP_UNCERTAINTY_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
+    hsep_real theta[HSEP_UNCERTAINTY_N_COMPONENTS];    /* variance of the noise, m2; others relative to their causes */
     hsep_real evidence[HSEP_UNCERTAINTY_N_COMPONENTS]; /* windows that each stands on, faded */
     hsep_real factor;                                  /* c in the middle of a window */
     hsep_real ratio;                                   /* c at its end relative to that at its beginning */
     hsep_real recent; /* m2, recent mean square of the residual; 0 before the first window */
     hsep_word n;      /* samples that are predicted */
-    hsep_real
-        felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, averages of what is felt for a while, up to the last one of them */
+    hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, averages of what acts later, too, up to the last sample */
     /* Offsets in words from the beginning of the struct */
     hsep_word e_h;        /* (n,) m, residual of the window as published */
     hsep_word components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */

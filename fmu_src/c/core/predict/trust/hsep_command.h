@@ -14,7 +14,7 @@
 typedef struct {
     hsep_word n;         /* samples of a prediction */
     hsep_word dead_time; /* samples */
-    hsep_word p;         /* lags, and increments after the first, whatever those of the settings are */
+    hsep_word p;         /* lags, and increments after the first, whatever p of the settings is */
     hsep_word count;     /* features without lags, p + 2 */
     hsep_word n_before;  /* commands before a window that its features need */
     /* Offsets in words from the beginning of the struct */

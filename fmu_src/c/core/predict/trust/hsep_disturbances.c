@@ -22,7 +22,7 @@ HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_w
     return feature + self->count < self->n ? 1.0 : HSEP_TRUST_DIFFERENCE_SHARE;
 }
 
-/* Filter i before the window; behind those of all disturbances are the ones after the samples that were tried. */
+/* Filter i before the window; behind all of these are the filters after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_word i)
 {
     return (hsep_physics *)hsep_at(self, self->filters + i * self->filter_words);
@@ -58,7 +58,7 @@ HSEP_API void hsep_disturbances_init(
     memset(self, 0, (size_t)hsep_disturbances_size(parameters));
     (void)disturbances_lay_out(self, parameters);
     self->origin = start;
-    for (hsep_word i = 0; i < 2 * self->count; i++) { /* those that were tried behind them */
+    for (hsep_word i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
         hsep_physics_init(
             disturbances_filter(self, i), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
             (hsep_hold)settings->input_hold);

@@ -31,7 +31,7 @@ typedef struct {
     hsep_word n;             /* features */
     hsep_real period;        /* m, of a disturbance that repeats with the position; 0: none */
     hsep_real origin;        /* m, the start: what repeats does not know of it */
-    hsep_word of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb, which
+    hsep_word of_motion;     /* whether the position's own velocity is damped; else the velocity of x_pb, which
                               * behind a compensator turns with every change of the command, far from the motion */
     hsep_real T_s;           /* s */
     hsep_disturbed before;   /* the window that comes next */
@@ -64,7 +64,7 @@ HSEP_API void hsep_disturbances_begin_in_motion(
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_word n);
 
-/* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for those that
+/* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for what
  * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6
  * tanh and 9 (6 n_modes) multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(

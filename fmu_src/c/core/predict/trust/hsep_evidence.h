@@ -25,7 +25,7 @@ static inline hsep_gram *hsep_evidence_earlier(hsep_evidence *self)
 /* Number of all rows, weighted. */
 HSEP_API hsep_real hsep_evidence_n_rows(hsep_evidence *self);
 
-/* Forget all rows; go on with all of them as with those of this run; with those of this run alone. */
+/* Forget all rows; go on with all of them as rows of this run; with the rows of this run alone. */
 HSEP_API void hsep_evidence_forget(hsep_evidence *self);
 HSEP_API void hsep_evidence_believe_earlier(hsep_evidence *self);
 HSEP_API void hsep_evidence_forget_earlier(hsep_evidence *self);

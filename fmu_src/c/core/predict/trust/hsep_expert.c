@@ -140,7 +140,7 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
     }
 }
 
-/* Variance of sample k of a prediction: that of the rows, carried through the impulse response. */
+/* Variance of sample k of a prediction: the rows' variances, carried through the impulse response. */
 static hsep_real expert_variance(const hsep_expert *self, hsep_word k)
 {
     const hsep_word j = self->n - 1 - k;

@@ -46,7 +46,7 @@ typedef struct {
     hsep_word response;     /* (n + p,) the recursion's impulse response, behind it 0 */
     hsep_word squares;      /* (n,) its squares, oldest first */
     hsep_word variances;    /* (n,) m2, of the rows */
-    hsep_word factor;       /* triangle of n_static + p + 1 rows: that of the solution */
+    hsep_word factor;       /* triangle of the solution, n_static + p + 1 rows */
     hsep_word side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
 } hsep_expert;
 
@@ -63,9 +63,9 @@ HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
 
-/* Solve for the weights from all rows, those of earlier runs weighed by weight. scales: (n_static,) prior standard
+/* Solve for the weights from all rows, rows of earlier runs weighed by weight. scales: (n_static,) prior standard
  * deviations of the weights without lags; first, least: m2, variance of the noise while it is not known, and the least
- * one. Cost: that of hsep_gram_solve. */
+ * one. Costs a hsep_gram_solve. */
 HSEP_API void hsep_expert_solve(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
     const hsep_real scales[], hsep_real first, hsep_real least);
@@ -74,14 +74,14 @@ HSEP_API void hsep_expert_solve(
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
 
 /* Predict samples first ... last - 1 in free run; first is 0, or where the last call ended. rows: (n, n_static), sample
- * after sample. Variances are computed of the samples before varied, while those behind them are taken as unknown; if
- * varied is first, what the variance leaves stays that of the last prediction. Cost of a sample: n_static + p
- * multiply-adds, and that of hsep_expert_vary. */
+ * after sample. Variances are computed of the samples before varied, while variances behind them are taken as unknown;
+ * if varied is first, shrinking stays as in the last prediction. A sample costs n_static + p multiply-adds, and what
+ * hsep_expert_vary does. */
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied);
 
-/* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs, and shrink
- * them by it. Cost for each: that of hsep_gram_leverages, four at a time, and last multiply-adds. */
+/* Compute the variance of samples first ... last - 1 of that prediction, if samples before them have theirs, and
+ * shrink them by it. Each costs a quarter of hsep_gram_leverages and last multiply-adds. */
 HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
 /* Estimate noise and correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1

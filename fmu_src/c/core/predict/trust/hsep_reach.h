@@ -8,7 +8,7 @@
 
 typedef struct {
     hsep_word n_missing; /* samples since the last one that was believed, */
-    hsep_word n_beyond;  /* of these, values out of reach, less those within it that followed */
+    hsep_word n_beyond;  /* of these, values out of reach, less values within reach that followed */
     hsep_real largest;   /* m, largest residual believed */
     hsep_real fastest;   /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_word known;     /* whether there was a motion, and a residual, before the window */

@@ -38,7 +38,7 @@ HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[]);
 HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[]);
 
 /* After that: add the motion to commands and physics-based prediction of the window, (n,), m, to the prediction of the
- * Np samples behind it, oldest first, and to the state of the physics model behind those. */
+ * Np samples behind it, oldest first, and to the state of the physics model behind all of these. */
 HSEP_API void hsep_start_apply(
     const hsep_start *self, hsep_real x_d[], hsep_real x_pb[], hsep_real ahead[], hsep_physics *physics);
 

@@ -19,7 +19,8 @@
 
 #define HSEP_N_RESIDUALS (HSEP_OF_COMMAND + 1) /* of residuals: of the physics model, and of the command */
 
-/* Samples of a window that are learned at one: those catch up that were measured before it was predicted. */
+/* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
+ * was predicted. */
 #define HSEP_TRUSTED_PACE 2
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
@@ -49,7 +50,7 @@ typedef struct {
     hsep_real forecast_scale;            /* m/s, velocity scale with it, */
     hsep_real forecast_step;             /* m, and largest change of the command */
     hsep_real bound;                     /* m, on what is predicted, */
-    hsep_real growth;                    /* and by how much that of the command may be larger: as its largest step is */
+    hsep_real growth;                    /* how much larger the command's bound may be, as its largest step is */
     hsep_word predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     /* Of the window that is measured */
     hsep_word followed;   /* samples that were judged and, as far as they are believed, learned */
@@ -114,7 +115,7 @@ HSEP_API int hsep_trusted_sound(const hsep_trusted *self);
  * machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
-/* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
+/* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
  * them, m, of a compensator, for which all n are predicted, with the variances of the first last ones; or NULL. Cost:
  * m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last n / 2, and 6 n tanh. */
@@ -127,8 +128,7 @@ HSEP_API void hsep_trusted_go_on(
     hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word varied);
 
 /* Predict other commands with the same scales and weights. e: (n + p,), m; varied: samples whose variance is computed,
- * the first ones, while the prediction of those behind them means nothing yet; 0: shrinking stays that of the last
- * prediction. */
+ * the first ones, while predictions behind them mean nothing yet; 0: shrinking stays as in the last prediction. */
 HSEP_API void hsep_trusted_predict(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied);
 
@@ -143,8 +143,8 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x
 
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
- * residuals; where the measurement is not believed, between those beside it; behind it those before it. Cost for a
- * sample: that of hsep_gram_fold, of physics and of command. */
+ * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A sample costs
+ * a hsep_gram_fold for each residual. */
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last);
 

@@ -200,7 +200,7 @@ HSEP_API void hsep_trusted_forecast(
         hsep_at(self, self->stacked)[i] = i / self->n == HSEP_HOLD ? hold : 0.0;
     }
     trusted_begin(self, x_d, e + self->n);
-    hsep_trusted_go_on(self, x_pb, e, 0, path != NULL ? self->n : last, last); /* the rows are those of the scales */
+    hsep_trusted_go_on(self, x_pb, e, 0, path != NULL ? self->n : last, last); /* the scales left the rows at x_pb */
 }
 
 HSEP_API void hsep_trusted_predict(

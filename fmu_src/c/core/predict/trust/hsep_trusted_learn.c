@@ -54,8 +54,8 @@ static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], cons
     self->n_accepted = 0.0;
 }
 
-/* Features of the window up to sample last - 1 as they were measured, and the residual of the command: those before
- * known are there. */
+/* Features of the window up to sample last - 1 as they were measured, and the residual of the command, from known
+ * on. */
 static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const hsep_real e[], hsep_word last)
 {
     const hsep_word first = self->known, Np = self->Np;
@@ -72,8 +72,8 @@ static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const 
     self->known = last;
 }
 
-/* Learn the row [features without lags | lags | residual] of sample k. Those with many lags that stand for samples
- * without a measurement are not. rows: (Np, n_static); e: (Np + lags,), m. */
+/* Learn the row [features without lags | lags | residual] of sample k. A row with many lags that stand for samples
+ * without a measurement is not learned. rows: (Np, n_static); e: (Np + lags,), m. */
 static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const hsep_real rows[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
@@ -92,8 +92,8 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     hsep_gram_fold(gram);
 }
 
-/* Judge the next sample, and take in those since the last one that is believed, if it is: their residuals are linear in
- * time between both. fold: whether it is learned. */
+/* Judge the next sample, and if it is believed, take in the samples since the last believed one: their residuals are linear
+ * in time between both. fold: whether it is learned. */
 static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
     const hsep_word k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
@@ -141,7 +141,7 @@ HSEP_API void hsep_trusted_follow(
     }
 }
 
-/* Update the weights of the stack with the samples that were published, of those accepted. */
+/* Update the weights of the stack with the accepted samples that were published. */
 static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted);
