@@ -31,8 +31,8 @@ class TrustConstants:
         of 20 errors are 2 % less on drives of modes, 8 % more on drives of two masses, and a third less where the
         physics model is bad; more than 36 cost more than four million instructions in the dearest sample.
     last_lag : float
-        Prior variance of the weight of the last lag, and of the command's last increment, relative to the
-        first one's: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
+        Prior variance of the weight of the last lag, and of the command's last increment, relative to the first
+        one's: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
     least_noise : float
         Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
         would prevent any learning.

@@ -43,7 +43,7 @@ HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold);
 HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time);
 
-/* Begin with a state: (2 n_modes + dead_time,), m, of the modes, then the commands within the dead time, oldest first. */
+/* Begin with a state, (2 n_modes + dead_time,), m: the modes', then the commands within the dead time, oldest first. */
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);
 
 /* Add the state of another one with the same parameters: it responds to the sum of both commands then. */

@@ -1,5 +1,5 @@
-/* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows; as
- * predict/uncertainty.py, which says how and why.
+/* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows;
+ * as predict/uncertainty.py, which says how and why.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
  * learned. A block as hsep_layout.h has them. Cost of a window: 50 n operations each.

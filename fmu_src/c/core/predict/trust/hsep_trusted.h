@@ -143,8 +143,8 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x
 
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
- * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A sample costs
- * a hsep_gram_fold for each residual. */
+ * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A
+ * sample costs a hsep_gram_fold for each residual. */
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last);
 

@@ -92,8 +92,8 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     hsep_gram_fold(gram);
 }
 
-/* Judge the next sample, and if it is believed, take in the samples since the last believed one: their residuals are linear
- * in time between both. fold: whether it is learned. */
+/* Judge the next sample, and if it is believed, take in the samples since the last believed one: their residuals are
+ * linear in time between both. fold: whether it is learned. */
 static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
     const hsep_word k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
