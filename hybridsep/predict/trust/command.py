@@ -1,6 +1,6 @@
 """Features of the expert without a physics model: eq. (4) with ``G_pb = 1``.
 
-It predicts the residual of the command itself, ``e_0(k) = x(k) − x_d(k − d)`` with the dead time ``d``; its features are
+It predicts the residual of the command, ``e_0(k) = x(k) − x_d(k − d)`` with the dead time ``d``; its features are
 a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j = 0 … p``, beside ``p`` lags of it.
 """
 
