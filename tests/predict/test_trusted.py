@@ -240,7 +240,7 @@ def test_a_rest_trains_nothing_of_a_motion() -> None:
 
 
 def test_an_operator_is_refused() -> None:
-    with pytest.raises(ParameterError, match="it needs trust = false"):
+    with pytest.raises(ParameterError, match="needs the paper's model, trust = false"):
         trusted().operator()
 
 
