@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -81,10 +82,10 @@ class Target:
         needed = [self.compiler[0], *self.emulator[:1], self.size_tool]
         lacking = [name for name in needed if not shutil.which(name)]
         if not lacking and self.script:
-            found = subprocess.run(
-                [*self.compiler, "-print-file-name=libm.a"], capture_output=True, text=True, check=True
-            )
-            lacking = [] if Path(found.stdout.strip()).is_absolute() else ["a C library for it"]
+            # Where picolibc is, its specifications alone know.
+            command = [*self.compiler, "-x", "c", "-", "-lm", "-o", os.devnull]
+            tried = subprocess.run(command, input="int main(void) { return 0; }", capture_output=True, text=True)
+            lacking = ["a C library for it"] if "cannot find" in tried.stderr else []
         return ", ".join(lacking)
 
 
