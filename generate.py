@@ -42,7 +42,18 @@ DECLARED = {
 }
 """Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
 
-PLACES = ("HOLD", "LAGGED", "STATIC", "COMMAND", "DOUBTING", "N_EXPERTS", "OF_PHYSICS", "OF_COMMAND")
+PLACES = (
+    "HOLD",
+    "LAGGED",
+    "STATIC",
+    "COMMAND",
+    "DOUBTING",
+    "N_EXPERTS",
+    "N_JUDGED",
+    "OF_PHYSICS",
+    "OF_COMMAND",
+    "N_RESIDUALS",
+)
 """Constants without a prefix in C."""
 
 OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE")

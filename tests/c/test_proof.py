@@ -29,7 +29,13 @@ def alarms(part: str, *, wrong: bool = False) -> int:
     """Return how many alarms Eva raises about a part of the proof, with calls of memcpy and its like not proved."""
     rings = Library("predictor", {"Np": 3, "p": 2, "q": 1, "trust": 0}, [SPRING_MASS_DAMPER])
     # without the processor's vectors: the same operations
-    options = [*include_flags(), "-D__AVX__", "-DTRUST=0", f"-DBLOCK={rings.size()}", *(["-DWRONG"] if wrong else [])]
+    options = [
+        *include_flags(),
+        "-DHSEP_NO_VECTORS",
+        "-DTRUST=0",
+        f"-DBLOCK={rings.size()}",
+        *(["-DWRONG"] if wrong else []),
+    ]
     sources = [
         path
         for path in sorted((C_SOURCES / "core").rglob("*.c"))

@@ -27,7 +27,7 @@ from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticSta
 from .evidence import Evidence
 from .expert import ExpertErrors, ResidualScale
 from .reach import Reach
-from .stack import COMMAND, DOUBTING, LAGGED, N_EXPERTS, Stack
+from .stack import COMMAND, DOUBTING, LAGGED, N_JUDGED, Stack
 
 __all__ = [
     "OF_COMMAND",
@@ -42,8 +42,8 @@ __all__ = [
     "take_over",
 ]
 
-OF_PHYSICS, OF_COMMAND = range(2)
-"""Residuals that experts predict, and the rows that they learn: of the physics model, and of the command."""
+OF_PHYSICS, OF_COMMAND, N_RESIDUALS = range(3)
+"""Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
 
 _ROUNDING = 1e-6
 """What rounding may have added to the sum of the stack's weights."""
@@ -129,7 +129,7 @@ class Learned:
     @classmethod
     def init(cls, fixed: Parameters) -> Learned:
         """Return that nothing has been learned."""
-        scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * (N_EXPERTS - LAGGED)
+        scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * N_JUDGED
         return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(fixed.static.n))
 
     def errors_of(self, expert: int) -> ExpertErrors:

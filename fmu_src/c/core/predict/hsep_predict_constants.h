@@ -35,6 +35,7 @@
 #define HSEP_COMMAND 3
 #define HSEP_DOUBTING 4
 #define HSEP_N_EXPERTS 5
+#define HSEP_N_JUDGED 4
 #define HSEP_STACK_LEAST_SQUARE HSEP_TINY(1e-300)
 
 /* hybridsep/predict/trust/expert.py */
@@ -52,6 +53,7 @@
 /* hybridsep/predict/trust/state.py, hybridsep/predict/trust/forecast.py, hybridsep/predict/trust/learn.py */
 #define HSEP_OF_PHYSICS 0
 #define HSEP_OF_COMMAND 1
+#define HSEP_N_RESIDUALS 2
 #define HSEP_TRUSTED_ROUNDING 1e-06
 #define HSEP_TRUSTED_LEAST HSEP_TINY(1e-150)
 #define HSEP_TRUSTED_BRIDGED 3

@@ -17,8 +17,6 @@
 #include "hsep_reach.h"
 #include "hsep_stack.h"
 
-#define HSEP_N_RESIDUALS (HSEP_OF_COMMAND + 1) /* of residuals: of the physics model, and of the command */
-
 /* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
@@ -30,7 +28,7 @@ typedef struct {
     hsep_real largest_step;   /* m, largest change from sample to sample, of the command */
     hsep_real fastest;        /* m, and of the physics model */
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
-    hsep_expert_errors errors[HSEP_N_EXPERTS - HSEP_LAGGED]; /* of the experts from HSEP_LAGGED on */
+    hsep_expert_errors errors[HSEP_N_JUDGED]; /* of the experts from HSEP_LAGGED on */
     hsep_stack stack;
 } hsep_learned;
 
@@ -73,7 +71,7 @@ typedef struct {
     hsep_learned learned;
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * (HSEP_N_EXPERTS - HSEP_LAGGED) + HSEP_STACK_WORDS);
+HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
     31 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
