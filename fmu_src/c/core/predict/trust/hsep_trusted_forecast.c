@@ -6,6 +6,10 @@
 
 #include <stddef.h>
 
+/* Features without lags of an expert, at most. */
+#define TRUSTED_OF_COMMAND (HSEP_TRUST_LAGS_OF_COMMAND + 2)
+#define TRUSTED_MOST (TRUSTED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? TRUSTED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
+
 /* Take the scales of velocity and command; return whether the commanded velocity outgrows what was learned. A
  * compensator begins to move before the path, with a creep: its first scale is the path's. */
 static int trusted_outgrown(hsep_trusted *self, const hsep_real x_d[], const hsep_real path[], hsep_word n_path)
@@ -56,7 +60,7 @@ static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
     const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
     hsep_expert *expert = hsep_trusted_expert(self, place);
-    hsep_real scales[HSEP_TRUST_LAGS_OF_COMMAND + 2];
+    hsep_real scales[TRUSTED_MOST];
     for (hsep_word i = 0; i < expert->n_static; i++) {
         const int of_command = kind == HSEP_OF_COMMAND;
         const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];
