@@ -22,7 +22,7 @@ AGREES = 5e-3
 
 def played(case: Case, *, single: bool) -> Replay:
     """Return a replay with the compiler of this machine, not counted."""
-    folder = build_folder() / f"{case.kind}_{case.Np}_{case.warm}_{single}"
+    folder = build_folder() / f"{case.kind}_{case.Np}_{case.windows}_{case.warm}_{single}"
     folder.mkdir()
     (folder / "case.h").write_text(header(case), encoding="utf-8")
     sources = [HERE / "replay.c", HERE / "board_host.c", *core_sources()]
@@ -75,7 +75,7 @@ def test_a_plan_is_that_of_double_precision() -> None:
 def test_a_processor_without_doubles_predicts_as_well(
     kind: str, size: tuple[int, int], warm: bool, tmp_path: Path
 ) -> None:
-    case = Case(kind, *size, 40, warm)
+    case = Case(kind, *size, 60, warm)
     machine = target_or_skip("m4f-float32")
     there = replay(machine, build(machine, case, tmp_path / "there"), count=False)
     assert there.began == 0
