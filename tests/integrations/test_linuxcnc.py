@@ -17,6 +17,7 @@ from pathlib import Path
 import contour
 import numpy as np
 import pytest
+import sampled_columns
 from command_line import Run
 from places import ROOT
 
@@ -25,7 +26,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.predict.predictor import HybridPredictor
 
 SIMULATION = ROOT / "integrations" / "linuxcnc" / "simulation"
-AXES = tuple(str(SIMULATION / f"{axis}.toml") for axis in contour.AXES)
+AXES = tuple(str(SIMULATION / f"{axis}.toml") for axis in sampled_columns.AXES)
 USER = "nobody"
 
 
@@ -149,8 +150,8 @@ def test_what_an_operator_does_in_motion_keeps_the_joints_limits(installed: Path
 def test_a_sampled_log_is_read_as_it_is(hybridsep: Run, tmp_path: Path) -> None:
     n = 4000
     command = 10.0 * np.sin(2e-3 * np.arange(n))
-    table = np.column_stack([np.arange(n), *[command] * (len(contour.COLUMNS) - 1)])
-    np.savetxt(tmp_path / "samples.txt", table, header=" ".join(contour.COLUMNS), comments="", fmt="%.6f")
+    table = np.column_stack([np.arange(n), *[command] * (len(sampled_columns.COLUMNS) - 1)])
+    np.savetxt(tmp_path / "samples.txt", table, header=" ".join(sampled_columns.COLUMNS), comments="", fmt="%.6f")
     reading = ("--x_d", "x_out", "--x", "x_fb", "--unit", "mm", "--T_s", "0.001")
     status, _, err = hybridsep("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading, "--as-is")
     assert status == 0, err

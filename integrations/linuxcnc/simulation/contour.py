@@ -19,26 +19,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from sampled_columns import AXES, COLUMNS
 
 from hybridsep.base.metrics import largest, rms
 from hybridsep.base.signals import Array
 
 HERE = Path(__file__).resolve().parent
-AXES = ("x", "y")
-CASES: dict[str, dict[str, int]] = {
-    "without": {},
+CASES: dict[str, dict[str, int] | None] = {
+    "without": None,
     "off": {"ENABLE": 0},
     "physics": {"MODEL": 1},
     "hybrid cold": {},
     "hybrid warm": {},
 }
-"""Cases by name, with the entries of machine.ini's [HSEP] that they change; the first one is without the component."""
+"""Cases by name, with the entries of machine.ini's [HSEP] that they change; None: without the component."""
 
-COLUMNS = (
-    "n",
-    *(f"{axis}_{name}" for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in AXES),
-    "overruns",
-)
 REACH = 80
 """Samples to either side among which the nearest part of the path is looked for."""
 
@@ -135,7 +130,7 @@ def run_cases(program: str, out: Path, user: str | None) -> dict[str, Samples]:
         log = out / f"{program}_{case.replace(' ', '_')}.txt"
         if case == "hybrid warm":
             train(out / f"{program}_hybrid_cold.txt", out)
-        run(f"{program}.ngc", log, out, entries, user, component=case != "without")
+        run(f"{program}.ngc", log, out, entries, user)
         found[case] = Samples.read(log)
         if case == "hybrid warm":
             for axis in AXES:
@@ -152,20 +147,19 @@ def train(log: Path, out: Path) -> None:
         hybridsep("hal", machine, "--out", str(out / "hal"), "--weights", state)
 
 
-def run(
-    program: str, log: Path, out: Path, entries: Mapping[str, int], user: str | None, *, component: bool = True
-) -> str:
-    """Run LinuxCNC once, with entries of [HSEP] changed or without the component; return what it printed."""
+def run(program: str, log: Path, out: Path, entries: Mapping[str, int] | None, user: str | None) -> str:
+    """Run LinuxCNC once, with entries of [HSEP] changed, or without the component; return what it printed."""
     folder = out.resolve() / "run"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(HERE, folder)
     for axis in AXES:
         shutil.copytree(out / "hal" / axis, folder / axis)
     text = (folder / "machine.ini").read_text(encoding="utf-8")
-    for name, number in entries.items():
-        text = re.sub(rf"^{name} = .*$", f"{name} = {number}", text, flags=re.MULTILINE)
-    if not component:
+    if entries is None:
         text = text.replace("HALFILE = component.hal", "HALFILE = without.hal")
+    else:
+        for name, number in entries.items():
+            text = re.sub(rf"^{name} = .*$", f"{name} = {number}", text, flags=re.MULTILINE)
     (folder / "machine.ini").write_text(text, encoding="utf-8")
     environment = {**os.environ, "HSEP_PROGRAM": program, "HSEP_SAMPLES": str(folder / "samples.txt")}
     command = ["linuxcnc", "-r", "machine.ini"]

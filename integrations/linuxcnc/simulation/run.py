@@ -16,12 +16,7 @@ import time
 from pathlib import Path
 
 import linuxcnc
-
-COLUMNS = ["n"] + [
-    axis + "_" + name for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in ("x", "y")
-]
-COLUMNS.append("overruns")
-"""Names of what the HAL files sample: a number, mm, the component's state, and periods that began late so far."""
+from sampled_columns import COLUMNS
 
 WAIT = 60.0
 """Time after which what is waited for will not come, s."""
