@@ -56,7 +56,7 @@ PLACES = (
 )
 """Constants without a prefix in C."""
 
-OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE")
+OF_LIBRARY = ("_OWN_MAX", "_LEAST_SHARE", "_MOST_SHARE")
 """Constants of these modules that C has not."""
 
 

@@ -84,7 +84,13 @@ class Target:
         if not lacking and self.script:
             # Where picolibc is, its specifications alone know.
             command = [*self.compiler, "-x", "c", "-", "-lm", "-o", os.devnull]
-            tried = subprocess.run(command, input="int main(void) { return 0; }", capture_output=True, text=True)
+            tried = subprocess.run(
+                command,
+                input="int main(void) { return 0; }",
+                capture_output=True,
+                text=True,
+                env=os.environ | {"LC_ALL": "C"},
+            )
             lacking = ["a C library for it"] if "cannot find" in tried.stderr else []
         return ", ".join(lacking)
 

@@ -1,6 +1,6 @@
 """Model of the residual ``e_pb = x − x_pb``: the paper's, or with trust the trusted one.
 
-Each function calls its counterpart of the two. A state is a record; each function returns another one.
+Each function calls its counterpart for the model that a state is of. A state is a record; a function returns another.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ def learn(
 ) -> tuple[ResidualModel, NDArray[np.bool_]]:
     """Return the model that has learned from a window measured at ``x``, and which samples it accepted, ``(m,)`` bool.
 
-    Positions, m, are relative to the start, NaN where missing; if not ``fold``, the next window but starts from them.
+    Positions, m, are relative to the start, NaN where missing. Without ``fold`` they are not learned; the next window
+    starts from them in any case.
     """
     if isinstance(state, TrustedModel):
         assert isinstance(forecast, trust_forecast.TrustedForecast)

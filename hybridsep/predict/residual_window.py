@@ -34,9 +34,9 @@ class FeatureScales(NamedTuple):
     velocity : float, m/s
         Velocity scale of the friction features.
     largest : (n_static,) array
-        Largest magnitudes of the static features, ahead, too.
+        Largest magnitudes of the static features, so far and ahead.
     step : float, m
-        Largest change of the command from sample to sample, ahead, too.
+        Largest change of the command from sample to sample, so far and ahead.
     """
 
     velocity: float

@@ -31,7 +31,7 @@ from ..base.signals import PREDICTION_MAX, Array
 __all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
 
 _SHARES = (4.0, 2.0)
-"""First variance of the error relative to its causes' own: timing, variance of the experts."""
+"""First variance of the error by each cause, relative to that cause: timing, variance of the experts."""
 
 N_COMPONENTS = 1 + len(_SHARES)
 """Of the variance."""

@@ -28,7 +28,7 @@ Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
-N_FRICTION, N_LASTING, N_PERIODIC = 6, 8, 2
+N_FRICTION, N_LASTING, _N_PERIODIC = 6, 8, 2
 """Disturbances by friction, with stiffness and damping, and what repeats with the position."""
 
 LEAST_VELOCITY = 1e-200
@@ -96,7 +96,7 @@ class StaticFeatures:
     @property
     def n_disturbances(self) -> int:
         """Number of disturbances."""
-        return N_LASTING + (N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
+        return N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
 
     @property
     def n(self) -> int:

@@ -17,8 +17,11 @@ HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
 """Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
 a counterpart of LAGGED or COMMAND, whichever led, that gives earlier runs little weight."""
 
-N_EXPERTS, N_JUDGED = 5, 4
-"""All of them, and those from LAGGED on, whose errors are judged."""
+N_EXPERTS = 5
+"""All of them."""
+
+N_JUDGED = N_EXPERTS - LAGGED
+"""Experts from LAGGED on, whose errors are judged."""
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""

@@ -38,7 +38,7 @@ class MotionBefore(NamedTuple):
     state : (n_state,) array, m
         Of ``G_pb`` at the beginning of the first window.
     x_d : (n,) array, m
-        Commands of the window: 0, but before the run, where measurements are late.
+        Commands of the window: 0, except the late ones at its beginning, which came before the run.
     x_pb : (n,) array, m
         Response to both.
     """

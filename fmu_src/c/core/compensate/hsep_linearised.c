@@ -119,7 +119,7 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
     }
 }
 
-/* Answer of the features of x_pb, x_pb itself and its differences, to a change behind G_pb. */
+/* Response of the features of x_pb, x_pb itself and its differences, to a change behind G_pb. */
 static void linearised_pass(
     const hsep_real weights[], hsep_word count, const hsep_real passed[], hsep_word n, hsep_real to[])
 {
@@ -173,7 +173,7 @@ static void linearised_shrink(
     }
 }
 
-/* Answer of an expert of the command to the increments of a change, from rest, (preview,). */
+/* Response of an expert of the command to the increments of a change, from rest, (preview,). */
 static void linearised_of_increments(
     hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_word dead_time,
     hsep_real to[])
@@ -194,7 +194,7 @@ static void linearised_of_increments(
 }
 
 /* Part of a change that is neither friction nor stiffness: the change behind G_pb and after the dead time, and the
- * answer of the experts of the command to it. */
+ * response of the experts of the command to it. */
 static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
 {
     const hsep_word dead_time = hsep_trusted_command(model)->dead_time;
@@ -224,16 +224,19 @@ static void linearised_slopes(
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(model);
     const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
+    hsep_real spread[HSEP_DISTURBANCES_N_FRICTION];
+    for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
+        spread[i] = hsep_disturbances_sign_velocity(scale, i);
+    }
     for (hsep_word j = self->n; j-- > 0; slopes += self->count) {
         const hsep_real v_d = (x_d[j] - last) / disturbances->T_s;
         last = x_d[j];
         for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
-            const hsep_real spread = hsep_disturbances_sign_velocity(scale, i);
             if (half > 0.0) {
-                slopes[i] = (hsep_tanh((v_d + half) / spread) - hsep_tanh((v_d - half) / spread)) / (2.0 * half);
+                slopes[i] = (hsep_tanh((v_d + half) / spread[i]) - hsep_tanh((v_d - half) / spread[i])) / (2.0 * half);
             } else {
-                const hsep_real sign = hsep_tanh(v_d / spread);
-                slopes[i] = (1.0 - sign * sign) / spread;
+                const hsep_real sign = hsep_tanh(v_d / spread[i]);
+                slopes[i] = (1.0 - sign * sign) / spread[i];
             }
         }
         const hsep_real v = hsep_disturbances_damped_velocity(disturbances, x_pb, x, self->n, j);

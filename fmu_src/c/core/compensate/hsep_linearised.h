@@ -35,8 +35,8 @@ typedef struct {
     hsep_word velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
     hsep_word position;    /* (2 + preview,) and it behind G_pb */
     hsep_word base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    hsep_word of_command;  /* (2, preview) and the answer of the experts of the command to it */
-    hsep_word passed;      /* (preview + 3,) of experts: the answer of the features of x_pb to it */
+    hsep_word of_command;  /* (2, preview) and the response of the experts of the command to it */
+    hsep_word passed;      /* (preview + 3,) of experts: the response of the features of x_pb to it */
     hsep_word run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
     hsep_word lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
     hsep_word disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */

@@ -22,7 +22,7 @@ typedef struct {
     hsep_real ratio;                                   /* c at its end relative to that at its beginning */
     hsep_real recent; /* m2, recent mean square of the residual; 0 before the first window */
     hsep_word n;      /* samples that are predicted */
-    hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, averages of what acts later, too, up to the last sample */
+    hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, components averaged over time, up to the last sample */
     /* Offsets in words from the beginning of the struct */
     hsep_word e_h;        /* (n,) m, residual of the window as published */
     hsep_word components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */

@@ -115,8 +115,8 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 /* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
- * them, m, of a compensator, for which all n are predicted, with the variances of the first last ones; or NULL. Cost:
- * m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last n / 2, and 6 n tanh. */
+ * them, m, of a compensator, for which all n are predicted, with variances of samples 0 ... last - 1 alone; or NULL.
+ * Cost: m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last n / 2, and 6 n tanh. */
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
     hsep_real e[], hsep_word last);
