@@ -22,10 +22,12 @@ MAIN = Path(__file__).parent / "main.c"
 
 @dataclass(frozen=True)
 class Calls:
-    """Calls of the allocator up to the end of the initialization, and after it."""
+    """Calls of the allocator up to the end of the initialization, and after it; RMS errors of steps, early and late, m."""
 
     before: int
     after: int
+    early: float = 0.0
+    late: float = 0.0
 
 
 class Host:
@@ -60,9 +62,9 @@ class Host:
         calls = self._call("fold", data, m, width - 1, repr(lam), repetitions, weights)
         return np.fromfile(weights), calls
 
-    def step(self, samples: int) -> Calls:
-        """Step the FMU so many samples; return the allocator's calls."""
-        return self._call("step", samples)
+    def step(self, samples: int, trust: bool) -> Calls:
+        """Step the FMU so many samples; return the allocator's calls, and its errors."""
+        return self._call("step", samples, int(trust))
 
     def _call(self, *arguments: object) -> Calls:
         done = subprocess.run([self.program, *map(str, arguments)], check=True, capture_output=True, text=True)
