@@ -14,7 +14,7 @@ from ...base.signals import Array
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from .constants import CONSTANTS
 
-__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "solve"]
+__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "noise_of", "solve"]
 
 _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
@@ -181,25 +181,35 @@ class SolvedExpert(NamedTuple):
         )
 
 
-def solve(
-    evidence: RidgeRegression, errors: ExpertErrors, scales: Array, p: int, first: float, least: float
-) -> SolvedExpert:
+def noise_of(target_square: float, errors: ExpertErrors, first: float, least: float) -> float:
+    """Return the variance of the noise that penalties come from, m².
+
+    Parameters
+    ----------
+    target_square : float, m²
+        Sum of the squares of the targets so far.
+    errors : ExpertErrors
+    first, least : float, m²
+        Variance of the noise while it is not known, and the least one.
+    """
+    return max(errors.noise_variance or first, least, _RESOLUTION * target_square) * errors.correlation
+
+
+def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> SolvedExpert:
     """Return an expert with the weights that follow from all rows so far.
 
     Parameters
     ----------
     evidence : RidgeRegression
         Rows whose first features are the expert's.
-    errors : ExpertErrors
+    variance : float, m²
+        Of the noise, by :func:`noise_of`.
     scales : (n_static,) array
         Prior standard deviations of the weights of the features without lags, the first ones of a row.
     p : int
         Lags of the residual.
-    first, least : float, m²
-        Variance of the noise while it is not known, and the least one.
     """
     resolved = _RESOLUTION * evidence.target_square
-    variance = max(errors.noise_variance or first, least, resolved) * errors.correlation
     priors = np.concatenate((scales, np.sqrt(CONSTANTS.last_lag ** (np.arange(p) / max(p, 1)))))
     solution = evidence.penalised(variance / priors**2)
     return SolvedExpert(len(scales), solution, variance, max(solution.residual_sum, resolved) / evidence.n_rows)

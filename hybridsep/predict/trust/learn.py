@@ -13,10 +13,10 @@ from ..regression import lags
 from ..residual_window import ResidualWindow
 from .constants import CONSTANTS
 from .evidence import Evidence
-from .expert import ExpertErrors
+from .expert import ResidualScale
 from .forecast import TrustedForecast
 from .reach import reached
-from .stack import DOUBTING, LAGGED, STATIC, Stack
+from .stack import DOUBTING, Stack
 from .state import OF_COMMAND, OF_PHYSICS, Learned, RunState, TrustedModel
 
 __all__ = ["begin_in_motion", "learn"]
@@ -48,6 +48,8 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
     learned, (velocity, largest, step) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
+    if state.disproved:
+        of_physics, of_command = of_physics.forget_earlier(), of_command.forget_earlier()
     if velocity != learned.velocity_scale:
         of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
     learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
@@ -57,20 +59,39 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
 def _folded(
     state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
 ) -> TrustedModel:
-    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
-    settings, n = state.fixed.settings, len(e[OF_PHYSICS])
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
+
+    Variances of the noise are taken before the last rows.
+    """
+    settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
     kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
-    def learned(kind: int) -> Evidence:
+    def learned(kind: int, part: slice) -> Evidence:
         past = state.run.past[kind]
         p = len(past)
         # Measured samples, as were all but a few of their lags
         n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
         counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
-        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
-        return state.evidence[kind].discount(kept).learn(rows[kind][counts], lagged[counts], e[kind][counts])
+        lagged, counts = lags(np.concatenate((past[::-1], e[kind][:-1])), p)[part], counts[part]
+        return state.evidence[kind].learn(rows[kind][part][counts], lagged[counts], e[kind][part][counts])
 
-    return replace(state, evidence=(learned(OF_PHYSICS), learned(OF_COMMAND)))
+    def both(part: slice) -> tuple[Evidence, Evidence]:
+        return learned(OF_PHYSICS, part), learned(OF_COMMAND, part)
+
+    state = replace(state, evidence=(state.evidence[0].discount(kept), state.evidence[1].discount(kept)))
+    state = replace(state, evidence=both(slice(early))).with_noise(_scales(state, e, ~bridged[-n:], slice(early)))
+    return replace(state, evidence=both(slice(early, n)))
+
+
+def _scales(
+    state: TrustedModel, e: tuple[Array, Array], accepted: NDArray[np.bool_], part: slice = slice(None)
+) -> tuple[ResidualScale, ResidualScale]:
+    """Return the sizes of the residuals with a part of a window."""
+    counts = np.flatnonzero(accepted[part])
+    of_physics, of_command = state.learned.scales
+    if not counts.size:
+        return of_physics, of_command
+    return of_physics.follow(e[OF_PHYSICS][counts]), of_command.follow(e[OF_COMMAND][counts])
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
@@ -89,20 +110,19 @@ def _judged(
         expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
         for expert, one in forecast.predictions.items()
     }
-    scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
     n, late = len(accepted), settings.measurement_delay
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     stack = learned.stack
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
-    evidence = state.evidence
-    if state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt:
-        # All experts go on with this run alone, and are judged anew.
-        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init()
-        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
-    learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
-    return replace(state, learned=learned, evidence=evidence)
+    learned = replace(learned.with_errors(errors), scales=_scales(state, e, accepted), stack=stack)
+    if not state.disproved:
+        disproved = state.doubts and bool(stack.weights[DOUBTING] > CONSTANTS.doubt)
+        return replace(state, learned=learned, disproved=disproved)
+    # All experts go on with this run alone, and are judged anew.
+    anew = replace(state, learned=learned).judged_anew()
+    return replace(state, learned=replace(learned.with_errors(anew), stack=Stack.init()), disproved=False)
 
 
 def learn(
@@ -136,10 +156,10 @@ def learn(
     e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
     rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
     bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-    if fold and accepted.any():
+    if fold:
         of_command = fixed.command.rows(run.commands, window.x_d)
         state = _folded(state, (rows, of_command), (e, e_0), bridged)
-        state = _judged(state, forecast, (e, e_0), accepted)
+        state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
     past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
     n_rejected = run.n_rejected + m - int(accepted.sum())
     commands = np.concatenate((run.commands, window.x_d))[m:]

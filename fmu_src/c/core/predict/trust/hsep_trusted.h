@@ -35,6 +35,7 @@ typedef struct {
 typedef struct {
     hsep_word Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
     hsep_word late;               /* samples by which the measurement is late */
+    hsep_word early;              /* samples of a window after which the next one's solutions begin */
     hsep_real T_s;                /* s */
     hsep_real least_variance;     /* m2, of the noise */
     hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
@@ -42,6 +43,7 @@ typedef struct {
     hsep_real kept;               /* weight of earlier rows, from window to window */
     hsep_word
         leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
+    hsep_word disproved; /* whether earlier runs are forgotten when the next window is learned */
     hsep_reach reach;
     hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
@@ -74,7 +76,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    31 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    33 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
@@ -102,8 +104,13 @@ static inline hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_word exp
 /* HSEP_OF_COMMAND if an expert predicts the residual of the command, else HSEP_OF_PHYSICS. */
 HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expert);
 
-/* Whether this run doubts earlier ones. */
+/* Whether this run doubts earlier ones; whether an expert is one of the experts that rows train. */
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
+HSEP_API int hsep_trusted_trains(hsep_trusted *self, hsep_word expert);
+
+/* Begin the experts' solutions from the rows so far, with variances of the noise as they are known then. squares:
+ * (HSEP_N_RESIDUALS,) m2, largest mean squares of the residuals so far. */
+HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_real squares[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);

@@ -23,9 +23,11 @@ HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expe
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, hsep_word expert)
 {
     if (hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND) {
-        return (hsep_expert_shape){self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND};
+        return (hsep_expert_shape){
+            self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, self->Np - self->early};
     }
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, expert == HSEP_STATIC ? 0 : self->p};
+    const hsep_word p = expert == HSEP_STATIC ? 0 : self->p;
+    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, self->Np - self->early};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
@@ -49,6 +51,7 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = settings->measurement_delay;
+    self->early = self->Np - (self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
@@ -105,7 +108,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
     hsep_trusted got;
     int sound = HSEP_LAID_OUT(got, block, trusted_lay_out(&got, parameters)) &&
                 (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 &&
+                got.known <= got.followed && got.reach.known <= 1 && got.disproved <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -122,6 +125,39 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self)
 {
     return hsep_evidence_earlier(hsep_trusted_evidence(self, HSEP_OF_PHYSICS))->n_rows > 0.0;
+}
+
+HSEP_API int hsep_trusted_trains(hsep_trusted *self, hsep_word expert)
+{
+    return expert != HSEP_HOLD && (expert != HSEP_DOUBTING || hsep_trusted_doubts(self));
+}
+
+/* Errors of an expert that count from the next solution on. */
+static hsep_expert_errors trusted_errors(const hsep_trusted *self, hsep_word expert)
+{
+    const hsep_expert_errors *errors = self->learned.errors;
+    if (self->disproved && expert == self->leading) {
+        return errors[HSEP_DOUBTING - HSEP_LAGGED];
+    }
+    return self->disproved && expert < HSEP_COMMAND ? (hsep_expert_errors){0.0, 1.0} : errors[expert - HSEP_LAGGED];
+}
+
+HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_real squares[])
+{
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+        hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
+    }
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const hsep_word kind = hsep_trusted_kind_of(self, i);
+        const hsep_real square = squares[kind], weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
+        const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
+        const hsep_real least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square);
+        const hsep_expert_errors errors = trusted_errors(self, i);
+        if (hsep_trusted_trains(self, i)) {
+            hsep_expert_begin_solution(
+                hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors, first, least);
+        }
+    }
 }
 
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self)
@@ -152,10 +188,16 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     const hsep_expert_shape shape = trusted_shape(self, HSEP_DOUBTING);
     hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
-    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
+    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = self->disproved = 0;
     hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);
+    }
+    const hsep_real squares[HSEP_N_RESIDUALS] = {
+        learned->scales[HSEP_OF_PHYSICS].largest_square, learned->scales[HSEP_OF_COMMAND].largest_square};
+    hsep_trusted_begin_solutions(self, squares);
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        hsep_solution_advance(hsep_expert_solution(hsep_trusted_expert(self, i)), INFINITY, 0);
     }
 }
