@@ -64,7 +64,7 @@ HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 
-/* Add the rows that wait to the sums now, so that hsep_gram_solve need not; called before the last row of a window. */
+/* Add the rows that wait to the sums now, before they are read or saved. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
 /* Sum of the squares of the targets, m2. */
