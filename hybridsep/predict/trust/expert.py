@@ -14,7 +14,7 @@ from ...base.signals import Array
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from .constants import CONSTANTS
 
-__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "noise_of", "solve"]
+__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "solve"]
 
 _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
@@ -91,6 +91,18 @@ class ExpertErrors:
 
     noise_variance: float = field(default=0.0, metadata=within())
     correlation: float = field(default=1.0, metadata=within(1.0))
+
+    def variance(self, target_square: float, first: float, least: float) -> float:
+        """Return the variance of the noise that penalties come from, m².
+
+        Parameters
+        ----------
+        target_square : float, m²
+            Sum of the squares of the targets so far.
+        first, least : float, m²
+            Variance of the noise while it is not known, and the least one.
+        """
+        return max(self.noise_variance or first, least, _RESOLUTION * target_square) * self.correlation
 
     def judge(
         self, prediction: ExpertPrediction, measured: Array, accepted: NDArray[np.bool_], given: float
@@ -181,20 +193,6 @@ class SolvedExpert(NamedTuple):
         )
 
 
-def noise_of(target_square: float, errors: ExpertErrors, first: float, least: float) -> float:
-    """Return the variance of the noise that penalties come from, m².
-
-    Parameters
-    ----------
-    target_square : float, m²
-        Sum of the squares of the targets so far.
-    errors : ExpertErrors
-    first, least : float, m²
-        Variance of the noise while it is not known, and the least one.
-    """
-    return max(errors.noise_variance or first, least, _RESOLUTION * target_square) * errors.correlation
-
-
 def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> SolvedExpert:
     """Return an expert with the weights that follow from all rows so far.
 
@@ -203,7 +201,7 @@ def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> 
     evidence : RidgeRegression
         Rows whose first features are the expert's.
     variance : float, m²
-        Of the noise, by :func:`noise_of`.
+        Of the noise, by :meth:`ExpertErrors.variance`.
     scales : (n_static,) array
         Prior standard deviations of the weights of the features without lags, the first ones of a row.
     p : int

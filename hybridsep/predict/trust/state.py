@@ -25,7 +25,7 @@ from .command import CommandFeatures
 from .constants import CONSTANTS
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .evidence import Evidence
-from .expert import ExpertErrors, ResidualScale, noise_of
+from .expert import ExpertErrors, ResidualScale
 from .reach import Reach
 from .stack import COMMAND, DOUBTING, LAGGED, N_JUDGED, STATIC, Stack
 
@@ -203,10 +203,8 @@ class TrustedModel:
         scales : pair of ResidualScale
             Sizes of the residuals so far.
         """
-        settings, learned = self.fixed.settings, self.learned
-        errors = learned.errors
-        if self.disproved:
-            errors = learned.with_errors(self.judged_anew()).errors
+        settings = self.fixed.settings
+        errors = self.learned.with_errors(self.judged_anew() if self.disproved else {}).errors
 
         def noise(expert: int) -> float:
             kind = self.kind_of(expert)
@@ -214,7 +212,7 @@ class TrustedModel:
             first = settings.noise_std**2 or CONSTANTS.first_noise * square
             least = min(settings.lam, CONSTANTS.least_noise * square)
             kept = CONSTANTS.less if expert == DOUBTING else 1.0
-            return noise_of(self.evidence[kind].target_square(kept), errors[expert - LAGGED], first, least)
+            return errors[expert - LAGGED].variance(self.evidence[kind].target_square(kept), first, least)
 
         return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
 

@@ -132,7 +132,7 @@ static void solution_take_in(hsep_solution *self)
     }
 }
 
-HSEP_API void hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)
+HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)
 {
     const hsep_word width = self->n_head + self->n_tail + 1;
     while (self->factored < self->n_head && amount > 0.0) {
@@ -148,6 +148,7 @@ HSEP_API void hsep_solution_advance(hsep_solution *self, hsep_real amount, int a
     if (self->factored == self->n_head && (all || self->waiting >= SOLUTION_TOGETHER)) {
         solution_take_in(self);
     }
+    return amount;
 }
 
 HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
@@ -157,7 +158,7 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *w = hsep_at(self, self->weights);
     hsep_real *least = hsep_at(self, self->least), *diagonal = tail, *row = hsep_at(self, self->factor);
     if (!self->finished) {
-        hsep_solution_advance(self, INFINITY, 0);
+        (void)hsep_solution_advance(self, INFINITY, 0);
         while (self->waiting > 0) {
             solution_take_in(self);
         }

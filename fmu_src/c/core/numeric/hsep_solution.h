@@ -48,9 +48,9 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
 /* Multiply-adds that are left to factor the head. */
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self);
 
-/* Factor the head, by panels of about n^2 * 4 multiply-adds until amount is spent; once it is factored, take in four
- * rows that wait, if there are as many, or at all with all, for 4 n_head n multiply-adds. */
-HSEP_API void hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
+/* Factor the head, by panels of about 4 n^2 multiply-adds until an amount is spent, and return what is left of it. Once
+ * the head is factored, take in four rows that wait, or with all fewer, for 8 n_head n multiply-adds. */
+HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
 
 /* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the rows
  * about them, of which rounding leaves 1e-14 of the square of the targets. Cost: what was left to be advanced,

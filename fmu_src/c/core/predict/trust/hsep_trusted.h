@@ -104,13 +104,15 @@ static inline hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_word exp
 /* HSEP_OF_COMMAND if an expert predicts the residual of the command, else HSEP_OF_PHYSICS. */
 HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expert);
 
-/* Whether this run doubts earlier ones; whether an expert is one of the experts that rows train. */
+/* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
-HSEP_API int hsep_trusted_trains(hsep_trusted *self, hsep_word expert);
 
-/* Begin the experts' solutions from the rows so far, with variances of the noise as they are known then. squares:
- * (HSEP_N_RESIDUALS,) m2, largest mean squares of the residuals so far. */
-HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_real squares[]);
+/* The solution of an expert; NULL where no rows train it. */
+HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert);
+
+/* Begin the solutions from the rows so far, with variances of the noise as they are known then, by the scales of the
+ * residuals so far, (HSEP_N_RESIDUALS,). */
+HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_residual_scale scales[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);

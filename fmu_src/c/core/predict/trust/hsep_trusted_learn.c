@@ -105,8 +105,9 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
     for (hsep_word i = HSEP_LAGGED; k >= self->early && i < HSEP_N_EXPERTS; i++) { /* their solutions have begun */
-        if (hsep_trusted_kind_of(self, i) == kind && hsep_trusted_trains(self, i)) {
-            hsep_solution_row(hsep_expert_solution(hsep_trusted_expert(self, i)), to, to[gram->n]);
+        hsep_solution *solution = hsep_trusted_solution(self, i);
+        if (hsep_trusted_kind_of(self, i) == kind && solution != NULL) {
+            hsep_solution_row(solution, to, lags[-1]);
         }
     }
     hsep_gram_fold(gram);
@@ -116,17 +117,14 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
 static void trusted_begin_solutions(hsep_trusted *self, const hsep_real e[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
+    const hsep_word n = self->followed, first = self->Np - n;
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
-    const hsep_word first = self->Np - self->followed;
     memcpy(scales, self->learned.scales, sizeof scales);
     if (self->n_accepted > 0.0) {
-        hsep_residual_scale_follow(
-            &scales[HSEP_OF_PHYSICS], e + first, accepted + first, self->followed, self->n_accepted);
-        hsep_residual_scale_follow(
-            &scales[HSEP_OF_COMMAND], e_0 + first, accepted + first, self->followed, self->n_accepted);
+        hsep_residual_scale_follow(&scales[HSEP_OF_PHYSICS], e + first, accepted + first, n, self->n_accepted);
+        hsep_residual_scale_follow(&scales[HSEP_OF_COMMAND], e_0 + first, accepted + first, n, self->n_accepted);
     }
-    const hsep_real squares[] = {scales[HSEP_OF_PHYSICS].largest_square, scales[HSEP_OF_COMMAND].largest_square};
-    hsep_trusted_begin_solutions(self, squares);
+    hsep_trusted_begin_solutions(self, scales);
 }
 
 /* Go on with them after sample last - 1: their heads are factored before the last rows come. */
@@ -135,16 +133,14 @@ static void trusted_advance(hsep_trusted *self, hsep_word last)
     const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / 8 + 1;
     hsep_real amount = 0.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        amount +=
-            hsep_trusted_trains(self, i) ? hsep_solution_left(hsep_expert_solution(hsep_trusted_expert(self, i))) : 0.0;
+        const hsep_solution *solution = hsep_trusted_solution(self, i);
+        amount += solution != NULL ? hsep_solution_left(solution) : 0.0;
     }
     amount /= left > of_rows + 1 ? (hsep_real)(left - of_rows) : 1.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (hsep_trusted_trains(self, i)) {
-            hsep_solution *solution = hsep_expert_solution(hsep_trusted_expert(self, i));
-            const hsep_real before = hsep_solution_left(solution);
-            hsep_solution_advance(solution, amount, left == 1);
-            amount -= before - hsep_solution_left(solution);
+        hsep_solution *solution = hsep_trusted_solution(self, i);
+        if (solution != NULL) {
+            amount = hsep_solution_advance(solution, amount, left == 1);
         }
     }
 }

@@ -4,6 +4,7 @@
 #include "hsep_math.h"
 #include "hsep_range.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static const hsep_range trusted_ranges[] = {HSEP_LEARNED_RANGES};
@@ -127,9 +128,10 @@ HSEP_API int hsep_trusted_doubts(hsep_trusted *self)
     return hsep_evidence_earlier(hsep_trusted_evidence(self, HSEP_OF_PHYSICS))->n_rows > 0.0;
 }
 
-HSEP_API int hsep_trusted_trains(hsep_trusted *self, hsep_word expert)
+HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert)
 {
-    return expert != HSEP_HOLD && (expert != HSEP_DOUBTING || hsep_trusted_doubts(self));
+    const int trained = expert != HSEP_HOLD && (expert != HSEP_DOUBTING || hsep_trusted_doubts(self));
+    return trained ? hsep_expert_solution(hsep_trusted_expert(self, expert)) : NULL;
 }
 
 /* Errors of an expert that count from the next solution on. */
@@ -142,18 +144,18 @@ static hsep_expert_errors trusted_errors(const hsep_trusted *self, hsep_word exp
     return self->disproved && expert < HSEP_COMMAND ? (hsep_expert_errors){0.0, 1.0} : errors[expert - HSEP_LAGGED];
 }
 
-HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_real squares[])
+HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_residual_scale scales[])
 {
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
     }
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_word kind = hsep_trusted_kind_of(self, i);
-        const hsep_real square = squares[kind], weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
+        const hsep_real square = scales[kind].largest_square, weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
         const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
         const hsep_real least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square);
         const hsep_expert_errors errors = trusted_errors(self, i);
-        if (hsep_trusted_trains(self, i)) {
+        if (hsep_trusted_solution(self, i) != NULL) {
             hsep_expert_begin_solution(
                 hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors, first, least);
         }
@@ -194,10 +196,8 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);
     }
-    const hsep_real squares[HSEP_N_RESIDUALS] = {
-        learned->scales[HSEP_OF_PHYSICS].largest_square, learned->scales[HSEP_OF_COMMAND].largest_square};
-    hsep_trusted_begin_solutions(self, squares);
+    hsep_trusted_begin_solutions(self, learned->scales);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        hsep_solution_advance(hsep_expert_solution(hsep_trusted_expert(self, i)), INFINITY, 0);
+        (void)hsep_solution_advance(hsep_expert_solution(hsep_trusted_expert(self, i)), INFINITY, 0);
     }
 }
