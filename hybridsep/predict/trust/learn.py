@@ -13,10 +13,10 @@ from ..regression import lags
 from ..residual_window import ResidualWindow
 from .constants import CONSTANTS
 from .evidence import Evidence
-from .expert import ResidualScale
+from .expert import ExpertErrors
 from .forecast import TrustedForecast
 from .reach import reached
-from .stack import DOUBTING, Stack
+from .stack import DOUBTING, LAGGED, STATIC, Stack
 from .state import OF_COMMAND, OF_PHYSICS, Learned, RunState, TrustedModel
 
 __all__ = ["begin_in_motion", "learn"]
@@ -57,41 +57,54 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
 
 
 def _folded(
-    state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
+    state: TrustedModel,
+    forecast: TrustedForecast,
+    rows: tuple[Array, Array],
+    e: tuple[Array, Array],
+    accepted: NDArray[np.bool_],
 ) -> TrustedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
-    Variances of the noise are taken before the last rows.
+    Variances of the noise for the next window are taken before the last rows.
     """
-    settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
+    settings, n, early = state.fixed.settings, len(accepted), state.early
     kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+    bridged: NDArray[np.bool_] = np.concatenate((state.run.bridged, ~accepted))
 
-    def learned(kind: int, part: slice) -> Evidence:
+    def learned(kind: int, evidence: Evidence, part: slice) -> Evidence:
         past = state.run.past[kind]
         p = len(past)
         # Measured samples, as were all but a few of their lags
         n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
-        counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
-        lagged, counts = lags(np.concatenate((past[::-1], e[kind][:-1])), p)[part], counts[part]
-        return state.evidence[kind].learn(rows[kind][part][counts], lagged[counts], e[kind][part][counts])
+        counts = (accepted & (n_bridged <= _BRIDGED))[part]
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)[part]
+        return evidence.learn(rows[kind][part][counts], lagged[counts], e[kind][part][counts])
 
-    def both(part: slice) -> tuple[Evidence, Evidence]:
-        return learned(OF_PHYSICS, part), learned(OF_COMMAND, part)
+    def both(evidence: tuple[Evidence, Evidence], part: slice) -> tuple[Evidence, Evidence]:
+        return learned(OF_PHYSICS, evidence[0], part), learned(OF_COMMAND, evidence[1], part)
 
-    state = replace(state, evidence=(state.evidence[0].discount(kept), state.evidence[1].discount(kept)))
-    state = replace(state, evidence=both(slice(early))).with_noise(_scales(state, e, ~bridged[-n:], slice(early)))
-    return replace(state, evidence=both(slice(early, n)))
+    of_physics, of_command = (one.discount(kept) for one in state.evidence)
+    state = replace(state, evidence=both((of_physics, of_command), slice(early)))
+    state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
+    return replace(state, evidence=both(state.evidence, slice(early, n)))
 
 
-def _scales(
-    state: TrustedModel, e: tuple[Array, Array], accepted: NDArray[np.bool_], part: slice = slice(None)
-) -> tuple[ResidualScale, ResidualScale]:
-    """Return the sizes of the residuals with a part of a window."""
-    counts = np.flatnonzero(accepted[part])
-    of_physics, of_command = state.learned.scales
-    if not counts.size:
-        return of_physics, of_command
-    return of_physics.follow(e[OF_PHYSICS][counts]), of_command.follow(e[OF_COMMAND][counts])
+def _judged_experts(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> Learned:
+    """Judge the experts, and the sizes of the residuals, by the first samples of their window."""
+    learned, given = state.learned, state.fixed.settings.noise_std**2
+    if not accepted.any():
+        return learned
+    errors = {
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, given)
+        for expert, one in forecast.predictions.items()
+    }
+    if state.disproved:  # all experts go on with this run alone, and are judged anew
+        doubting = errors.get(DOUBTING, learned.errors_of(DOUBTING))
+        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: doubting}
+    of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    return replace(learned.with_errors(errors), scales=(of_physics, of_command))
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
@@ -105,24 +118,16 @@ def _judged(
     state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> TrustedModel:
     """Judge the experts and their stack by the measurement of their window."""
-    settings, learned = state.fixed.settings, state.learned
-    errors = {
-        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
-        for expert, one in forecast.predictions.items()
-    }
+    learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
     n, late = len(accepted), settings.measurement_delay
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     stack = learned.stack
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
-    learned = replace(learned.with_errors(errors), scales=_scales(state, e, accepted), stack=stack)
-    if not state.disproved:
-        disproved = state.doubts and bool(stack.weights[DOUBTING] > CONSTANTS.doubt)
-        return replace(state, learned=learned, disproved=disproved)
-    # All experts go on with this run alone, and are judged anew.
-    anew = replace(state, learned=learned).judged_anew()
-    return replace(state, learned=replace(learned.with_errors(anew), stack=Stack.init()), disproved=False)
+    stack = Stack.init() if state.disproved else stack
+    disproved = state.doubts and bool(stack.weights[DOUBTING] > CONSTANTS.doubt)
+    return replace(state, learned=replace(learned, stack=stack), disproved=disproved)
 
 
 def learn(
@@ -158,7 +163,7 @@ def learn(
     bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
     if fold:
         of_command = fixed.command.rows(run.commands, window.x_d)
-        state = _folded(state, (rows, of_command), (e, e_0), bridged)
+        state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
         state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
     past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
     n_rejected = run.n_rejected + m - int(accepted.sum())

@@ -27,7 +27,7 @@ from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticSta
 from .evidence import Evidence
 from .expert import ExpertErrors, ResidualScale
 from .reach import Reach
-from .stack import COMMAND, DOUBTING, LAGGED, N_JUDGED, STATIC, Stack
+from .stack import COMMAND, DOUBTING, LAGGED, N_JUDGED, Stack
 
 __all__ = [
     "OF_COMMAND",
@@ -195,30 +195,19 @@ class TrustedModel:
         Np = self.fixed.settings.Np
         return Np - min(Np // 2, _AHEAD)
 
-    def with_noise(self, scales: tuple[ResidualScale, ResidualScale]) -> TrustedModel:
-        """Return the model with the variances of the noise that follow from what is known now.
-
-        Parameters
-        ----------
-        scales : pair of ResidualScale
-            Sizes of the residuals so far.
-        """
+    def with_noise(self, learned: Learned) -> TrustedModel:
+        """Return the model with the variances of the noise that follow from what is learned so far."""
         settings = self.fixed.settings
-        errors = self.learned.with_errors(self.judged_anew() if self.disproved else {}).errors
 
         def noise(expert: int) -> float:
             kind = self.kind_of(expert)
-            square = scales[kind].largest_square
+            square = learned.scales[kind].largest_square
             first = settings.noise_std**2 or CONSTANTS.first_noise * square
             least = min(settings.lam, CONSTANTS.least_noise * square)
             kept = CONSTANTS.less if expert == DOUBTING else 1.0
-            return errors[expert - LAGGED].variance(self.evidence[kind].target_square(kept), first, least)
+            return learned.errors_of(expert).variance(self.evidence[kind].target_square(kept), first, least)
 
         return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
-
-    def judged_anew(self) -> dict[int, ExpertErrors]:
-        """Return the errors of the experts, by their places, that change where earlier runs are disproved."""
-        return {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), self.leading: self.learned.errors_of(DOUBTING)}
 
     @property
     def doubts(self) -> bool:
@@ -280,7 +269,7 @@ def restart(state: TrustedModel) -> TrustedModel:
     learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
     evidence = of_physics, of_command
     begun = TrustedModel(fixed, learned, evidence, state.noise, leading, False, RunState.init(fixed))
-    return begun.with_noise(learned.scales)
+    return begun.with_noise(learned)
 
 
 def plan_ahead(state: TrustedModel) -> TrustedModel:

@@ -214,17 +214,17 @@ HSEP_API void hsep_expert_predict(
 
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
-    hsep_real given)
+    hsep_word n, hsep_real given)
 {
     const hsep_real *unshrunk = hsep_at_const(self, self->unshrunk) + (self->n - self->Np); /* of the window */
-    hsep_real sum = 0.0, n = 0.0;
-    for (hsep_word j = 0; j < self->Np; j++) {
+    hsep_real sum = 0.0, count = 0.0;
+    for (hsep_word j = self->Np - n; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
-        n += accepted[j];
+        count += accepted[j];
     }
     errors->noise_variance = given > 0.0 ? given : self->rows_variance;
     if (errors->noise_variance > 0.0) {
-        const hsep_real seen = hsep_fmin(sum * sum / n / errors->noise_variance, HSEP_EXPERT_DIVERGED);
+        const hsep_real seen = hsep_fmin(sum * sum / count / errors->noise_variance, HSEP_EXPERT_DIVERGED);
         errors->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - errors->correlation);
         errors->correlation = hsep_fmin(hsep_fmax(errors->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
     }

@@ -21,6 +21,9 @@
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
 
+/* Rows that a solution takes in at a sample once its head is factored, in the mean. */
+#define HSEP_TRUSTED_ROWS 8
+
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
 typedef struct {
@@ -110,9 +113,10 @@ HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
 /* The solution of an expert; NULL where no rows train it. */
 HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert);
 
-/* Begin the solutions from the rows so far, with variances of the noise as they are known then, by the scales of the
- * residuals so far, (HSEP_N_RESIDUALS,). */
-HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_residual_scale scales[]);
+/* Begin the solutions from the rows so far, with variances of the noise as they are known then. scales:
+ * (HSEP_N_RESIDUALS,) of the residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_LAGGED on. */
+HSEP_API void hsep_trusted_begin_solutions(
+    hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);

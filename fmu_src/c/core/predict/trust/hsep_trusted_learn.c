@@ -113,24 +113,46 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     hsep_gram_fold(gram);
 }
 
-/* Begin the solutions for the next window, whose residuals are e so far. */
+/* Judge the experts by the residuals e of the first n samples of their window, one of which counts at least. */
+static void trusted_judge_experts(
+    hsep_trusted *self, const hsep_real e[], hsep_word n, hsep_residual_scale scales[], hsep_expert_errors errors[])
+{
+    const hsep_real *accepted = hsep_at(self, self->accepted);
+    const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
+    const hsep_word first = self->Np - n;
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_judge(
+                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
+                accepted, n, self->given_variance);
+        }
+    }
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+        hsep_residual_scale_follow(&scales[i], residuals[i] + first, accepted + first, n, self->n_accepted);
+    }
+    if (self->disproved) { /* all experts go on with this run alone, and are judged anew */
+        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+    }
+}
+
+/* Begin the solutions for the next window, as far as this one, whose residuals are e, is known. */
 static void trusted_begin_solutions(hsep_trusted *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
-    const hsep_word n = self->followed, first = self->Np - n;
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
+    hsep_expert_errors errors[HSEP_N_JUDGED];
     memcpy(scales, self->learned.scales, sizeof scales);
+    memcpy(errors, self->learned.errors, sizeof errors);
     if (self->n_accepted > 0.0) {
-        hsep_residual_scale_follow(&scales[HSEP_OF_PHYSICS], e + first, accepted + first, n, self->n_accepted);
-        hsep_residual_scale_follow(&scales[HSEP_OF_COMMAND], e_0 + first, accepted + first, n, self->n_accepted);
+        trusted_judge_experts(self, e, self->followed, scales, errors);
     }
-    hsep_trusted_begin_solutions(self, scales);
+    hsep_trusted_begin_solutions(self, scales, errors);
 }
 
 /* Go on with them after sample last - 1: their heads are factored before the last rows come. */
 static void trusted_advance(hsep_trusted *self, hsep_word last)
 {
-    const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / 8 + 1;
+    const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / HSEP_TRUSTED_ROWS + 1;
     hsep_real amount = 0.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_solution *solution = hsep_trusted_solution(self, i);
@@ -235,29 +257,13 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 /* Judge the experts and their stack by the measurement of their window. */
 static void trusted_judge(hsep_trusted *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted);
-    const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
     hsep_learned *learned = &self->learned;
-    hsep_expert_errors *errors = learned->errors;
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            hsep_expert_judge(
-                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
-                accepted, self->given_variance);
-        }
-    }
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-        hsep_residual_scale_follow(&learned->scales[i], residuals[i], accepted, self->Np, self->n_accepted);
-    }
+    trusted_judge_experts(self, e, self->Np, learned->scales, learned->errors);
     trusted_judge_stack(self, e);
-    if (!self->disproved) {
-        self->disproved = hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT;
-    } else { /* all experts go on with this run alone, and are judged anew */
-        self->disproved = 0;
-        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+    if (self->disproved) {
         hsep_stack_init(&learned->stack);
     }
+    self->disproved = hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT;
 }
 
 HSEP_API void hsep_trusted_learn(

@@ -134,17 +134,8 @@ HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expe
     return trained ? hsep_expert_solution(hsep_trusted_expert(self, expert)) : NULL;
 }
 
-/* Errors of an expert that count from the next solution on. */
-static hsep_expert_errors trusted_errors(const hsep_trusted *self, hsep_word expert)
-{
-    const hsep_expert_errors *errors = self->learned.errors;
-    if (self->disproved && expert == self->leading) {
-        return errors[HSEP_DOUBTING - HSEP_LAGGED];
-    }
-    return self->disproved && expert < HSEP_COMMAND ? (hsep_expert_errors){0.0, 1.0} : errors[expert - HSEP_LAGGED];
-}
-
-HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_residual_scale scales[])
+HSEP_API void hsep_trusted_begin_solutions(
+    hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[])
 {
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
@@ -154,10 +145,10 @@ HSEP_API void hsep_trusted_begin_solutions(hsep_trusted *self, const hsep_residu
         const hsep_real square = scales[kind].largest_square, weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
         const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
         const hsep_real least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square);
-        const hsep_expert_errors errors = trusted_errors(self, i);
         if (hsep_trusted_solution(self, i) != NULL) {
             hsep_expert_begin_solution(
-                hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors, first, least);
+                hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors[i - HSEP_LAGGED],
+                first, least);
         }
     }
 }
@@ -196,7 +187,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);
     }
-    hsep_trusted_begin_solutions(self, learned->scales);
+    hsep_trusted_begin_solutions(self, learned->scales, learned->errors);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         (void)hsep_solution_advance(hsep_expert_solution(hsep_trusted_expert(self, i)), INFINITY, 0);
     }
