@@ -98,9 +98,9 @@ HSEP_API void hsep_expert_predict(
  * shrink them by it. Each costs a quarter of hsep_solution_leverages and last multiply-adds. */
 HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
-/* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured. measured:
- * (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the noise, if it
- * is known; else 0. */
+/* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
+ * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the
+ * noise, if it is known; else 0. */
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
     hsep_word n, hsep_real given);
