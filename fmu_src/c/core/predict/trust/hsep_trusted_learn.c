@@ -144,7 +144,7 @@ static void trusted_begin_solutions(hsep_trusted *self, const hsep_real e[])
     memcpy(scales, self->learned.scales, sizeof scales);
     memcpy(errors, self->learned.errors, sizeof errors);
     if (self->n_accepted > 0.0) {
-        trusted_judge_experts(self, e, self->followed, scales, errors);
+        trusted_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
     }
     hsep_trusted_begin_solutions(self, scales, errors);
 }
