@@ -26,7 +26,7 @@ __all__ = ["Changes", "CoreVariant", "Run"]
 
 SOURCES = Path(__file__).resolve().parents[1] / "fmu_src" / "c" / "core"
 
-PARTS = ("numeric", "predict", "online")
+PARTS = ("numeric", "modal", "predict", "online")
 """Folders of the core that a predictor needs."""
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Dmemcpy=memmove")

@@ -22,7 +22,7 @@ MAIN = Path(__file__).parent / "main.c"
 
 @dataclass(frozen=True)
 class Calls:
-    """Calls of the allocator up to the end of the initialization, and after it; RMS errors of steps, early and late, m."""
+    """Calls of the allocator up to the end of the initialization, and after it; RMS errors early and late, m."""
 
     before: int
     after: int

@@ -2,8 +2,8 @@
 
 Folds a block of feature rows of the staircase over and over into the C regression, n = 55, and compares the weights
 with the exact ones: repeating rows m times is the same as taking them times √m, so one QR in extended precision gives
-them. Then steps the whole FMU along a motion that repeats, with the paper's model and with the trusted one: the error of
-its predictions must not grow. Every call of the allocator is counted. Ends with 1 if a limit is missed.
+them. Then steps the whole FMU along a motion that repeats, with the paper's model and with the trusted one: the error
+of its predictions must not grow. Every call of the allocator is counted. Ends with 1 if a limit is missed.
 """
 
 from __future__ import annotations

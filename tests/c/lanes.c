@@ -1,6 +1,6 @@
 /* Factor and solve with and without vectors: prints the bits of the results. */
 #include "hsep_cholesky.h"
-#include "hsep_gram.h"
+#include "hsep_solution.h"
 #include "hsep_vector.h"
 
 #include <stdio.h>
@@ -15,14 +15,16 @@ static double next(void)
 
 int main(void)
 {
-    enum { N = 23 };
+    enum { N = 23, HEAD = 13, LATE = 6 };
     hsep_gram *gram = malloc((size_t)hsep_gram_size(N));
-    double penalties[N], factor[(N + 1) * (N + 2) / 2], least[N + 1], w[N], side_by_side[N * HSEP_GRAM_ABREAST];
-    double leverages[HSEP_GRAM_ABREAST];
-    if (gram == NULL) {
+    hsep_solution *solution = malloc((size_t)hsep_solution_size(HEAD, N - HEAD, LATE));
+    double leverages[HSEP_SOLUTION_ABREAST];
+    if (gram == NULL || solution == NULL) {
         return 1;
     }
     hsep_gram_init(gram, N);
+    hsep_solution_init(solution, HEAD, N - HEAD, LATE);
+    double *penalties = hsep_at(solution, solution->penalties), *least = hsep_at(solution, solution->least);
     for (int k = 0; k < 99; k++) {
         double *row = hsep_gram_row(gram);
         for (int i = 0; i <= N; i++) {
@@ -33,16 +35,26 @@ int main(void)
     for (int i = 0; i < N; i++) {
         penalties[i] = 1e-3;
     }
-    printf("%a\n", hsep_gram_solve(gram, NULL, 1.0, penalties, N, factor, least, w));
-    for (int i = 0; i < N * HSEP_GRAM_ABREAST; i++) {
-        side_by_side[i] = next();
+    hsep_gram_settle(gram);
+    hsep_solution_begin(solution, gram, NULL, 1.0);
+    for (int k = 0; k < LATE; k++) {
+        double row[N];
+        for (int i = 0; i < N; i++) {
+            row[i] = next();
+        }
+        hsep_solution_row(solution, row, next());
     }
-    hsep_gram_leverages(factor, N, side_by_side, leverages);
-    hsep_cholesky_solve(factor, N + 1, least);
+    printf("%a\n", hsep_solution_finish(solution));
+    for (int i = 0; i < N * HSEP_SOLUTION_ABREAST; i++) {
+        hsep_at(solution, solution->work)[i] = next();
+    }
+    hsep_solution_leverages(solution, leverages);
+    hsep_cholesky_solve(hsep_at(solution, solution->factor), N + 1, least);
     for (int i = 0; i < N; i++) {
-        printf("%a %a\n", w[i], least[i]);
+        printf("%a %a\n", hsep_at(solution, solution->weights)[i], least[i]);
     }
     printf("%a %d\n", leverages[0] + leverages[3], HSEP_LANES);
+    free(solution);
     free(gram);
     return 0;
 }

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
 from c_gram import CGram, CSolution
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hybridsep.predict.regression import RidgeRegression
@@ -44,6 +46,7 @@ def assert_same(ours: CSolution, library: RidgeRegression, penalties: Array, row
 @pytest.mark.parametrize("n_rows", [1, 3, 200])
 def test_a_solution_with_penalties_is_the_librarys(n: int, n_rows: int) -> None:
     gram, library, rows, _ = both(n, n_rows, n)
+    gram.settle()
     before = gram.block.copy()
     for m in sorted({1, n // 2 or 1, n}):
         penalties = 10.0 ** np.random.default_rng(m).uniform(-3, 3, m) * np.abs(rows[:, :m]).max(axis=0) ** 2
@@ -54,11 +57,55 @@ def test_a_solution_with_penalties_is_the_librarys(n: int, n_rows: int) -> None:
 @pytest.mark.parametrize("n_rows", [1, 2, 3, 4, 5])
 def test_rows_that_wait_count(n_rows: int) -> None:
     gram, library, rows, _ = both(6, n_rows, 1)
+    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
+    gram.settle()
+    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
     penalties = np.abs(rows).max(axis=0) ** 2
     assert_same(CSolution(gram, penalties), library, penalties, rows)
-    gram.settle()
-    assert_same(CSolution(gram, penalties), library, penalties, rows)
-    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
+
+
+@given(
+    st.integers(1, 40),
+    st.integers(0, 30),
+    st.lists(st.floats(0.0, 4000.0), min_size=23, max_size=23),
+    st.integers(0, 9),
+)
+@settings(max_examples=60, deadline=None)
+def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: list[float], seed: int) -> None:
+    """However much work is done before each row: as with all rows from the beginning."""
+    n_rows = n_before + len(amounts)
+    _, library, rows, target = both(n, n_rows, seed)
+    gram = CGram(n)
+    gram.fold(rows[:n_before], target[:n_before])
+    later = np.column_stack((rows, target))[n_before:]
+    penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
+    solution = CSolution(gram, penalties, later=later, amounts=amounts)
+    assert_same(solution, library, penalties, rows)
+    assert solution.lefts == sorted(solution.lefts, reverse=True)
+    assert solution.left == 0.0
+    assert solution.valid
+
+
+def test_the_tails_penalties_may_change() -> None:
+    gram, library, rows, _ = both(9, 40, 5)
+    penalties = np.abs(rows).max(axis=0) ** 2
+    solution = CSolution(gram, penalties)
+    for factor in (1e-3, 1e3, 1.0):
+        changed = np.where(np.arange(9) < 4, factor, 1.0) * penalties
+        solution.finish(changed)
+        assert_same(solution, library, changed, rows)
+
+
+def test_a_solution_of_other_sizes_or_out_of_range_is_not_valid() -> None:
+    gram, _, rows, _ = both(9, 40, 5)
+    solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2)
+    assert solution.valid
+    for word, value in ((3, 6), (4, 2), (5, 2), (8, 0)):
+        words = solution.block.view(np.uint64)
+        before, words[word] = int(words[word]), value
+        assert not solution.valid
+        words[word] = before
+    assert solution.valid
 
 
 def test_rows_of_others_are_added_with_their_weight() -> None:
@@ -150,6 +197,7 @@ def test_digits_do_not_wear_off() -> None:
     rows, target = 1.0 + rng.random((n_rows, 2)), rng.random(n_rows)
     gram = CGram(2)
     gram.fold_over(rows, target, repetitions)
+    gram.settle()
     exact = [
         repetitions * sum((Fraction(a) * Fraction(b) for a, b in zip(x.tolist(), y.tolist(), strict=True)), Fraction(0))
         for x, y in ((rows[:, 0], rows[:, 0]), (rows[:, 0], rows[:, 1]), (rows[:, 0], target))
@@ -162,7 +210,10 @@ def test_digits_do_not_wear_off() -> None:
 @pytest.mark.slow
 def test_vectors_change_no_bit(tmp_path: Path) -> None:
     numeric = C_SOURCES / "core" / "numeric"
-    sources = [Path(__file__).with_name("lanes.c"), numeric / "hsep_gram.c", numeric / "hsep_cholesky.c"]
+    sources = [
+        Path(__file__).with_name("lanes.c"),
+        *(numeric / f"hsep_{name}.c" for name in ("gram", "solution", "cholesky")),
+    ]
     shown = []
     for flags in (["-O3"], ["-O3", "-DHSEP_NO_VECTORS"], ["-O1", "-DHSEP_NO_VECTORS"]):
         program = tmp_path / "lanes"

@@ -29,7 +29,8 @@ def solved(
     first: float = 1.0,
     least: float = 1e-9,
 ) -> SolvedExpert:
-    return solve(evidence, ExpertErrors(noise, correlation), scales, p, first, least)
+    variance = ExpertErrors(noise, correlation).variance(evidence.target_square, first, least)
+    return solve(evidence, variance, scales, p)
 
 
 def written_out(

@@ -170,7 +170,7 @@ def test_a_prediction_that_overflows_is_refused() -> None:
     arrays["residual.learned.scales.0.largest"] = np.array(1e-100)
     arrays["residual.evidence.0.this.factor"] = 1e-100 * np.eye(27)
     for i in range(4):
-        arrays[f"residual.learned.errors.{i}.noise_variance"] = np.array(0.0)
+        arrays[f"residual.noise.{i}"] = np.array(1e-202)
     with pytest.raises(StateError, match="the prediction of the pending window must be finite"):
         HybridPredictor.from_bytes(pack("predictor", meta, arrays))
 

@@ -1,4 +1,4 @@
-"""The C core's Gram matrix through ctypes."""
+"""The C core's Gram matrix, and the solutions from it, through ctypes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ABREAST = 4
-"""HSEP_GRAM_ABREAST."""
+"""HSEP_SOLUTION_ABREAST."""
+
+OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "work")
+"""Of hsep_solution, behind seven other words."""
 
 
 def pointer(array: Array) -> Any:
@@ -68,31 +71,88 @@ class CGram:
 
 
 class CSolution:
-    """Weights of the first features with penalties, as hsep_expert.c solves for them."""
+    """Weights of the first features with penalties, as hsep_expert.c solves for them.
 
-    def __init__(self, gram: CGram, penalties: Array, other: CGram | None = None, weight: float = 1.0) -> None:
+    Parameters
+    ----------
+    gram : CGram
+        Its rows, settled.
+    penalties : (m,) array
+        Of its first ``m`` features; where these are all, the second half of them is the head, else there is none.
+    other, weight : CGram and float, optional
+        Rows that are added with a weight, settled.
+    later : (k, m + 1) array, optional
+        Rows ``[φ | target]`` that come once the solution has begun.
+    amounts : list of float
+        Multiply-adds that are spent before each of them; what is left is done in the end.
+    """
+
+    def __init__(
+        self,
+        gram: CGram,
+        penalties: Array,
+        other: CGram | None = None,
+        weight: float = 1.0,
+        later: Array | None = None,
+        amounts: list[float] | None = None,
+    ) -> None:
         self.library, m = gram.library, len(penalties)
-        self.weights, self.factor = np.empty(m), np.full((m + 1) * (m + 2) // 2, np.nan)
-        self.library.hsep_gram_solve.restype = ctypes.c_double
-        self.residual_sum = self.library.hsep_gram_solve(
-            gram._block,
-            None if other is None else other._block,
-            ctypes.c_double(weight),
-            pointer(penalties),
-            ctypes.c_uint64(m),
-            pointer(self.factor),
-            pointer(np.full(m + 1, np.nan)),
-            pointer(self.weights),
-        )
+        n_head = m - m // 2 if m == gram.n else 0
+        later = np.empty((0, m + 1)) if later is None else np.ascontiguousarray(later)
+        sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later))]
+        self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
+        self.library.hsep_solution_left.restype = ctypes.c_double
+        self.block = np.full(int(self.library.hsep_solution_size(*sizes)) // 8, np.nan)
+        self.library.hsep_solution_init(self._block, *sizes)
+        self.n_head, self.m = n_head, m
+        self._part("penalties", m)[:] = penalties
+        gram.settle()
+        if other is not None:
+            other.settle()
+        added = None if other is None else other._block
+        self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
+        self.lefts = [self.left]
+        for i, row in enumerate(later):
+            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
+            if amounts is not None:
+                self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
+                self.lefts.append(self.left)
+        self.finish()
+
+    def finish(self, penalties: Array | None = None) -> None:
+        """Solve for the weights, with other penalties of the tail if there are."""
+        if penalties is not None:
+            self._part("penalties", len(penalties))[:] = penalties
+        self.residual_sum = self.library.hsep_solution_finish(self._block)
+
+    @property
+    def left(self) -> float:
+        return float(self.library.hsep_solution_left(self._block))
+
+    @property
+    def valid(self) -> bool:
+        sizes = [ctypes.c_uint64(int(word)) for word in self.block[:3].view(np.uint64)]
+        return bool(self.library.hsep_solution_valid(self._block, *sizes))
+
+    @property
+    def _block(self) -> Any:
+        return pointer(self.block)
+
+    def _part(self, name: str, count: int) -> Array:
+        place = int(self.block.view(np.uint64)[7 + OFFSETS.index(name)])
+        return self.block[place : place + count]
+
+    @property
+    def weights(self) -> Array:
+        return self._part("weights", self.m)
 
     def leverage(self, rows: Array) -> Array:
-        found = []
+        found, in_order = [], np.hstack((rows[:, self.m - self.n_head :], rows[:, : self.m - self.n_head]))
         for first in range(0, len(rows), ABREAST):
-            some = rows[first : first + ABREAST]
-            side_by_side = np.ascontiguousarray(np.vstack((some, np.zeros((ABREAST - len(some), rows.shape[1])))).T)
+            some = in_order[first : first + ABREAST]
+            side_by_side = np.vstack((some, np.zeros((ABREAST - len(some), self.m)))).T
+            self._part("work", ABREAST * self.m)[:] = side_by_side.ravel()
             leverages = np.full(ABREAST, np.nan)
-            self.library.hsep_gram_leverages(
-                pointer(self.factor), ctypes.c_uint64(rows.shape[1]), pointer(side_by_side), pointer(leverages)
-            )
+            self.library.hsep_solution_leverages(self._block, pointer(leverages))
             found += leverages[: len(some)].tolist()
         return np.array(found)

@@ -68,6 +68,12 @@ class Evidence:
         earlier = self.earlier.discount(kept)
         return earlier if self.this.n_rows == 0.0 else self.this.add(earlier)
 
+    def target_square(self, kept: float = 1.0) -> float:
+        """Return the sum of the squares of the targets, m², the rows of earlier runs weighed by ``kept``."""
+        return self.this.target_square + kept * self.earlier.target_square
+
     def learn(self, rows: Array, lagged: Array, target: Array) -> Evidence:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
+        if not len(target):
+            return self
         return replace(self, this=self.this.update_stacked(np.column_stack((rows, lagged, target))))

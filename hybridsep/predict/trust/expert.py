@@ -92,6 +92,18 @@ class ExpertErrors:
     noise_variance: float = field(default=0.0, metadata=within())
     correlation: float = field(default=1.0, metadata=within(1.0))
 
+    def variance(self, target_square: float, first: float, least: float) -> float:
+        """Return the variance of the noise that penalties come from, m².
+
+        Parameters
+        ----------
+        target_square : float, m²
+            Sum of the squares of the targets so far.
+        first, least : float, m²
+            Variance of the noise while it is not known, and the least one.
+        """
+        return max(self.noise_variance or first, least, _RESOLUTION * target_square) * self.correlation
+
     def judge(
         self, prediction: ExpertPrediction, measured: Array, accepted: NDArray[np.bool_], given: float
     ) -> ExpertErrors:
@@ -181,25 +193,21 @@ class SolvedExpert(NamedTuple):
         )
 
 
-def solve(
-    evidence: RidgeRegression, errors: ExpertErrors, scales: Array, p: int, first: float, least: float
-) -> SolvedExpert:
+def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> SolvedExpert:
     """Return an expert with the weights that follow from all rows so far.
 
     Parameters
     ----------
     evidence : RidgeRegression
         Rows whose first features are the expert's.
-    errors : ExpertErrors
+    variance : float, m²
+        Of the noise, by :meth:`ExpertErrors.variance`.
     scales : (n_static,) array
         Prior standard deviations of the weights of the features without lags, the first ones of a row.
     p : int
         Lags of the residual.
-    first, least : float, m²
-        Variance of the noise while it is not known, and the least one.
     """
     resolved = _RESOLUTION * evidence.target_square
-    variance = max(errors.noise_variance or first, least, resolved) * errors.correlation
     priors = np.concatenate((scales, np.sqrt(CONSTANTS.last_lag ** (np.arange(p) / max(p, 1)))))
     solution = evidence.penalised(variance / priors**2)
     return SolvedExpert(len(scales), solution, variance, max(solution.residual_sum, resolved) / evidence.n_rows)

@@ -79,9 +79,7 @@ def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: Fea
     else:
         p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
     priors = effect * shares / np.maximum(largest, _LEAST)
-    first = settings.noise_std**2 or CONSTANTS.first_noise * square
-    least = min(settings.lam, CONSTANTS.least_noise * square)
-    return solve(rows, state.learned.errors_of(expert), priors, p, first, least)
+    return solve(rows, state.noise_of(expert), priors, p)
 
 
 def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
@@ -93,8 +91,8 @@ def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert
             continue
         if kind == OF_COMMAND or not outgrown:
             rows = evidence.all()
-            found |= {expert: _solved(state, expert, rows, scales) for expert in experts}
-            if state.doubts and state.leading == experts[0]:
+            found |= {expert: _solved(state, expert, rows, scales) for expert in experts if state.noise_of(expert)}
+            if state.doubts and state.leading == experts[0] and state.noise_of(DOUBTING):
                 found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
     return found
 

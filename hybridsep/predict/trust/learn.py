@@ -48,6 +48,8 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
     learned, (velocity, largest, step) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
+    if state.disproved:
+        of_physics, of_command = of_physics.forget_earlier(), of_command.forget_earlier()
     if velocity != learned.velocity_scale:
         of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
     learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
@@ -55,22 +57,54 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
 
 
 def _folded(
-    state: TrustedModel, rows: tuple[Array, Array], e: tuple[Array, Array], bridged: NDArray[np.bool_]
+    state: TrustedModel,
+    forecast: TrustedForecast,
+    rows: tuple[Array, Array],
+    e: tuple[Array, Array],
+    accepted: NDArray[np.bool_],
 ) -> TrustedModel:
-    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
-    settings, n = state.fixed.settings, len(e[OF_PHYSICS])
-    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
-    def learned(kind: int) -> Evidence:
+    Variances of the noise for the next window are taken before the last rows.
+    """
+    settings, n, early = state.fixed.settings, len(accepted), state.early
+    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+    bridged: NDArray[np.bool_] = np.concatenate((state.run.bridged, ~accepted))
+
+    def learned(kind: int, evidence: Evidence, part: slice) -> Evidence:
         past = state.run.past[kind]
         p = len(past)
         # Measured samples, as were all but a few of their lags
         n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
-        counts = ~bridged[-n:] & (n_bridged <= _BRIDGED)
-        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
-        return state.evidence[kind].discount(kept).learn(rows[kind][counts], lagged[counts], e[kind][counts])
+        counts = (accepted & (n_bridged <= _BRIDGED))[part]
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)[part]
+        return evidence.learn(rows[kind][part][counts], lagged[counts], e[kind][part][counts])
 
-    return replace(state, evidence=(learned(OF_PHYSICS), learned(OF_COMMAND)))
+    def both(evidence: tuple[Evidence, Evidence], part: slice) -> tuple[Evidence, Evidence]:
+        return learned(OF_PHYSICS, evidence[0], part), learned(OF_COMMAND, evidence[1], part)
+
+    of_physics, of_command = (one.discount(kept) for one in state.evidence)
+    state = replace(state, evidence=both((of_physics, of_command), slice(early)))
+    state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
+    return replace(state, evidence=both(state.evidence, slice(early, n)))
+
+
+def _judged_experts(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> Learned:
+    """Judge the experts, and the sizes of the residuals, by the first samples of their window."""
+    learned, given = state.learned, state.fixed.settings.noise_std**2
+    if not accepted.any():
+        return learned
+    errors = {
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, given)
+        for expert, one in forecast.predictions.items()
+    }
+    if state.disproved:  # all experts go on with this run alone, and are judged anew
+        doubting = errors.get(DOUBTING, learned.errors_of(DOUBTING))
+        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: doubting}
+    of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    return replace(learned.with_errors(errors), scales=(of_physics, of_command))
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
@@ -84,25 +118,16 @@ def _judged(
     state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> TrustedModel:
     """Judge the experts and their stack by the measurement of their window."""
-    settings, learned = state.fixed.settings, state.learned
-    errors = {
-        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, settings.noise_std**2)
-        for expert, one in forecast.predictions.items()
-    }
-    scales = tuple(scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
     n, late = len(accepted), settings.measurement_delay
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     stack = learned.stack
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
-    evidence = state.evidence
-    if state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt:
-        # All experts go on with this run alone, and are judged anew.
-        evidence, stack = (evidence[0].forget_earlier(), evidence[1].forget_earlier()), Stack.init()
-        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: errors[DOUBTING]}
-    learned = replace(learned.with_errors(errors), scales=(scales[0], scales[1]), stack=stack)
-    return replace(state, learned=learned, evidence=evidence)
+    stack = Stack.init() if state.disproved else stack
+    disproved = state.doubts and bool(stack.weights[DOUBTING] > CONSTANTS.doubt)
+    return replace(state, learned=replace(learned, stack=stack), disproved=disproved)
 
 
 def learn(
@@ -136,10 +161,10 @@ def learn(
     e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
     rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
     bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-    if fold and accepted.any():
+    if fold:
         of_command = fixed.command.rows(run.commands, window.x_d)
-        state = _folded(state, (rows, of_command), (e, e_0), bridged)
-        state = _judged(state, forecast, (e, e_0), accepted)
+        state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
+        state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
     past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
     n_rejected = run.n_rejected + m - int(accepted.sum())
     commands = np.concatenate((run.commands, window.x_d))[m:]

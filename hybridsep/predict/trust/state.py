@@ -45,6 +45,10 @@ __all__ = [
 OF_PHYSICS, OF_COMMAND, N_RESIDUALS = range(3)
 """Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
 
+_AHEAD = 20
+"""Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
+penalties come from: a controller factors most of that solution in them."""
+
 _ROUNDING = 1e-6
 """What rounding may have added to the sum of the stack's weights."""
 
@@ -158,8 +162,12 @@ class TrustedModel:
     learned : Learned
     evidence : pair of Evidence
         Rows of the residuals of the physics model, and of the command.
+    noise : tuple of float, m²
+        Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
     leading : int
         Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
+    disproved : bool
+        Whether earlier runs are forgotten when the next window is learned.
     run : RunState
     """
 
@@ -168,12 +176,38 @@ class TrustedModel:
     fixed: Parameters = field(metadata=FIXED)
     learned: Learned
     evidence: tuple[Evidence, Evidence]
+    noise: tuple[float, ...] = field(metadata=within())
     leading: int
+    disproved: bool
     run: RunState
 
     def kind_of(self, expert: int) -> int:
         """Return OF_COMMAND if an expert predicts the residual of the command, else OF_PHYSICS."""
         return OF_COMMAND if expert == COMMAND or (expert == DOUBTING and self.leading == COMMAND) else OF_PHYSICS
+
+    def noise_of(self, expert: int) -> float:
+        """Return the variance of the noise that an expert's penalties come from, m²; 0: none yet."""
+        return self.noise[expert - LAGGED]
+
+    @property
+    def early(self) -> int:
+        """Samples of a window after which its variances are taken."""
+        Np = self.fixed.settings.Np
+        return Np - min(Np // 2, _AHEAD)
+
+    def with_noise(self, learned: Learned) -> TrustedModel:
+        """Return the model with the variances of the noise that follow from what is learned so far."""
+        settings = self.fixed.settings
+
+        def noise(expert: int) -> float:
+            kind = self.kind_of(expert)
+            square = learned.scales[kind].largest_square
+            first = settings.noise_std**2 or CONSTANTS.first_noise * square
+            least = min(settings.lam, CONSTANTS.least_noise * square)
+            kept = CONSTANTS.less if expert == DOUBTING else 1.0
+            return learned.errors_of(expert).variance(self.evidence[kind].target_square(kept), first, least)
+
+        return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
 
     @property
     def doubts(self) -> bool:
@@ -221,7 +255,7 @@ def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Distur
     static = StaticFeatures(discrete, settings.q, settings.period, own)
     fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
     evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
-    return TrustedModel(fixed, Learned.init(fixed), evidence, LAGGED, RunState.init(fixed))
+    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, LAGGED, False, RunState.init(fixed))
 
 
 def restart(state: TrustedModel) -> TrustedModel:
@@ -233,7 +267,9 @@ def restart(state: TrustedModel) -> TrustedModel:
     if of_physics.earlier.n_rows > 0.0:
         stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
     learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
-    return TrustedModel(fixed, learned, (of_physics, of_command), leading, RunState.init(fixed))
+    evidence = of_physics, of_command
+    begun = TrustedModel(fixed, learned, evidence, state.noise, leading, False, RunState.init(fixed))
+    return begun.with_noise(learned)
 
 
 def plan_ahead(state: TrustedModel) -> TrustedModel:

@@ -178,7 +178,7 @@ static void linearised_of_increments(
     hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_word dead_time,
     hsep_real to[])
 {
-    const hsep_real *weights = hsep_at_const(expert, expert->weights), *lag_weights = weights + expert->n_static;
+    const hsep_real *weights = hsep_expert_weights(expert), *lag_weights = weights + expert->n_static;
     hsep_real *run = hsep_at(self, self->run);
     for (hsep_word u = 0; u < self->preview; u++) {
         hsep_real drive = 0.0;
@@ -261,7 +261,7 @@ HSEP_API void hsep_linearised_at(
     linearised_command(self, model, change);
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-        const hsep_real *weights = hsep_at_const(expert, expert->weights);
+        const hsep_real *weights = hsep_expert_weights(expert);
         if (hsep_trusted_kind_of(model, linearised_experts[i]) == HSEP_OF_COMMAND) {
             continue;
         }
@@ -318,7 +318,7 @@ static void linearised_filter(hsep_linearised *self, hsep_word count)
 /* The weights of the lags of an expert, each of them as often as a vector has lanes, and zeros behind them. */
 static void linearised_take_lags(hsep_linearised *self, const hsep_expert *expert)
 {
-    const hsep_real *weights = hsep_at_const(expert, expert->weights) + expert->n_static;
+    const hsep_real *weights = hsep_expert_weights(expert) + expert->n_static;
     hsep_real *lags = hsep_at(self, self->lags);
     for (hsep_word i = 0; i < expert->p + LINEARISED_TOGETHER - 1; i++) {
         for (int l = 0; l < HSEP_LANES; l++) {

@@ -22,13 +22,10 @@ static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *le
     return 1;
 }
 
-/* Rows of a triangle that are finished together. */
-#define CHOLESKY_PANEL 8
-
 /* Finish count rows, from row k of n on, from which the rows above have been subtracted; return whether they have
  * pivots. */
 static int cholesky_panel(
-    hsep_real *const rows[CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
+    hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
 {
     for (hsep_word r = 0; r < count; r++) {
         hsep_word above = 0;
@@ -48,12 +45,33 @@ static int cholesky_panel(
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[])
+/* Subtract from row i what count finished rows leave of it; length: of row i. */
+static void cholesky_take(
+    hsep_real row[], hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word i, hsep_word length)
 {
-    hsep_real *row = triangle;
-    for (hsep_word k = 0; k < n; k += CHOLESKY_PANEL) {
-        const hsep_word length = n - k, count = length < CHOLESKY_PANEL ? length : CHOLESKY_PANEL;
-        hsep_real *rows[CHOLESKY_PANEL] = {NULL};
+    hsep_real a[HSEP_CHOLESKY_PANEL];
+    const hsep_real *x[HSEP_CHOLESKY_PANEL];
+    for (hsep_word r = 0; r < count; r++) {
+        x[r] = rows[r] + (i - r);
+        a[r] = *x[r];
+    }
+    if (count == HSEP_CHOLESKY_PANEL) {
+        hsep_take_eight(row, a, x, length);
+        return;
+    }
+    for (hsep_word r = 0; r < count; r++) {
+        hsep_axpy(row, -a[r], x[r], length);
+    }
+}
+
+HSEP_API int hsep_cholesky_rows(
+    hsep_real triangle[], hsep_word n, hsep_word first, hsep_word last, const hsep_real least[])
+{
+    hsep_real *row = triangle + (hsep_word)(hsep_triangle(n) - hsep_triangle(n - first));
+    for (hsep_word k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
+        const hsep_word length = n - k, left = last - k;
+        const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+        hsep_real *rows[HSEP_CHOLESKY_PANEL] = {NULL};
         for (hsep_word r = 0; r < count; r++) {
             rows[r] = row;
             row += length - r;
@@ -62,37 +80,121 @@ HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_
             return 0;
         }
         hsep_real *y = row;
-        for (hsep_word i = CHOLESKY_PANEL; i < length; i++) { /* what they leave of the rows below */
-            hsep_real a[CHOLESKY_PANEL];
-            const hsep_real *x[CHOLESKY_PANEL];
-            for (hsep_word r = 0; r < CHOLESKY_PANEL; r++) {
-                x[r] = rows[r] + (i - r);
-                a[r] = *x[r];
-            }
-            hsep_take_eight(y, a, x, length - i);
+        for (hsep_word i = count; i < length; i++) { /* what they leave of the rows below */
+            cholesky_take(y, rows, count, i, length - i);
             y += length - i;
         }
     }
     return 1;
 }
 
+HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[])
+{
+    return hsep_cholesky_rows(triangle, n, 0, n, least);
+}
+
+/* The reflection of a pivot and the entries below it: its length, entries relative to the first one, and factor. */
+typedef struct {
+    hsep_real norm, v[4], tau;
+} cholesky_reflection;
+
+static cholesky_reflection cholesky_reflect(hsep_real pivot, const hsep_real x[], hsep_word stride, hsep_word count)
+{
+    cholesky_reflection self = {0.0, {0.0}, 0.0};
+    hsep_real square = pivot * pivot;
+    for (hsep_word i = 0; i < count; i++) {
+        square += x[stride * i] * x[stride * i];
+    }
+    self.norm = hsep_sqrt(square);
+    const hsep_real sum = pivot + self.norm;
+    for (hsep_word i = 0; i < count; i++) {
+        self.v[i] = x[stride * i] / sum;
+    }
+    self.tau = sum / self.norm;
+    return self;
+}
+
+HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[])
+{
+    hsep_real *row = triangle;
+    for (hsep_word k = 0; k < n; k++) {
+        const hsep_word length = n - k;
+        if (k >= head) {
+            hsep_axpy(row, x[k], x + k, length);
+        } else {
+            const cholesky_reflection h = cholesky_reflect(row[0], x + k, 0, 1);
+            const hsep_real v = h.v[0], tau = h.tau;
+            hsep_real *restrict r = row, *restrict y = x + k;
+            hsep_word j = 1;
+            for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
+                hsep_lanes *to = hsep_lanes_at(r + j), *from = hsep_lanes_at(y + j);
+                const hsep_lanes w = tau * (*to + v * *from);
+                *to = w - *to;
+                *from -= v * w;
+            }
+            for (; j < length; j++) {
+                const hsep_real w = tau * (r[j] + v * y[j]);
+                r[j] = w - r[j];
+                y[j] -= v * w;
+            }
+            row[0] = h.norm;
+        }
+        row += length;
+    }
+}
+
+HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[])
+{
+    hsep_real *row = triangle;
+    for (hsep_word k = 0; k < n; k++) {
+        const hsep_word length = n - k;
+        hsep_real *x0 = x + k, *x1 = x0 + n, *x2 = x1 + n, *x3 = x2 + n;
+        if (k >= head) {
+            const hsep_real a[4] = {-x0[0], -x1[0], -x2[0], -x3[0]};
+            const hsep_real *const all[4] = {x0, x1, x2, x3};
+            hsep_take_four(row, a, all, length);
+        } else {
+            const cholesky_reflection h = cholesky_reflect(row[0], x0, n, 4);
+            const hsep_real v0 = h.v[0], v1 = h.v[1], v2 = h.v[2], v3 = h.v[3], tau = h.tau;
+            hsep_word j = 1;
+            for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
+                hsep_lanes *to = hsep_lanes_at(row + j), *y0 = hsep_lanes_at(x0 + j), *y1 = hsep_lanes_at(x1 + j);
+                hsep_lanes *y2 = hsep_lanes_at(x2 + j), *y3 = hsep_lanes_at(x3 + j);
+                const hsep_lanes w = tau * (*to + ((v0 * *y0 + v1 * *y1) + (v2 * *y2 + v3 * *y3)));
+                *to = w - *to;
+                *y0 -= v0 * w;
+                *y1 -= v1 * w;
+                *y2 -= v2 * w;
+                *y3 -= v3 * w;
+            }
+            for (; j < length; j++) {
+                const hsep_real w = tau * (row[j] + ((v0 * x0[j] + v1 * x1[j]) + (v2 * x2[j] + v3 * x3[j])));
+                row[j] = w - row[j];
+                x0[j] -= v0 * w, x1[j] -= v1 * w, x2[j] -= v2 * w, x3[j] -= v3 * w;
+            }
+            row[0] = h.norm;
+        }
+        row += length;
+    }
+}
+
 HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[])
 {
     const hsep_real *row = triangle;
-    for (hsep_word first = 0; first < n; first += CHOLESKY_PANEL) { /* R' y = b */
-        const hsep_word left = n - first, count = left < CHOLESKY_PANEL ? left : CHOLESKY_PANEL;
-        const hsep_real *x[CHOLESKY_PANEL] = {NULL};
+    for (hsep_word first = 0; first < n; first += HSEP_CHOLESKY_PANEL) { /* R' y = b */
+        const hsep_word left = n - first, count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+        const hsep_real *x[HSEP_CHOLESKY_PANEL] = {NULL};
         hsep_real *y = b + first;
         for (hsep_word r = 0; r < count; r++) {
             y[r] /= row[0];
             for (hsep_word j = 1; r + j < count; j++) {
                 y[r + j] -= y[r] * row[j];
             }
-            x[r] = row + (CHOLESKY_PANEL - r);
+            x[r] = row + (HSEP_CHOLESKY_PANEL - r);
             row += left - r;
         }
-        if (left > CHOLESKY_PANEL) {
-            hsep_take_eight(y + CHOLESKY_PANEL, y, x, left - CHOLESKY_PANEL);
+        if (left > HSEP_CHOLESKY_PANEL) {
+            hsep_take_eight(y + HSEP_CHOLESKY_PANEL, y, x, left - HSEP_CHOLESKY_PANEL);
         }
     }
     for (hsep_word i = n; i-- > 0;) { /* R x = y */

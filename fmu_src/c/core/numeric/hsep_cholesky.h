@@ -9,6 +9,8 @@
 #include "hsep_api.h"
 #include "hsep_real.h"
 
+#define HSEP_CHOLESKY_PANEL 8 /* rows of a triangle that are finished together */
+
 /* Doubles of a triangle of n rows. */
 static inline hsep_real hsep_triangle(hsep_word n) { return 0.5 * (hsep_real)n * ((hsep_real)n + 1.0); }
 
@@ -16,6 +18,17 @@ static inline hsep_real hsep_triangle(hsep_word n) { return 0.5 * (hsep_real)n *
  * is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL: nothing is.
  * Cost: n^3 / 6 multiply-adds. */
 HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[]);
+
+/* The same for rows first ... last - 1 alone, behind others that are finished; what they leave is subtracted from the
+ * rows below. */
+HSEP_API int hsep_cholesky_rows(
+    hsep_real triangle[], hsep_word n, hsep_word first, hsep_word last, const hsep_real least[]);
+
+/* Take one row x, (n,), or four, (4, n), into a triangle of which the first head rows are finished: R' R becomes
+ * R' R + x' x, by a reflection of each pivot. The rows are used up. Cost: for each row about head (n - head / 2) times
+ * two, and (n - head)^2 / 2 multiply-adds. */
+HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[]);
+HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[]);
 
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
 HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[]);

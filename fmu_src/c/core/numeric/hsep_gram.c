@@ -32,11 +32,9 @@ HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
     hsep_gram got;
     memcpy(&got, block, sizeof got);
     (void)gram_lay_out(&got, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.waiting < HSEP_GRAM_TOGETHER && got.n_rows >= 0.0 &&
+    return memcmp(&got, block, sizeof got) == 0 && got.waiting <= HSEP_GRAM_TOGETHER && got.n_rows >= 0.0 &&
            got.n_rows <= HSEP_PREDICTION_MAX;
 }
-
-HSEP_API hsep_real *hsep_gram_row(hsep_gram *self) { return hsep_at(self, self->rows) + (self->n + 1) * self->waiting; }
 
 /* Add row a of the products of four rows, from its diagonal on, to the sums; their rounding errors are kept in the
  * carries and added back next time (Kahan 1965). */
@@ -85,12 +83,18 @@ static void gram_add_waiting(hsep_gram *self)
     }
 }
 
+HSEP_API hsep_real *hsep_gram_row(hsep_gram *self)
+{
+    if (self->waiting == HSEP_GRAM_TOGETHER) { /* only now: a window's last sample has enough to do */
+        gram_add_waiting(self);
+    }
+    return hsep_at(self, self->rows) + (self->n + 1) * self->waiting;
+}
+
 HSEP_API void hsep_gram_fold(hsep_gram *self)
 {
     self->n_rows += 1.0;
-    if (++self->waiting == HSEP_GRAM_TOGETHER) {
-        gram_add_waiting(self);
-    }
+    self->waiting++;
 }
 
 HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i)
@@ -145,105 +149,4 @@ HSEP_API hsep_real hsep_gram_square(const hsep_gram *self)
         square += *target * *target;
     }
     return square;
-}
-
-/* The triangle of the first m features with the target beside them: the target is the column behind the features, whose
- * last row is its square. other: NULL, or added with its weight. */
-static void gram_copy(
-    const hsep_gram *self, const hsep_gram *other, hsep_real weight, const hsep_real penalties[], hsep_word m,
-    hsep_real to[])
-{
-    const hsep_word n = self->n;
-    const hsep_real *sums = hsep_at_const(self, self->sums), *rows = hsep_at_const(self, self->rows);
-    const hsep_real *others = other != NULL ? hsep_at_const(other, other->sums) : NULL;
-    for (hsep_word i = 0; i < m; i++) {
-        memcpy(to, sums, (size_t)(m - i) * sizeof(hsep_real));
-        to[m - i] = sums[n - i];
-        if (others != NULL) {
-            hsep_axpy(to, weight, others, m - i);
-            to[m - i] += weight * others[n - i];
-            others += n + 1 - i;
-        }
-        for (hsep_word b = 0; b < self->waiting; b++) {
-            const hsep_real *row = rows + (n + 1) * b;
-            hsep_axpy(to, row[i], row + i, m - i);
-            to[m - i] += row[i] * row[n];
-        }
-        to[0] += penalties[i];
-        to += m + 1 - i;
-        sums += n + 1 - i;
-    }
-}
-
-HSEP_API hsep_real hsep_gram_solve(
-    const hsep_gram *self, const hsep_gram *other, hsep_real weight, const hsep_real penalties[], hsep_word m,
-    hsep_real factor[], hsep_real least[], hsep_real w[])
-{
-    const hsep_real square = hsep_gram_square(self) + (other != NULL ? weight * hsep_gram_square(other) : 0.0);
-    hsep_real *row = factor + (hsep_word)hsep_triangle(m + 1) - 1;
-    gram_copy(self, other, weight, penalties, m, factor);
-    for (hsep_word i = 0; i < m; i++) {
-        least[i] = penalties[i] > HSEP_GRAM_LEAST ? penalties[i] : HSEP_GRAM_LEAST;
-    }
-    row[0] = square;
-    least[m] = hsep_fmax(HSEP_GRAM_OF_TARGET * square, HSEP_GRAM_LEAST);
-    (void)hsep_cholesky_factor(factor, m + 1, least); /* no pivot is 0 */
-    hsep_real sum = row[0] * row[0];                  /* sum of the squares, and of the penalties */
-    for (hsep_word i = m; i-- > 0;) {                 /* R w = z */
-        row -= m + 1 - i;
-        w[i] = (row[m - i] - hsep_dot(row + 1, w + i + 1, m - i - 1)) / row[0];
-        sum -= penalties[i] * w[i] * w[i];
-    }
-    return hsep_fmax(sum, 0.0);
-}
-
-/* x_j -= y_0 r_0j + y_1 r_1j + y_2 r_2j + y_3 r_3j for the entries j behind four, of HSEP_GRAM_ABREAST rows side by
- * side. r: four rows of R. */
-static void gram_take(
-    hsep_real *restrict x, const hsep_real y[4 * HSEP_GRAM_ABREAST], const hsep_real *const r[4], hsep_word n)
-{
-    const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-    hsep_lanes at[4 * HSEP_OF_FOUR];
-    memcpy(at, y, sizeof at);
-    for (hsep_word j = 0; j < n; j++, x += HSEP_GRAM_ABREAST) {
-        hsep_lanes *to = hsep_lanes_at(x);
-        for (int l = 0; l < HSEP_OF_FOUR; l++) {
-            to[l] -= (r0[j] * at[l] + r1[j] * at[HSEP_OF_FOUR + l]) +
-                     (r2[j] * at[2 * HSEP_OF_FOUR + l] + r3[j] * at[3 * HSEP_OF_FOUR + l]);
-        }
-    }
-}
-
-HSEP_API void hsep_gram_leverages(
-    const hsep_real factor[], hsep_word m, hsep_real rows[], hsep_real leverages[HSEP_GRAM_ABREAST])
-{
-    hsep_lanes sums[HSEP_OF_FOUR];
-    const hsep_real *row = factor;
-    memset(leverages, 0, HSEP_GRAM_ABREAST * sizeof *leverages);
-    memcpy(sums, leverages, sizeof sums);
-    /* R' y = phi from the first feature to the last, which takes each of them from the entries behind it. */
-    for (hsep_word first = 0; first < m; first += 4) {
-        const hsep_word left = m - first, height = left < 4 ? left : 4;
-        hsep_real *x = rows + HSEP_GRAM_ABREAST * first;
-        const hsep_real *r[4] = {NULL};
-        for (hsep_word i = 0; i < height; i++) {
-            hsep_lanes *y = hsep_lanes_at(x) + HSEP_OF_FOUR * i;
-            const hsep_real inverse = 1.0 / row[0];
-            for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                y[l] *= inverse;
-                sums[l] += y[l] * y[l];
-            }
-            for (hsep_word j = 1; i + j < height; j++) {
-                for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    y[HSEP_OF_FOUR * j + (hsep_word)l] -= row[j] * y[l];
-                }
-            }
-            r[i] = row + (height - i);
-            row += m + 1 - (first + i);
-        }
-        if (left > 4) {
-            gram_take(x + 4 * HSEP_GRAM_ABREAST, x, r, left - 4);
-        }
-    }
-    memcpy(leverages, sums, sizeof sums);
 }

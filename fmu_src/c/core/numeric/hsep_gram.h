@@ -29,11 +29,10 @@
 #endif
 
 #define HSEP_GRAM_TOGETHER 4 /* rows that are added in one go */
-#define HSEP_GRAM_ABREAST 4  /* rows whose leverages are computed side by side */
 
 typedef struct {
     hsep_word n;       /* features */
-    hsep_word waiting; /* rows that are not added yet, fewer than HSEP_GRAM_TOGETHER */
+    hsep_word waiting; /* rows that are not added yet */
     hsep_real n_rows;  /* rows so far, weighted */
     /* Offsets in words from the beginning of the struct */
     hsep_word rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
@@ -65,24 +64,10 @@ HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 
-/* Add the rows that wait to the sums now, so that hsep_gram_solve need not; called before the last row of a window. */
+/* Add the rows that wait to the sums now, before they are read or saved. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
 /* Sum of the squares of the targets, m2. */
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self);
-
-/* Solve for the weights w, (m,), of the first m features; with the rows of other, settled and of the same features,
- * weighed by weight, or NULL. penalties: (m,) > 0; factor: triangle of m + 1 rows, [R z; 0 rho] with R' R = gram +
- * penalties afterwards, by rows from the diagonal on; least: (m + 1,), work. Return the first sum, of which rounding
- * leaves 1e-14 of the square of the targets. Cost: m^3 / 6 + m^2 multiply-adds, and m^2 / 2 for each row that waits. */
-HSEP_API hsep_real hsep_gram_solve(
-    const hsep_gram *self, const hsep_gram *other, hsep_real weight, const hsep_real penalties[], hsep_word m,
-    hsep_real factor[], hsep_real least[], hsep_real w[]);
-
-/* phi' (R' R)^-1 phi of HSEP_GRAM_ABREAST rows phi, entry after entry side by side in rows, which is used up: the
- * variances of w' phi relative to the variance of the noise. factor: from hsep_gram_solve. Cost: m^2 / 2 multiply-adds
- * for each. */
-HSEP_API void hsep_gram_leverages(
-    const hsep_real factor[], hsep_word m, hsep_real rows[], hsep_real leverages[HSEP_GRAM_ABREAST]);
 
 #endif

@@ -126,8 +126,8 @@ HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self)
 {
     const hsep_word part = (self->Np - 1) / residual_parts + 1;
-    /* Two at least, because the spread of errors follows from differences. */
-    return self->trusted ? (part > 2 ? part : 2) : self->Np;
+    /* Two at least, because the spread of errors follows from differences; variances come side by side. */
+    return self->trusted ? (part > HSEP_SOLUTION_ABREAST ? part : HSEP_SOLUTION_ABREAST) : self->Np;
 }
 
 HSEP_API void hsep_residual_predict(

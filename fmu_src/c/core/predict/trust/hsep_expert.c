@@ -1,6 +1,5 @@
 #include "hsep_expert.h"
 
-#include "hsep_cholesky.h"
 #include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
@@ -23,15 +22,13 @@ HSEP_API void hsep_residual_scale_follow(
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
 {
-    const hsep_real window = (hsep_real)shape->n, lags = (hsep_real)shape->p, n = (hsep_real)shape->n_static + lags;
+    const hsep_real window = (hsep_real)shape->n, lags = (hsep_real)shape->p;
     hsep_real end = HSEP_WORDS(hsep_expert);
     self->Np = shape->Np;
     self->n = shape->n;
     self->n_static = shape->n_static;
     self->p = shape->p;
     self->lag_scales = hsep_take(&end, lags);
-    self->penalties = hsep_take(&end, n);
-    self->weights = hsep_take(&end, n);
     self->run = hsep_take(&end, window + lags);
     self->unshrunk = hsep_take(&end, window + lags);
     self->e_h = hsep_take(&end, window);
@@ -39,8 +36,7 @@ static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shap
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
-    self->factor = hsep_take(&end, hsep_triangle(shape->n_static + shape->p + 1));
-    self->side_by_side = hsep_take(&end, HSEP_GRAM_ABREAST * (n + 1.0));
+    self->solution = hsep_take_block(&end, hsep_solution_size(shape->p, shape->n_static, shape->ahead));
     return end * sizeof(hsep_real);
 }
 
@@ -50,6 +46,7 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 {
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
+    hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->ahead);
     for (hsep_word i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
             hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
@@ -59,31 +56,42 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape)
 {
     hsep_expert got;
-    return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape));
+    return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape)) &&
+           hsep_solution_valid(hsep_at_bytes(block, got.solution), shape->p, shape->n_static, shape->ahead);
 }
 
-HSEP_API void hsep_expert_solve(
-    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
-    const hsep_real scales[], hsep_real first, hsep_real least)
+/* Least sum of squares that counts, of targets whose squares have a sum. */
+static hsep_real expert_resolved(hsep_real square)
+{
+    return hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_GRAM_RESOLUTION) * square;
+}
+
+HSEP_API void hsep_expert_begin_solution(
+    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
+    hsep_real least)
 {
     const hsep_gram *of_run = hsep_evidence_of_run(evidence), *earlier = hsep_evidence_earlier(evidence);
-    const hsep_real n_rows = of_run->n_rows + weight * earlier->n_rows;
     const hsep_real of_earlier = earlier->n_rows > 0.0 ? weight * hsep_gram_square(earlier) : 0.0;
-    const hsep_real resolved =
-        hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_GRAM_RESOLUTION) * (hsep_gram_square(of_run) + of_earlier);
+    const hsep_real resolved = expert_resolved(hsep_gram_square(of_run) + of_earlier);
     const hsep_real noise = errors->noise_variance > 0.0 ? errors->noise_variance : first;
-    const hsep_word n = self->n_static + self->p;
-    hsep_real *penalties = hsep_at(self, self->penalties);
+    hsep_solution *solution = hsep_expert_solution(self);
+    hsep_real *penalties = hsep_at(solution, solution->penalties) + self->n_static;
+    const hsep_real *scales = hsep_at(self, self->lag_scales);
     self->variance = hsep_fmax(hsep_fmax(noise, least), resolved) * errors->correlation;
-    memcpy(penalties, scales, (size_t)self->n_static * sizeof(hsep_real));
-    memcpy(penalties + self->n_static, hsep_at(self, self->lag_scales), (size_t)self->p * sizeof(hsep_real));
-    for (hsep_word i = 0; i < n; i++) {
-        penalties[i] = self->variance / (penalties[i] * penalties[i]);
+    for (hsep_word i = 0; i < self->p; i++) {
+        penalties[i] = self->variance / (scales[i] * scales[i]);
     }
-    const hsep_real sum = hsep_gram_solve(
-        of_run, earlier->n_rows > 0.0 ? earlier : NULL, weight, penalties, n, hsep_at(self, self->factor),
-        hsep_at(self, self->side_by_side), hsep_at(self, self->weights));
-    self->rows_variance = hsep_fmax(sum, resolved) / n_rows;
+    hsep_solution_begin(solution, of_run, earlier->n_rows > 0.0 ? earlier : NULL, weight);
+}
+
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[])
+{
+    hsep_solution *solution = hsep_expert_solution(self);
+    hsep_real *penalties = hsep_at(solution, solution->penalties);
+    for (hsep_word i = 0; i < self->n_static; i++) {
+        penalties[i] = self->variance / (scales[i] * scales[i]);
+    }
+    self->rows_variance = hsep_fmax(hsep_solution_finish(solution), expert_resolved(solution->square)) / n_rows;
 }
 
 /* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
@@ -91,7 +99,7 @@ HSEP_API void hsep_expert_solve(
 static void expert_free_run(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last)
 {
     const hsep_word n_static = self->n_static;
-    const hsep_real *weights = hsep_at(self, self->weights), *lag_weights = weights + n_static;
+    const hsep_real *weights = hsep_expert_weights(self), *lag_weights = weights + n_static;
     hsep_real *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
     rows += first * n_static;
     for (hsep_word k = first; k < last; k++, rows += n_static) {
@@ -105,7 +113,7 @@ static void expert_free_run(hsep_expert *self, const hsep_real rows[], hsep_word
 static void expert_respond(hsep_expert *self, hsep_word first, hsep_word last)
 {
     const hsep_word n = self->n;
-    const hsep_real *lag_weights = hsep_at(self, self->weights) + self->n_static;
+    const hsep_real *lag_weights = hsep_expert_weights(self) + self->n_static;
     hsep_real *response = hsep_at(self, self->response), *squares = hsep_at(self, self->squares);
     for (hsep_word k = first; k < last; k++) {
         const hsep_word j = n - 1 - k;
@@ -119,22 +127,23 @@ static void expert_respond(hsep_expert *self, hsep_word first, hsep_word last)
 /* Largest variance that counts, m2. */
 static hsep_real expert_most(const hsep_expert *self) { return HSEP_EXPERT_DIVERGED * self->bound * self->bound; }
 
-/* Variances of the rows of count samples from k on, at most HSEP_GRAM_ABREAST. */
+/* Variances of the rows of count samples from k on, at most HSEP_SOLUTION_ABREAST. */
 static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_word k, hsep_word count)
 {
     const hsep_word n_static = self->n_static, p = self->p;
-    hsep_real *to = hsep_at(self, self->side_by_side), leverages[HSEP_GRAM_ABREAST];
-    for (hsep_word c = 0; c < HSEP_GRAM_ABREAST; c++) {
+    hsep_solution *solution = hsep_expert_solution(self);
+    hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
+    for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
         const hsep_word sample = k + (c < count ? c : count - 1); /* what is beyond is a copy */
         const hsep_real *row = rows + sample * n_static, *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
-        for (hsep_word i = 0; i < n_static; i++) {
-            to[HSEP_GRAM_ABREAST * i + c] = row[i];
-        }
         for (hsep_word i = 0; i < p; i++) {
-            to[HSEP_GRAM_ABREAST * (n_static + i) + c] = lags[i];
+            to[HSEP_SOLUTION_ABREAST * i + c] = lags[i];
+        }
+        for (hsep_word i = 0; i < n_static; i++) {
+            to[HSEP_SOLUTION_ABREAST * (p + i) + c] = row[i];
         }
     }
-    hsep_gram_leverages(hsep_at(self, self->factor), n_static + p, to, leverages);
+    hsep_solution_leverages(solution, leverages);
     for (hsep_word c = 0; c < count; c++) {
         hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c];
     }
@@ -172,8 +181,8 @@ HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_w
     if (self->p > 0) {
         expert_respond(self, first, last);
     }
-    for (hsep_word k = first; k < last; k += HSEP_GRAM_ABREAST) {
-        expert_vary_rows(self, rows, k, last - k < HSEP_GRAM_ABREAST ? last - k : HSEP_GRAM_ABREAST);
+    for (hsep_word k = first; k < last; k += HSEP_SOLUTION_ABREAST) {
+        expert_vary_rows(self, rows, k, last - k < HSEP_SOLUTION_ABREAST ? last - k : HSEP_SOLUTION_ABREAST);
     }
     for (hsep_word k = first; k < last; k++) {
         kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, k));
@@ -205,17 +214,17 @@ HSEP_API void hsep_expert_predict(
 
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
-    hsep_real given)
+    hsep_word n, hsep_real given)
 {
     const hsep_real *unshrunk = hsep_at_const(self, self->unshrunk) + (self->n - self->Np); /* of the window */
-    hsep_real sum = 0.0, n = 0.0;
-    for (hsep_word j = 0; j < self->Np; j++) {
+    hsep_real sum = 0.0, count = 0.0;
+    for (hsep_word j = self->Np - n; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
-        n += accepted[j];
+        count += accepted[j];
     }
     errors->noise_variance = given > 0.0 ? given : self->rows_variance;
     if (errors->noise_variance > 0.0) {
-        const hsep_real seen = hsep_fmin(sum * sum / n / errors->noise_variance, HSEP_EXPERT_DIVERGED);
+        const hsep_real seen = hsep_fmin(sum * sum / count / errors->noise_variance, HSEP_EXPERT_DIVERGED);
         errors->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - errors->correlation);
         errors->correlation = hsep_fmin(hsep_fmax(errors->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
     }

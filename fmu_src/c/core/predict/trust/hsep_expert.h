@@ -11,6 +11,7 @@
 #include "hsep_evidence.h"
 #include "hsep_layout.h"
 #include "hsep_real.h"
+#include "hsep_solution.h"
 
 /* Size of the residuals so far. */
 typedef struct {
@@ -27,6 +28,7 @@ typedef struct {
 typedef struct {
     hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
     hsep_word n_static, p; /* features without lags, lags */
+    hsep_word ahead;       /* samples of a window that come once its solution is begun */
 } hsep_expert_shape;
 
 typedef struct {
@@ -36,24 +38,21 @@ typedef struct {
     hsep_real largest_square; /* m2, largest mean square of a window, and */
     hsep_real bound;          /* m, bound on the prediction, as it was made */
     /* Offsets in words from the beginning of the struct */
-    hsep_word lag_scales;   /* (p,) prior standard deviations of the weights of the lags */
-    hsep_word penalties;    /* (n_static + p,) of the weights */
-    hsep_word weights;      /* (n_static + p,) */
-    hsep_word run;          /* (n + p,) m, the recursion, behind it measured residuals */
-    hsep_word unshrunk;     /* (n + p,) m, the same within bounds */
-    hsep_word e_h;          /* (n,) m, shrunk by its variance, and bounded */
-    hsep_word kept;         /* (n,) what the variance leaves of it */
-    hsep_word response;     /* (n + p,) the recursion's impulse response, behind it 0 */
-    hsep_word squares;      /* (n,) its squares, oldest first */
-    hsep_word variances;    /* (n,) m2, of the rows */
-    hsep_word factor;       /* triangle of the solution, n_static + p + 1 rows */
-    hsep_word side_by_side; /* (n_static + p + 1, HSEP_GRAM_ABREAST) rows whose variances are computed, work */
+    hsep_word lag_scales; /* (p,) prior standard deviations of the weights of the lags */
+    hsep_word run;        /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_word unshrunk;   /* (n + p,) m, the same within bounds */
+    hsep_word e_h;        /* (n,) m, shrunk by its variance, and bounded */
+    hsep_word kept;       /* (n,) what the variance leaves of it */
+    hsep_word response;   /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_word squares;    /* (n,) its squares, oldest first */
+    hsep_word variances;  /* (n,) m2, of the rows */
+    hsep_word solution;   /* hsep_solution, whose head are the lags */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
-HSEP_ASSERT_WORDS(hsep_expert_shape, 4);
+HSEP_ASSERT_WORDS(hsep_expert_shape, 5);
 HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
-HSEP_ASSERT_WORDS(hsep_expert, 20);
+HSEP_ASSERT_WORDS(hsep_expert, 17);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
 HSEP_API void hsep_residual_scale_follow(
@@ -63,12 +62,27 @@ HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
 HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
 
-/* Solve for the weights from all rows, rows of earlier runs weighed by weight. scales: (n_static,) prior standard
- * deviations of the weights without lags; first, least: m2, variance of the noise while it is not known, and the least
- * one. Costs a hsep_gram_solve. */
-HSEP_API void hsep_expert_solve(
-    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors,
-    const hsep_real scales[], hsep_real first, hsep_real least);
+static inline hsep_solution *hsep_expert_solution(hsep_expert *self)
+{
+    return (hsep_solution *)hsep_at(self, self->solution);
+}
+
+/* Weights of the features without lags, then of the lags, (n_static + p,). */
+static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
+{
+    const hsep_solution *solution = (const hsep_solution *)hsep_at_const(self, self->solution);
+    return hsep_at_const(solution, solution->weights);
+}
+
+/* Begin to solve for the weights from the rows so far, both parts of them settled, rows of earlier runs weighed by
+ * weight. first, least: m2, variance of the noise while it is not known, and the least one. */
+HSEP_API void hsep_expert_begin_solution(
+    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
+    hsep_real least);
+
+/* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
+ * without lags. Costs a hsep_solution_finish. */
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[]);
 
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
@@ -81,13 +95,14 @@ HSEP_API void hsep_expert_predict(
     hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied);
 
 /* Compute the variance of samples first ... last - 1 of that prediction, if samples before them have theirs, and
- * shrink them by it. Each costs a quarter of hsep_gram_leverages and last multiply-adds. */
+ * shrink them by it. Each costs a quarter of hsep_solution_leverages and last multiply-adds. */
 HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
 
-/* Estimate noise and correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1
- * where it counts, which one does at least; given: m2, variance of the noise, if it is known; else 0. */
+/* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
+ * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the
+ * noise, if it is known; else 0. */
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
-    hsep_real given);
+    hsep_word n, hsep_real given);
 
 #endif

@@ -21,6 +21,9 @@
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
 
+/* Rows that a solution takes in at a sample once its head is factored, in the mean. */
+#define HSEP_TRUSTED_ROWS 8
+
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
 typedef struct {
@@ -35,6 +38,7 @@ typedef struct {
 typedef struct {
     hsep_word Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
     hsep_word late;               /* samples by which the measurement is late */
+    hsep_word early;              /* samples of a window after which the next one's solutions begin */
     hsep_real T_s;                /* s */
     hsep_real least_variance;     /* m2, of the noise */
     hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
@@ -42,6 +46,7 @@ typedef struct {
     hsep_real kept;               /* weight of earlier rows, from window to window */
     hsep_word
         leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
+    hsep_word disproved; /* whether earlier runs are forgotten when the next window is learned */
     hsep_reach reach;
     hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
@@ -74,7 +79,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    31 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    33 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
@@ -104,6 +109,14 @@ HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expe
 
 /* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
+
+/* The solution of an expert; NULL where no rows train it. */
+HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert);
+
+/* Begin the solutions from the rows so far, with variances of the noise as they are known then. scales:
+ * (HSEP_N_RESIDUALS,) of the residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_LAGGED on. */
+HSEP_API void hsep_trusted_begin_solutions(
+    hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);

@@ -56,9 +56,10 @@ static int trusted_scale(
 static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
 {
     const hsep_word kind = hsep_trusted_kind_of(self, place);
+    hsep_evidence *evidence = hsep_trusted_evidence(self, kind);
+    const hsep_real n_rows = hsep_evidence_of_run(evidence)->n_rows + weight * hsep_evidence_earlier(evidence)->n_rows;
     const hsep_real square = self->learned.scales[kind].largest_square;
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
-    const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
     hsep_expert *expert = hsep_trusted_expert(self, place);
     hsep_real scales[TRUSTED_MOST];
     for (hsep_word i = 0; i < expert->n_static; i++) {
@@ -69,9 +70,7 @@ static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
                                            : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / hsep_fmax(largest, HSEP_TRUSTED_LEAST);
     }
-    hsep_expert_solve(
-        expert, hsep_trusted_evidence(self, kind), weight, &self->learned.errors[place - HSEP_LAGGED], scales, first,
-        hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square));
+    hsep_expert_solve(expert, n_rows, scales);
 }
 
 /* Solve for the weights of the experts that know something. */
@@ -87,6 +86,7 @@ static void trusted_solved(hsep_trusted *self, int outgrown)
     predicted[HSEP_COMMAND] = known[HSEP_OF_COMMAND];
     predicted[HSEP_DOUBTING] = predicted[self->leading] && hsep_trusted_doubts(self);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        predicted[i] = predicted[i] && hsep_trusted_expert(self, i)->variance > 0.0;
         if (predicted[i]) {
             trusted_solve(self, i, i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0);
         }

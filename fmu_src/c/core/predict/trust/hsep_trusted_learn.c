@@ -24,17 +24,32 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
-/* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. */
-static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
+/* Forget what is not believed any more before a window: rows at lower velocities, if it outgrows them, and earlier
+ * runs, if they are disproved. */
+static void trusted_forget(hsep_trusted *self)
+{
+    if (self->forecast_scale != self->learned.velocity_scale) {
+        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
+        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+        hsep_stack_forget(&self->learned.stack, HSEP_DOUBTING);
+    }
+    for (hsep_word i = 0; self->disproved && i < HSEP_N_RESIDUALS; i++) {
+        hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
+    }
+}
+
+/* Begin to follow a window: take over its scales; the rows so far fade if it is learned, fold. */
+static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], int fold)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     hsep_command *command = hsep_trusted_command(self);
     hsep_learned *learned = &self->learned;
     hsep_real before = disturbances->before.x_pb[0];
-    if (self->forecast_scale != learned->velocity_scale) {
-        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
-        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
-        hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
+    trusted_forget(self);
+    for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) { /* of more rows than can be counted, half */
+        hsep_evidence *evidence = hsep_trusted_evidence(self, i);
+        const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
+        hsep_evidence_discount(evidence, countable ? self->kept : 0.5 * self->kept);
     }
     learned->velocity_scale = self->forecast_scale;
     learned->largest_step = self->forecast_step;
@@ -89,21 +104,75 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
+    for (hsep_word i = HSEP_LAGGED; k >= self->early && i < HSEP_N_EXPERTS; i++) { /* their solutions have begun */
+        hsep_solution *solution = hsep_trusted_solution(self, i);
+        if (hsep_trusted_kind_of(self, i) == kind && solution != NULL) {
+            hsep_solution_row(solution, to, lags[-1]);
+        }
+    }
     hsep_gram_fold(gram);
 }
 
-/* Judge the next sample, and if it is believed, take in the samples since the last believed one: their residuals are
- * linear in time between both. fold: whether it is learned. */
-static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
+/* Judge the experts by the residuals e of the first n samples of their window, one of which counts at least. */
+static void trusted_judge_experts(
+    hsep_trusted *self, const hsep_real e[], hsep_word n, hsep_residual_scale scales[], hsep_expert_errors errors[])
 {
-    const hsep_word k = self->followed++, j = self->Np - 1 - k, known = self->Np - self->known;
-    const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_reach_judge(&self->reach, measured, self->T_s);
-    hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
-    hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
-    if (!accepted) {
-        return;
+    const hsep_real *accepted = hsep_at(self, self->accepted);
+    const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
+    const hsep_word first = self->Np - n;
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_judge(
+                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
+                accepted, n, self->given_variance);
+        }
     }
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+        hsep_residual_scale_follow(&scales[i], residuals[i] + first, accepted + first, n, self->n_accepted);
+    }
+    if (self->disproved) { /* all experts go on with this run alone, and are judged anew */
+        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+    }
+}
+
+/* Begin the solutions for the next window, as far as this one, whose residuals are e, is known. */
+static void trusted_begin_solutions(hsep_trusted *self, const hsep_real e[])
+{
+    hsep_residual_scale scales[HSEP_N_RESIDUALS];
+    hsep_expert_errors errors[HSEP_N_JUDGED];
+    memcpy(scales, self->learned.scales, sizeof scales);
+    memcpy(errors, self->learned.errors, sizeof errors);
+    if (self->n_accepted > 0.0) {
+        trusted_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
+    }
+    hsep_trusted_begin_solutions(self, scales, errors);
+}
+
+/* Go on with them after sample last - 1: their heads are factored before the last rows come. */
+static void trusted_advance(hsep_trusted *self, hsep_word last)
+{
+    const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / HSEP_TRUSTED_ROWS + 1;
+    hsep_real amount = 0.0;
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const hsep_solution *solution = hsep_trusted_solution(self, i);
+        amount += solution != NULL ? hsep_solution_left(solution) : 0.0;
+    }
+    amount /= left > of_rows + 1 ? (hsep_real)(left - of_rows) : 1.0;
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        hsep_solution *solution = hsep_trusted_solution(self, i);
+        if (solution != NULL) {
+            amount = hsep_solution_advance(solution, amount, left == 1);
+        }
+    }
+}
+
+/* Take in sample k, which is believed, and the samples since the last believed one: their residuals are linear in time
+ * between both. fold: whether it is learned. */
+static void trusted_believe(
+    hsep_trusted *self, hsep_word k, const hsep_real x_pb[], hsep_real e[], hsep_real measured, int fold)
+{
+    const hsep_word j = self->Np - 1 - k, known = self->Np - self->known;
     e[j] = measured;
     const hsep_real slope = (e[j] - e[known]) / (hsep_real)(known - j);
     for (hsep_word i = known - 1; i > j; i--) {
@@ -111,12 +180,7 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
     }
     trusted_take_rows(self, x_pb, e, k + 1);
     for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
-        hsep_evidence *evidence = hsep_trusted_evidence(self, i);
         const hsep_command *command = hsep_trusted_command(self);
-        if (!(self->n_accepted > 0.0)) { /* of more rows than can be counted without rounding, half */
-            const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
-            hsep_evidence_discount(evidence, countable ? self->kept : 0.5 * self->kept);
-        }
         if (i == HSEP_OF_COMMAND) {
             trusted_fold(self, i, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
         } else {
@@ -126,18 +190,34 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
     self->n_accepted += 1.0;
 }
 
+/* Judge the next sample, and take it in if it is believed. */
+static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
+{
+    const hsep_word k = self->followed++, j = self->Np - 1 - k;
+    const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
+    const int accepted = hsep_reach_judge(&self->reach, measured, self->T_s);
+    hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
+    hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
+    if (accepted) {
+        trusted_believe(self, k, x_pb, e, measured, fold);
+    }
+    if (fold && self->followed == self->early) {
+        trusted_begin_solutions(self, e);
+    }
+}
+
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last)
 {
     if (self->followed == 0 && last > 0) {
-        trusted_begin_window(self, x_d, x_pb);
+        trusted_begin_window(self, x_d, x_pb, 1);
     }
+    const int begun = self->followed >= self->early;
     for (hsep_word i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
         trusted_follow_sample(self, x_pb, e, 1);
     }
-    for (hsep_word i = 0; last + 1 == self->Np && i < HSEP_N_RESIDUALS;
-         i++) { /* the solution comes with the next row */
-        hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
+    if (begun && last < self->Np) {
+        trusted_advance(self, last);
     }
 }
 
@@ -177,30 +257,13 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 /* Judge the experts and their stack by the measurement of their window. */
 static void trusted_judge(hsep_trusted *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted);
-    const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
     hsep_learned *learned = &self->learned;
-    hsep_expert_errors *errors = learned->errors;
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            hsep_expert_judge(
-                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
-                accepted, self->given_variance);
-        }
-    }
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-        hsep_residual_scale_follow(&learned->scales[i], residuals[i], accepted, self->Np, self->n_accepted);
-    }
+    trusted_judge_experts(self, e, self->Np, learned->scales, learned->errors);
     trusted_judge_stack(self, e);
-    if (hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
-        /* All experts go on with this run alone, and are judged anew. */
-        for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-            hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
-        }
-        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+    if (self->disproved) {
         hsep_stack_init(&learned->stack);
     }
+    self->disproved = hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT;
 }
 
 HSEP_API void hsep_trusted_learn(
@@ -209,7 +272,7 @@ HSEP_API void hsep_trusted_learn(
     const hsep_word p = self->p, of_command = hsep_trusted_command(self)->p;
     hsep_real *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     if (self->followed == 0) {
-        trusted_begin_window(self, x_d, x_pb);
+        trusted_begin_window(self, x_d, x_pb, fold);
     }
     while (self->followed < self->Np) {
         trusted_follow_sample(self, x_pb, e, fold);

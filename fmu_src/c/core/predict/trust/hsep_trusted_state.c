@@ -4,6 +4,7 @@
 #include "hsep_math.h"
 #include "hsep_range.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static const hsep_range trusted_ranges[] = {HSEP_LEARNED_RANGES};
@@ -23,9 +24,11 @@ HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expe
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, hsep_word expert)
 {
     if (hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND) {
-        return (hsep_expert_shape){self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND};
+        return (hsep_expert_shape){
+            self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, self->Np - self->early};
     }
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, expert == HSEP_STATIC ? 0 : self->p};
+    const hsep_word p = expert == HSEP_STATIC ? 0 : self->p;
+    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, self->Np - self->early};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
@@ -49,6 +52,7 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = settings->measurement_delay;
+    self->early = self->Np - (self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
@@ -105,7 +109,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
     hsep_trusted got;
     int sound = HSEP_LAID_OUT(got, block, trusted_lay_out(&got, parameters)) &&
                 (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 &&
+                got.known <= got.followed && got.reach.known <= 1 && got.disproved <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -122,6 +126,31 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self)
 {
     return hsep_evidence_earlier(hsep_trusted_evidence(self, HSEP_OF_PHYSICS))->n_rows > 0.0;
+}
+
+HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert)
+{
+    const int trained = expert != HSEP_HOLD && (expert != HSEP_DOUBTING || hsep_trusted_doubts(self));
+    return trained ? hsep_expert_solution(hsep_trusted_expert(self, expert)) : NULL;
+}
+
+HSEP_API void hsep_trusted_begin_solutions(
+    hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[])
+{
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+        hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
+    }
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const hsep_word kind = hsep_trusted_kind_of(self, i);
+        const hsep_real square = scales[kind].largest_square, weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
+        const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
+        const hsep_real least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square);
+        if (hsep_trusted_solution(self, i) != NULL) {
+            hsep_expert_begin_solution(
+                hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors[i - HSEP_LAGGED],
+                first, least);
+        }
+    }
 }
 
 HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self)
@@ -152,10 +181,14 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     const hsep_expert_shape shape = trusted_shape(self, HSEP_DOUBTING);
     hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
-    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
+    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = self->disproved = 0;
     hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);
+    }
+    hsep_trusted_begin_solutions(self, learned->scales, learned->errors);
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        (void)hsep_solution_advance(hsep_expert_solution(hsep_trusted_expert(self, i)), INFINITY, 0);
     }
 }

@@ -1,0 +1,65 @@
+/* Weights from a Gram matrix with a penalty of its own on each, solved as rows come.
+ *
+ * R' R = gram + penalties, where the head of the features has penalties that are known before the last rows are, and
+ * the tail not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
+ * hsep_solution_row takes rows that come meanwhile, each into the factor by a reflection. What is left for
+ * hsep_solution_finish are the last row and the tail. The solution is the same to rounding as with all rows at once.
+ *
+ * Rows of a Gram matrix have the tail first. A block as hsep_layout.h has them.
+ */
+#ifndef HSEP_SOLUTION_H
+#define HSEP_SOLUTION_H
+
+#include "hsep_gram.h"
+
+#define HSEP_SOLUTION_ABREAST 4 /* rows whose leverages are computed side by side */
+
+typedef struct {
+    hsep_word n_head, n_tail; /* features */
+    hsep_word room;           /* rows that may come before the head is factored */
+    hsep_word factored;       /* rows of the head that are */
+    hsep_word waiting;        /* rows that have come since, and are not in the factor yet */
+    hsep_word finished;       /* whether left is valid */
+    hsep_real square;         /* sum of the squares of the targets */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word penalties; /* (n_tail + n_head,) */
+    hsep_word weights;   /* (n_tail + n_head,) */
+    hsep_word factor;    /* triangle [R z; 0 rho] of head, tail and target, by rows from the diagonal on */
+    hsep_word left;      /* triangle of tail and target: what the head leaves of them, without penalties */
+    hsep_word least;     /* (n_head + n_tail + 1,) bounds on the pivots */
+    hsep_word rows;      /* (room + 1, n_head + n_tail + 1) rows that wait: head, tail, target */
+    hsep_word work;      /* (n_head + n_tail + 1, HSEP_SOLUTION_ABREAST) */
+} hsep_solution;
+
+HSEP_ASSERT_WORDS(hsep_solution, 14);
+
+/* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
+HSEP_API hsep_real hsep_solution_size(hsep_word n_head, hsep_word n_tail, hsep_word room);
+HSEP_API void hsep_solution_init(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room);
+HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word n_tail, hsep_word room);
+
+/* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, or NULL; both are settled. Its
+ * first n_tail + n_head features count. penalties: > 0, of the head, (n_head,), kept in the block at n_tail. */
+HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight);
+
+/* Take another row of features, as the Gram matrix has them, and its target. Once it is begun, room + 1 may wait. */
+HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
+
+/* Multiply-adds that are left to factor the head. */
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self);
+
+/* Factor the head, by panels of about 4 n^2 multiply-adds until an amount is spent, and return what is left of it. Once
+ * the head is factored, take in four rows that wait, or with all fewer, for 8 n_head n multiply-adds. */
+HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
+
+/* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the rows
+ * about them, of which rounding leaves 1e-14 of the square of the targets. Cost: what was left to be advanced,
+ * n_tail^3 / 6 + n^2 / 2 multiply-adds. May be called again with other penalties of the tail. */
+HSEP_API hsep_real hsep_solution_finish(hsep_solution *self);
+
+/* phi' (R' R)^-1 phi of HSEP_SOLUTION_ABREAST rows phi, which are the block's work, entry after entry side by side,
+ * head before tail, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2
+ * multiply-adds for each. */
+HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_real leverages[HSEP_SOLUTION_ABREAST]);
+
+#endif
