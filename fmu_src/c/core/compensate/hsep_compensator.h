@@ -17,9 +17,8 @@
  * With trust a late measurement adds late^2 / 2 multiply-adds for each expert in two samples of a window: negligible up
  * to 100 samples, 2 ms on a desktop's core for 1000.
  *
- * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
- * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window, as
- * in hsep_predictor.h.
+ * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
+ * window, as in hsep_predictor.h.
  */
 #ifndef HSEP_COMPENSATOR_H
 #define HSEP_COMPENSATOR_H

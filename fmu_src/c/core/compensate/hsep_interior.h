@@ -3,7 +3,7 @@
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
  * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
- * them. Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
+ * them. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H

@@ -7,8 +7,8 @@
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
  * The expert of the command alone, A, is linear and time-invariant: its features are increments and lags of the
- * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is. Memory is one block,
- * without pointers. Reentrant; allocates nothing.
+ * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is. A block as
+ * hsep_layout.h has them.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H

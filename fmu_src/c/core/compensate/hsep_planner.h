@@ -6,7 +6,7 @@
  * the next plan starts from the remainder, which returns to x_d within the limits. A plan whose unconstrained minimum
  * is feasible is found at once; another one is solved in steps of equal cost.
  *
- * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
+ * A block as hsep_layout.h has them.
  */
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H

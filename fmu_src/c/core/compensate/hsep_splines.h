@@ -5,7 +5,7 @@
  * differences of delta of orders 0 to 3. Each of them, as a share of its limit, is a "row": order o at sample k is row
  * o preview + k.
  *
- * Memory is one block: the struct, then its tables of numbers; no pointers. Reentrant; allocates nothing.
+ * A block as hsep_layout.h has them.
  */
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H

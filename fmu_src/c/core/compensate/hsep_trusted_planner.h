@@ -8,8 +8,7 @@
  *
  * The work is cut into short parts: hsep_trusted_planner_advance does the next part, hsep_trusted_planner_next tells
  * its work, hsep_trusted_planner_left the most that all parts left may take. Both are counted in multiply-adds from the
- * sizes, so that samples can share the work equally. Memory is one block, without pointers. Reentrant; allocates
- * nothing.
+ * sizes, so that samples can share the work equally. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_TRUSTED_PLANNER_H
 #define HSEP_TRUSTED_PLANNER_H

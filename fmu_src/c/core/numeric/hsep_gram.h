@@ -7,7 +7,7 @@
  * than its penalty. The rounding error of an entry is kept and added back with the next rows (compensated summation),
  * so that errors do not pile up.
  *
- * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
+ * A block as hsep_layout.h has them.
  */
 #ifndef HSEP_GRAM_H
 #define HSEP_GRAM_H

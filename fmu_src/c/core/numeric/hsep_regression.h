@@ -8,7 +8,7 @@
  * bound of ordinary Givens rotations, see hsep_regression.c. The rounding error of an entry is kept and added back with
  * the next row (compensated summation), so that errors do not pile up over 10^8 rows.
  *
- * Memory is one block: the struct, then its arrays of numbers; no pointers. Reentrant; allocates nothing.
+ * A block as hsep_layout.h has them.
  */
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H

@@ -14,13 +14,13 @@
  *
  * Cost of a sample, with n features: as much as hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end
  * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust a sample
- * costs two hsep_gram_fold, and the end of a window hsep_trusted_learn and hsep_trusted_forecast. The latter leaves
- * most of the window that begins to the next samples: each of them does one hsep_residual_part. At the end of a first
- * window whose commands begin in motion all its rows are folded at once.
+ * costs two hsep_gram_fold, before the end of a window a share of the next solutions (hsep_solution.h), and the end of
+ * a window hsep_trusted_learn and hsep_trusted_forecast. The latter leaves most of the window that begins to the next
+ * samples: each of them does one hsep_residual_part. At the end of a first window whose commands begin in motion all
+ * its rows are folded at once.
  *
- * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
- * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
- * the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.
+ * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
+ * window: the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.
  */
 #ifndef HSEP_PREDICTOR_H
 #define HSEP_PREDICTOR_H
