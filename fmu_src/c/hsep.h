@@ -17,8 +17,9 @@
  *   hsep_*_valid             | constant; the predictor's, its windows                | returns 0: invalid
  *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
  *                            | window's end Np (p + q) + n^2 / 2 on top; with trust, |
- *                            | for each of three experts, four in a warm run, 4 n^2, |
- *                            | and at a window's end s^3 / 6 and 6 Np tanh on top    |
+ *                            | for each of three experts, four in a warm run,        |
+ *                            | (4 + Np / 50 + late / 2) n^2, at a window's end       |
+ *                            | 4 n^2 + s^3 / 6 and 6 Np tanh on top                  |
  *   hsep_compensator_sample  | as the predictor's with preview for Np but in folds;  | divergence is set, latched
  *                            | at a window's end a plan, m^3 / 6, and a bounded share|
  *                            | of its solution in each of the samples that follow    |
@@ -26,8 +27,9 @@
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
  * Costs are multiply-adds; n: features, p + q, with trust p and a few more, 74 at least; s: 38 of them at most, without
- * lags; m: splines in a plan, preview / spacing. With windows shorter than 20 samples 4 n^2 become up to n^3 / 6. The
- * dearest sample is bounded by the parameters, and is the same at the first and at the 10^9th sample.
+ * lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples 4 n^2
+ * become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the 10^9th
+ * sample, but for a first window that begins in motion: its last sample has Np n^2 + n^3 / 6 for each expert.
  */
 #ifndef HSEP_H
 #define HSEP_H

@@ -96,6 +96,17 @@ def test_the_tails_penalties_may_change() -> None:
         assert_same(solution, library, changed, rows)
 
 
+def test_no_more_rows_wait_than_there_is_room_for() -> None:
+    """A state that was changed on purpose may count more of them."""
+    gram, _, rows, target = both(9, 40, 5)
+    later = np.column_stack((rows, target))[:3]
+    solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2, later=later)
+    solution.add(later)
+    before = solution.block.copy()
+    solution.add(later)
+    np.testing.assert_array_equal(solution.block, before)
+
+
 def test_a_solution_of_other_sizes_or_out_of_range_is_not_valid() -> None:
     gram, _, rows, _ = both(9, 40, 5)
     solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2)

@@ -113,11 +113,16 @@ class CSolution:
         self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
         self.lefts = [self.left]
         for i, row in enumerate(later):
-            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
+            self.add(row[None])
             if amounts is not None:
                 self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
                 self.lefts.append(self.left)
         self.finish()
+
+    def add(self, rows: Array) -> None:
+        """Take rows ``[φ | target]``."""
+        for row in np.ascontiguousarray(rows):
+            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
 
     def finish(self, penalties: Array | None = None) -> None:
         """Solve for the weights, with other penalties of the tail if there are."""

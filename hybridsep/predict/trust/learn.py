@@ -61,15 +61,15 @@ def _folded(
     forecast: TrustedForecast,
     rows: tuple[Array, Array],
     e: tuple[Array, Array],
-    accepted: NDArray[np.bool_],
+    bridged: NDArray[np.bool_],
 ) -> TrustedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
     Variances of the noise for the next window are taken before the last rows.
     """
-    settings, n, early = state.fixed.settings, len(accepted), state.early
+    settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
+    accepted = ~bridged[-n:]
     kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
-    bridged: NDArray[np.bool_] = np.concatenate((state.run.bridged, ~accepted))
 
     def learned(kind: int, evidence: Evidence, part: slice) -> Evidence:
         past = state.run.past[kind]
@@ -163,7 +163,7 @@ def learn(
     bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
     if fold:
         of_command = fixed.command.rows(run.commands, window.x_d)
-        state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
+        state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
         state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
     past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
     n_rejected = run.n_rejected + m - int(accepted.sum())

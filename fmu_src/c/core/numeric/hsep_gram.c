@@ -85,7 +85,8 @@ static void gram_add_waiting(hsep_gram *self)
 
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self)
 {
-    if (self->waiting == HSEP_GRAM_TOGETHER) { /* only now: a window's last sample has enough to do */
+    if (self->waiting ==
+        HSEP_GRAM_TOGETHER) { /* only now: a window's last sample, the fourth mostly, has enough to do */
         gram_add_waiting(self);
     }
     return hsep_at(self, self->rows) + (self->n + 1) * self->waiting;

@@ -1,11 +1,7 @@
-/* Regression with a penalty of its own on each weight, from the Gram matrix of all rows [phi | target].
+/* Gram matrix of all rows [phi | target] of a regression, which hsep_solution.h solves.
  *
- * w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2
- *
- * A row costs the same at every sample, and a solution one Cholesky factor, which is a third of the work of updating a
- * triangular factor. The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot is less
- * than its penalty. The rounding error of an entry is kept and added back with the next rows (compensated summation),
- * so that errors do not pile up.
+ * A row costs the same at every sample, a third of the work of updating a triangular factor. The rounding error of an
+ * entry is kept and added back with the next rows (compensated summation), so that errors do not pile up.
  *
  * A block as hsep_layout.h has them.
  */

@@ -23,7 +23,7 @@ static hsep_real solution_lay_out(hsep_solution *self, hsep_word n_head, hsep_wo
     self->factor = hsep_take(&end, hsep_triangle(n_head + n_tail + 1));
     self->left = hsep_take(&end, hsep_triangle(n_tail + 1));
     self->least = hsep_take(&end, n + 1.0);
-    self->rows = hsep_take(&end, ((hsep_real)room + 1.0) * (n + 1.0));
+    self->rows = hsep_take(&end, (hsep_real)room * (n + 1.0));
     self->work = hsep_take(&end, HSEP_SOLUTION_ABREAST * (n + 1.0));
     return end * sizeof(hsep_real);
 }
@@ -43,7 +43,7 @@ HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word 
 {
     hsep_solution got;
     return HSEP_LAID_OUT(got, block, solution_lay_out(&got, n_head, n_tail, room)) && got.factored <= got.n_head &&
-           got.waiting <= got.room + 1 && got.finished <= 1;
+           got.waiting <= got.room && got.finished <= 1;
 }
 
 /* The rows of the factor behind the head. */
@@ -102,6 +102,9 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
 {
     const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
     hsep_real *to = hsep_at(self, self->rows) + self->waiting * (n + 1);
+    if (self->waiting == self->room) { /* of a state that was changed on purpose */
+        return;
+    }
     memcpy(to, row + n_tail, (size_t)n_head * sizeof(hsep_real));
     memcpy(to + n_head, row, (size_t)n_tail * sizeof(hsep_real));
     to[n] = target;

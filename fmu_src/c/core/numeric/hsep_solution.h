@@ -1,9 +1,13 @@
-/* Weights from a Gram matrix with a penalty of its own on each, solved as rows come.
+/* Regression with a penalty of its own on each weight, from a Gram matrix, solved as rows come.
  *
- * R' R = gram + penalties, where the head of the features has penalties that are known before the last rows are, and
- * the tail not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
- * hsep_solution_row takes rows that come meanwhile, each into the factor by a reflection. What is left for
- * hsep_solution_finish are the last row and the tail. The solution is the same to rounding as with all rows at once.
+ * w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2
+ *
+ * The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot of its Cholesky factor is
+ * less than its penalty. Penalties of the head of the features are known before the last rows are, penalties of the
+ * tail are not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
+ * hsep_solution_row takes rows that come meanwhile, which go into the factor by reflections. What is left for
+ * hsep_solution_finish are the last rows, mostly one, and the tail. The solution is the same to rounding as with all
+ * rows at once.
  *
  * Rows of a Gram matrix have the tail first. A block as hsep_layout.h has them.
  */
@@ -16,7 +20,7 @@
 
 typedef struct {
     hsep_word n_head, n_tail; /* features */
-    hsep_word room;           /* rows that may come before the head is factored */
+    hsep_word room;           /* rows that may come once it has begun */
     hsep_word factored;       /* rows of the head that are */
     hsep_word waiting;        /* rows that have come since, and are not in the factor yet */
     hsep_word finished;       /* whether left is valid */
@@ -27,7 +31,7 @@ typedef struct {
     hsep_word factor;    /* triangle [R z; 0 rho] of head, tail and target, by rows from the diagonal on */
     hsep_word left;      /* triangle of tail and target: what the head leaves of them, without penalties */
     hsep_word least;     /* (n_head + n_tail + 1,) bounds on the pivots */
-    hsep_word rows;      /* (room + 1, n_head + n_tail + 1) rows that wait: head, tail, target */
+    hsep_word rows;      /* (room, n_head + n_tail + 1) rows that wait: head, tail, target */
     hsep_word work;      /* (n_head + n_tail + 1, HSEP_SOLUTION_ABREAST) */
 } hsep_solution;
 
@@ -39,10 +43,10 @@ HSEP_API void hsep_solution_init(hsep_solution *self, hsep_word n_head, hsep_wor
 HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word n_tail, hsep_word room);
 
 /* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, or NULL; both are settled. Its
- * first n_tail + n_head features count. penalties: > 0, of the head, (n_head,), kept in the block at n_tail. */
+ * first n_tail + n_head features count. Penalties of the head, >= 0, are in the block, behind those of the tail. */
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight);
 
-/* Take another row of features, as the Gram matrix has them, and its target. Once it is begun, room + 1 may wait. */
+/* Take another row of features, as the Gram matrix has them, and its target; the rows behind room are not taken. */
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
 
 /* Multiply-adds that are left to factor the head. */

@@ -17,7 +17,7 @@
  * costs two hsep_gram_fold, before the end of a window a share of the next solutions (hsep_solution.h), and the end of
  * a window hsep_trusted_learn and hsep_trusted_forecast. The latter leaves most of the window that begins to the next
  * samples: each of them does one hsep_residual_part. At the end of a first window whose commands begin in motion all
- * its rows are folded at once.
+ * its rows are folded and the solutions factored at once.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
  * window: the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.

@@ -21,7 +21,7 @@
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
 
-/* Rows that a solution takes in at a sample once its head is factored, in the mean. */
+/* The last samples of a window have no factoring, one for so many rows that come while there is some. */
 #define HSEP_TRUSTED_ROWS 8
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
@@ -129,7 +129,8 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 /* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
  * them, m, of a compensator, for which all n are predicted, with variances of samples 0 ... last - 1 alone; or NULL.
- * Cost: m^3 / 6 multiply-adds for each expert's m features, last m^2 / 2, last n / 2, and 6 n tanh. */
+ * Cost: for each expert a hsep_solution_finish, last m^2 / 2 multiply-adds with its m features and last n / 2; 6 n
+ * tanh. */
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
     hsep_real e[], hsep_word last);
@@ -155,7 +156,7 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A
- * sample costs a hsep_gram_fold for each residual. */
+ * sample costs a hsep_gram_fold for each residual, and behind early samples a share of the next window's solutions. */
 HSEP_API void hsep_trusted_follow(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last);
 

@@ -24,17 +24,17 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
-/* Forget what is not believed any more before a window: rows at lower velocities, if it outgrows them, and earlier
- * runs, if they are disproved. */
+/* Forget what is not believed any more before a window: earlier runs, if they are disproved, and rows at lower
+ * velocities, if it outgrows them. */
 static void trusted_forget(hsep_trusted *self)
 {
+    for (hsep_word i = 0; self->disproved && i < HSEP_N_RESIDUALS; i++) {
+        hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
+    }
     if (self->forecast_scale != self->learned.velocity_scale) {
         hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
         hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
         hsep_stack_forget(&self->learned.stack, HSEP_DOUBTING);
-    }
-    for (hsep_word i = 0; self->disproved && i < HSEP_N_RESIDUALS; i++) {
-        hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
     }
 }
 
