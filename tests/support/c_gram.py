@@ -152,7 +152,7 @@ class CSolution:
         return self._part("weights", self.m)
 
     def leverage(self, rows: Array) -> Array:
-        found, in_order = [], np.hstack((rows[:, self.m - self.n_head :], rows[:, : self.m - self.n_head]))
+        found, in_order = [], np.hstack((rows[:, self.m - self.n_head :][:, ::-1], rows[:, : self.m - self.n_head]))
         for first in range(0, len(rows), ABREAST):
             some = in_order[first : first + ABREAST]
             side_by_side = np.vstack((some, np.zeros((ABREAST - len(some), self.m)))).T

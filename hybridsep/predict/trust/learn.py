@@ -48,8 +48,6 @@ def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float)
     learned, (velocity, largest, step) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
-    if state.disproved:
-        of_physics, of_command = of_physics.forget_earlier(), of_command.forget_earlier()
     if velocity != learned.velocity_scale:
         of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
     learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
@@ -100,9 +98,6 @@ def _judged_experts(
         expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, given)
         for expert, one in forecast.predictions.items()
     }
-    if state.disproved:  # all experts go on with this run alone, and are judged anew
-        doubting = errors.get(DOUBTING, learned.errors_of(DOUBTING))
-        errors |= {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: doubting}
     of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
     return replace(learned.with_errors(errors), scales=(of_physics, of_command))
 
@@ -125,9 +120,14 @@ def _judged(
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
-    stack = Stack.init() if state.disproved else stack
-    disproved = state.doubts and bool(stack.weights[DOUBTING] > CONSTANTS.doubt)
-    return replace(state, learned=replace(learned, stack=stack), disproved=disproved)
+    learned = replace(learned, stack=stack)
+    if not (state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt):
+        return replace(state, learned=learned)
+    # All experts go on with this run alone, and are judged anew.
+    anew = {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(DOUBTING)}
+    learned = replace(learned.with_errors(anew), stack=Stack.init())
+    evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
+    return replace(state, learned=learned, evidence=evidence).with_noise(learned)
 
 
 def learn(

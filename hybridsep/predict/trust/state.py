@@ -166,8 +166,6 @@ class TrustedModel:
         Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
     leading : int
         Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
-    disproved : bool
-        Whether earlier runs are forgotten when the next window is learned.
     run : RunState
     """
 
@@ -178,7 +176,6 @@ class TrustedModel:
     evidence: tuple[Evidence, Evidence]
     noise: tuple[float, ...] = field(metadata=within())
     leading: int
-    disproved: bool
     run: RunState
 
     def kind_of(self, expert: int) -> int:
@@ -255,7 +252,7 @@ def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Distur
     static = StaticFeatures(discrete, settings.q, settings.period, own)
     fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
     evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
-    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, LAGGED, False, RunState.init(fixed))
+    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, LAGGED, RunState.init(fixed))
 
 
 def restart(state: TrustedModel) -> TrustedModel:
@@ -268,7 +265,7 @@ def restart(state: TrustedModel) -> TrustedModel:
         stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
     learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
     evidence = of_physics, of_command
-    begun = TrustedModel(fixed, learned, evidence, state.noise, leading, False, RunState.init(fixed))
+    begun = TrustedModel(fixed, learned, evidence, state.noise, leading, RunState.init(fixed))
     return begun.with_noise(learned)
 
 

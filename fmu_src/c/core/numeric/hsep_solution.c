@@ -58,21 +58,28 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
 {
     const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = gram->n;
     const hsep_real *row = hsep_at_const(gram, gram->sums); /* row i of the triangle, from its diagonal on */
-    hsep_real *to = hsep_at(self, self->factor), *tail = solution_tail(self);
+    hsep_real *factor = hsep_at(self, self->factor), *tail = solution_tail(self);
     for (hsep_word i = 0; i < n_tail; i++, row += n + 1 - (i - 1)) {
-        hsep_real *column = to + n_head + i;
+        hsep_real *to = factor + n_head + i;
         for (hsep_word j = 0; j < n_head; j++) {
-            *column += weight * row[n_tail + j - i];
-            column += n_head + n_tail - j;
+            *to += weight * row[n_tail + (n_head - 1 - j) - i];
+            to += n_head + n_tail - j;
         }
         hsep_axpy(tail, weight, row, n_tail - i);
         tail[n_tail - i] += weight * row[n - i];
         tail += n_tail + 1 - i;
     }
-    for (hsep_word i = 0; i < n_head; i++) {
-        hsep_axpy(to, weight, row, n_head - i);
-        to[n_head + n_tail - i] += weight * row[n - n_tail - i];
-        to += n_head + n_tail + 1 - i;
+    for (hsep_word i = 0; i < n_head; i++) { /* a row of the Gram matrix is a column of the factor, upwards */
+        hsep_real *to = factor + (n_head - 1 - i);
+        for (hsep_word j = 0; j < n_head - i; j++) {
+            *to += weight * row[n_head - i - 1 - j];
+            to += n_head + n_tail - j;
+        }
+        to = factor + n_head + n_tail;
+        for (hsep_word j = 0; j < n_head - 1 - i; j++) {
+            to += n_head + n_tail - j;
+        }
+        *to += weight * row[n - n_tail - i];
         row += n - n_tail + 1 - i;
     }
     *tail += weight * hsep_gram_square(gram);
@@ -92,9 +99,10 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
         solution_add(self, other, weight);
     }
     for (hsep_word i = 0; i < n_head; i++) {
-        *diagonal += penalties[i];
+        const hsep_real penalty = penalties[n_head - 1 - i];
+        *diagonal += penalty;
         diagonal += n + 1 - i;
-        least[i] = penalties[i] > HSEP_GRAM_LEAST ? penalties[i] : HSEP_GRAM_LEAST;
+        least[i] = penalty > HSEP_GRAM_LEAST ? penalty : HSEP_GRAM_LEAST;
     }
 }
 
@@ -105,7 +113,9 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     if (self->waiting == self->room) { /* of a state that was changed on purpose */
         return;
     }
-    memcpy(to, row + n_tail, (size_t)n_head * sizeof(hsep_real));
+    for (hsep_word i = 0; i < n_head; i++) {
+        to[i] = row[n_tail + n_head - 1 - i];
+    }
     memcpy(to + n_head, row, (size_t)n_tail * sizeof(hsep_real));
     to[n] = target;
     self->square += target * target;
@@ -184,7 +194,9 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
         x[i] = (row[n - i] - hsep_dot(row + 1, x + i + 1, n - i - 1)) / row[0];
     }
     memcpy(w, x + n_head, (size_t)n_tail * sizeof(hsep_real));
-    memcpy(w + n_tail, x, (size_t)n_head * sizeof(hsep_real));
+    for (hsep_word i = 0; i < n_head; i++) {
+        w[n_tail + i] = x[n_head - 1 - i];
+    }
     for (hsep_word i = 0; i < n; i++) { /* sum of the squares, and of the penalties */
         sum -= penalties[i] * w[i] * w[i];
     }

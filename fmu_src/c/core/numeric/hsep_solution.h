@@ -9,7 +9,9 @@
  * hsep_solution_finish are the last rows, mostly one, and the tail. The solution is the same to rounding as with all
  * rows at once.
  *
- * Rows of a Gram matrix have the tail first. A block as hsep_layout.h has them.
+ * Rows of a Gram matrix have the tail first. The head is factored from its last feature to its first: where these are
+ * lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
+ * hsep_layout.h has them.
  */
 #ifndef HSEP_SOLUTION_H
 #define HSEP_SOLUTION_H
@@ -28,10 +30,10 @@ typedef struct {
     /* Offsets in words from the beginning of the struct */
     hsep_word penalties; /* (n_tail + n_head,) */
     hsep_word weights;   /* (n_tail + n_head,) */
-    hsep_word factor;    /* triangle [R z; 0 rho] of head, tail and target, by rows from the diagonal on */
+    hsep_word factor;    /* triangle [R z; 0 rho] of the head backwards, tail and target, by rows */
     hsep_word left;      /* triangle of tail and target: what the head leaves of them, without penalties */
     hsep_word least;     /* (n_head + n_tail + 1,) bounds on the pivots */
-    hsep_word rows;      /* (room, n_head + n_tail + 1) rows that wait: head, tail, target */
+    hsep_word rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
     hsep_word work;      /* (n_head + n_tail + 1, HSEP_SOLUTION_ABREAST) */
 } hsep_solution;
 
@@ -62,7 +64,7 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
 HSEP_API hsep_real hsep_solution_finish(hsep_solution *self);
 
 /* phi' (R' R)^-1 phi of HSEP_SOLUTION_ABREAST rows phi, which are the block's work, entry after entry side by side,
- * head before tail, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2
+ * in that order, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2
  * multiply-adds for each. */
 HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_real leverages[HSEP_SOLUTION_ABREAST]);
 

@@ -137,7 +137,7 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
         const hsep_word sample = k + (c < count ? c : count - 1); /* what is beyond is a copy */
         const hsep_real *row = rows + sample * n_static, *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
         for (hsep_word i = 0; i < p; i++) {
-            to[HSEP_SOLUTION_ABREAST * i + c] = lags[i];
+            to[HSEP_SOLUTION_ABREAST * (p - 1 - i) + c] = lags[i];
         }
         for (hsep_word i = 0; i < n_static; i++) {
             to[HSEP_SOLUTION_ABREAST * (p + i) + c] = row[i];

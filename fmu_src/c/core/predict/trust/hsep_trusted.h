@@ -46,7 +46,6 @@ typedef struct {
     hsep_real kept;               /* weight of earlier rows, from window to window */
     hsep_word
         leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
-    hsep_word disproved; /* whether earlier runs are forgotten when the next window is learned */
     hsep_reach reach;
     hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
@@ -79,7 +78,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    33 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    32 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */

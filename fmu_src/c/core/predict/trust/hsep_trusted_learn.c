@@ -24,28 +24,19 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
-/* Forget what is not believed any more before a window: earlier runs, if they are disproved, and rows at lower
- * velocities, if it outgrows them. */
-static void trusted_forget(hsep_trusted *self)
-{
-    for (hsep_word i = 0; self->disproved && i < HSEP_N_RESIDUALS; i++) {
-        hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
-    }
-    if (self->forecast_scale != self->learned.velocity_scale) {
-        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
-        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
-        hsep_stack_forget(&self->learned.stack, HSEP_DOUBTING);
-    }
-}
-
-/* Begin to follow a window: take over its scales; the rows so far fade if it is learned, fold. */
+/* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. The
+ * rows so far fade if it is learned, fold. */
 static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], int fold)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     hsep_command *command = hsep_trusted_command(self);
     hsep_learned *learned = &self->learned;
     hsep_real before = disturbances->before.x_pb[0];
-    trusted_forget(self);
+    if (self->forecast_scale != learned->velocity_scale) {
+        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
+        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
+        hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
+    }
     for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) { /* of more rows than can be counted, half */
         hsep_evidence *evidence = hsep_trusted_evidence(self, i);
         const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
@@ -129,10 +120,6 @@ static void trusted_judge_experts(
     }
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_residual_scale_follow(&scales[i], residuals[i] + first, accepted + first, n, self->n_accepted);
-    }
-    if (self->disproved) { /* all experts go on with this run alone, and are judged anew */
-        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
     }
 }
 
@@ -260,10 +247,17 @@ static void trusted_judge(hsep_trusted *self, const hsep_real e[])
     hsep_learned *learned = &self->learned;
     trusted_judge_experts(self, e, self->Np, learned->scales, learned->errors);
     trusted_judge_stack(self, e);
-    if (self->disproved) {
+    if (hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+        /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
+        hsep_expert_errors *errors = learned->errors;
+        for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+            hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
+        }
+        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
         hsep_stack_init(&learned->stack);
+        hsep_trusted_begin_solutions(self, learned->scales, errors);
     }
-    self->disproved = hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT;
 }
 
 HSEP_API void hsep_trusted_learn(

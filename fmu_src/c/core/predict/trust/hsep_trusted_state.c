@@ -109,7 +109,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
     hsep_trusted got;
     int sound = HSEP_LAID_OUT(got, block, trusted_lay_out(&got, parameters)) &&
                 (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 && got.disproved <= 1 &&
+                got.known <= got.followed && got.reach.known <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -181,7 +181,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     const hsep_expert_shape shape = trusted_shape(self, HSEP_DOUBTING);
     hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
-    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = self->disproved = 0;
+    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
     hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
