@@ -127,7 +127,7 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert (
         advice
-        == "The hybrid is neither better nor worse here: 0.98 × the error of ARX40 (refitted), judged by 30 windows."
+        == "Use the hybrid: its error is 0.98 × the error of ARX40 (refitted), the best of the others, judged by 30 windows."
     )
     assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
