@@ -99,7 +99,6 @@ static void fold(char *arguments[])
 
 /* A motion that repeats, in samples, so that its last round is as its first but for the noise. */
 #define ROUND 10000
-#define WINDOW 100 /* Np of the FMU */
 
 static double command[ROUND], position[ROUND];
 
@@ -129,7 +128,7 @@ static void step(unsigned long samples, int trust)
     const fmi2ValueReference trusted = HSEP_VR_trust;
     const double T_s = hsep_starts[HSEP_VR_T_s];
     double x_h = 0.0, early = 0.0, late = 0.0;
-    const unsigned long part = samples / 20;
+    const unsigned long part = samples / 20, Np = (unsigned long)hsep_starts[HSEP_VR_Np];
     move();
     fmi2Component fmu = fmi2Instantiate("long run", fmi2CoSimulation, HSEP_GUID, NULL, NULL, fmi2False, fmi2False);
     expect(fmu != NULL && fmi2SetBoolean(fmu, &trusted, 1, &(fmi2Boolean){trust}) == fmi2OK, "the instance");
@@ -138,7 +137,7 @@ static void step(unsigned long samples, int trust)
     expect(fmi2EnterInitializationMode(fmu) == fmi2OK && fmi2ExitInitializationMode(fmu) == fmi2OK, "initialization");
     const unsigned long before = allocator_calls;
     for (unsigned long k = 0; k < samples; k++) { /* the drive begins when its first command has arrived */
-        const double x = k < WINDOW ? command[0] : position[(k - WINDOW) % ROUND];
+        const double x = k < Np ? command[0] : position[(k - Np) % ROUND];
         const double values[2] = {command[k % ROUND], x + noise()}, e = x_h - x;
         early += k >= part && k < 2 * part ? e * e : 0.0;
         late += k >= 19 * part && k < 20 * part ? e * e : 0.0;

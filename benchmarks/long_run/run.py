@@ -40,6 +40,8 @@ SKIPPED = 200
 """Rows before the block: there the lags are not all measured yet."""
 
 ERROR_MAX = 1e-9
+LEAST_STEPS = 1_000_000
+"""Steps of which a twentieth is whole rounds of the motion, five of them: its first ones are another task."""
 GROWTH_MAX = 1.01
 """Of the RMS error of predictions, from the second twentieth of the steps to the last."""
 
@@ -51,6 +53,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.samples < BLOCK or options.samples % BLOCK:
         parser.error(f"--samples must be a multiple of {BLOCK}, got {options.samples}")
+    if options.steps < LEAST_STEPS or options.steps % LEAST_STEPS:
+        parser.error(f"--steps must be a multiple of {LEAST_STEPS}, got {options.steps}")
     require_extended_precision()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc"]
@@ -77,13 +81,13 @@ def main() -> int:
             error = relative_error(weights, exact_weights(rows, LAM, samples // BLOCK))
             worst = max(worst, error)
             add(samples, "rows folded", seconds, f"{error:.1e}", counted)
-        growth = {}
+        runs = {}
         for trust in (False, True):
             begin = perf_counter()
             counted = host.step(options.steps, trust)
             what = f"fmi2DoStep, with its values, trust = {str(trust).lower()}"
             add(options.steps, what, perf_counter() - begin, "", counted)
-            growth[trust] = counted
+            runs[trust] = counted
     console = Console(width=110)
     console.print(table)
     taken = sum(counted.after for counted in calls)
@@ -96,7 +100,7 @@ def main() -> int:
                 f"trust = {str(trust).lower()}: RMS error of predictions {1e6 * run.early:.4f} µm early,"
                 f" {1e6 * run.late:.4f} µm late, limit ≤ {GROWTH_MAX} times",
             )
-            for trust, run in growth.items()
+            for trust, run in runs.items()
         ),
         (all(counted.before > 0 for counted in calls), "the calls before it were seen, so the count works"),
     ]

@@ -64,9 +64,12 @@ def test_outputs_are_the_same_to_the_bit(target: str, kind: str, tmp_path: Path)
     np.testing.assert_array_equal(there.outputs, here.outputs)
     assert (there.block, there.began) == (here.block, 0)
     assert there.counts.min() > 0
-    assert there.counts.max() > 2.0 * np.median(there.counts)  # the work is even, but for a window's end
-    if kind == "predictor":  # a window's end was counted
+    dearer = there.counts.max() / np.median(there.counts)
+    if kind == "predictor":  # its work is even, but for a window's end, which was counted
         assert there.counts.argmax() % case.Np == case.Np - 1
+        assert dearer > 4.0
+    else:
+        assert dearer > 5.0
 
 
 @pytest.mark.parametrize("target", ["m7", "m7-picolibc", "m4f"])

@@ -124,7 +124,7 @@ def test_every_parameter_predicts_with_trust_as_in_the_library(
 
 def faulty(k: int, x_meas: float, last: float) -> float:
     """Miss some samples, jump, stay, read 0 for a while, and shift in the end."""
-    if k % 37 == 5 or 1450 <= k < 1460 or 775 <= k % 700 + 700 < 783:  # and where a solution begins
+    if k % 37 == 5 or 1450 <= k < 1460 or 75 <= k % 700 < 83:  # and where a solution begins
         return math.nan
     if k in (777, 1130, 1131):
         return x_meas + 1e-3 * (k - 1100)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -69,22 +70,26 @@ def _folded(
     accepted = ~bridged[-n:]
     kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
-    def learned(kind: int, evidence: Evidence, part: slice) -> Evidence:
+    def taken(kind: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         past = state.run.past[kind]
         p = len(past)
         # Measured samples, as were all but a few of their lags
         n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
-        counts = (accepted & (n_bridged <= _BRIDGED))[part]
-        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)[part]
-        return evidence.learn(rows[kind][part][counts], lagged[counts], e[kind][part][counts])
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
+        return rows[kind], lagged, e[kind], accepted & (n_bridged <= _BRIDGED)
 
-    def both(evidence: tuple[Evidence, Evidence], part: slice) -> tuple[Evidence, Evidence]:
-        return learned(OF_PHYSICS, evidence[0], part), learned(OF_COMMAND, evidence[1], part)
+    of_kind = taken(OF_PHYSICS), taken(OF_COMMAND)
 
-    of_physics, of_command = (one.discount(kept) for one in state.evidence)
-    state = replace(state, evidence=both((of_physics, of_command), slice(early)))
+    def learned(evidence: Iterable[Evidence], part: slice) -> tuple[Evidence, Evidence]:
+        of_physics, of_command = (
+            one.learn(features[part][counts[part]], lagged[part][counts[part]], target[part][counts[part]])
+            for one, (features, lagged, target, counts) in zip(evidence, of_kind, strict=True)
+        )
+        return of_physics, of_command
+
+    state = replace(state, evidence=learned((one.discount(kept) for one in state.evidence), slice(early)))
     state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
-    return replace(state, evidence=both(state.evidence, slice(early, n)))
+    return replace(state, evidence=learned(state.evidence, slice(early, n)))
 
 
 def _judged_experts(

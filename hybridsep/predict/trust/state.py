@@ -188,7 +188,7 @@ class TrustedModel:
 
     @property
     def early(self) -> int:
-        """Samples of a window after which its variances are taken."""
+        """Samples of a window after which the variances for the next one are taken."""
         Np = self.fixed.settings.Np
         return Np - min(Np // 2, _AHEAD)
 

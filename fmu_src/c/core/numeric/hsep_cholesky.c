@@ -45,23 +45,23 @@ static int cholesky_panel(
     return 1;
 }
 
-/* Subtract from row i what count finished rows leave of it; length: of row i. */
-static void cholesky_take(
+/* Subtract from row i what the rows of a panel, count of them, leave of it; length: of row i. */
+static inline void cholesky_take(
     hsep_real row[], hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word i, hsep_word length)
 {
+    if (count < HSEP_CHOLESKY_PANEL) {
+        for (hsep_word r = 0; r < count; r++) {
+            hsep_axpy(row, -rows[r][i - r], rows[r] + (i - r), length);
+        }
+        return;
+    }
     hsep_real a[HSEP_CHOLESKY_PANEL];
     const hsep_real *x[HSEP_CHOLESKY_PANEL];
-    for (hsep_word r = 0; r < count; r++) {
+    for (hsep_word r = 0; r < HSEP_CHOLESKY_PANEL; r++) { /* of known length: registers */
         x[r] = rows[r] + (i - r);
         a[r] = *x[r];
     }
-    if (count == HSEP_CHOLESKY_PANEL) {
-        hsep_take_eight(row, a, x, length);
-        return;
-    }
-    for (hsep_word r = 0; r < count; r++) {
-        hsep_axpy(row, -a[r], x[r], length);
-    }
+    hsep_take_eight(row, a, x, length);
 }
 
 HSEP_API int hsep_cholesky_rows(

@@ -102,7 +102,7 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
         const hsep_real penalty = penalties[n_head - 1 - i];
         *diagonal += penalty;
         diagonal += n + 1 - i;
-        least[i] = penalty > HSEP_GRAM_LEAST ? penalty : HSEP_GRAM_LEAST;
+        least[i] = penalty > HSEP_SOLUTION_LEAST ? penalty : HSEP_SOLUTION_LEAST;
     }
 }
 
@@ -183,9 +183,9 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     for (hsep_word i = 0; i < n_tail; i++) {
         *diagonal += penalties[i];
         diagonal += n_tail + 1 - i;
-        least[n_head + i] = penalties[i] > HSEP_GRAM_LEAST ? penalties[i] : HSEP_GRAM_LEAST;
+        least[n_head + i] = penalties[i] > HSEP_SOLUTION_LEAST ? penalties[i] : HSEP_SOLUTION_LEAST;
     }
-    least[n] = hsep_fmax(HSEP_GRAM_OF_TARGET * self->square, HSEP_GRAM_LEAST);
+    least[n] = hsep_fmax(HSEP_SOLUTION_OF_TARGET * self->square, HSEP_SOLUTION_LEAST);
     (void)hsep_cholesky_rows(tail, n_tail + 1, 0, n_tail + 1, least + n_head);
     hsep_real *x = hsep_at(self, self->work), sum = *diagonal * *diagonal;
     row += (hsep_word)hsep_triangle(n + 1) - 1;

@@ -18,6 +18,18 @@
 
 #include "hsep_gram.h"
 
+/* Least pivot, m2, where a penalty underflows; least pivot of the target, relative to its sum of squares; and the part
+ * of the sum of squares that rounding leaves unresolved, relative to the targets' sum of squares. */
+#ifdef HSEP_FLOAT32
+#define HSEP_SOLUTION_LEAST 1e-36F
+#define HSEP_SOLUTION_OF_TARGET 6e-8F
+#define HSEP_SOLUTION_RESOLUTION 3e-7F
+#else
+#define HSEP_SOLUTION_LEAST 1e-40
+#define HSEP_SOLUTION_OF_TARGET 1e-16
+#define HSEP_SOLUTION_RESOLUTION 1e-14
+#endif
+
 #define HSEP_SOLUTION_ABREAST 4 /* rows whose leverages are computed side by side */
 
 typedef struct {

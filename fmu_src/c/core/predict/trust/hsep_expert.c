@@ -63,7 +63,7 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 /* Least sum of squares that counts, of targets whose squares have a sum. */
 static hsep_real expert_resolved(hsep_real square)
 {
-    return hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_GRAM_RESOLUTION) * square;
+    return hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_SOLUTION_RESOLUTION) * square;
 }
 
 HSEP_API void hsep_expert_begin_solution(

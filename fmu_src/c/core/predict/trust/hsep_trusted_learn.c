@@ -123,8 +123,8 @@ static void trusted_judge_experts(
     }
 }
 
-/* Begin the solutions for the next window, as far as this one, whose residuals are e, is known. */
-static void trusted_begin_solutions(hsep_trusted *self, const hsep_real e[])
+/* Begin the solutions for the next window with what is known of this one, whose residuals are e, so far. */
+static void trusted_begin_next(hsep_trusted *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_JUDGED];
@@ -189,7 +189,7 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
         trusted_believe(self, k, x_pb, e, measured, fold);
     }
     if (fold && self->followed == self->early) {
-        trusted_begin_solutions(self, e);
+        trusted_begin_next(self, e);
     }
 }
 

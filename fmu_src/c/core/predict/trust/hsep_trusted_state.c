@@ -190,6 +190,8 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     hsep_trusted_begin_solutions(self, learned->scales, learned->errors);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         hsep_solution *solution = hsep_trusted_solution(self, i);
-        (void)(solution != NULL ? hsep_solution_advance(solution, INFINITY, 0) : 0.0);
+        if (solution != NULL) {
+            (void)hsep_solution_advance(solution, INFINITY, 0);
+        }
     }
 }
