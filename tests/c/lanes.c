@@ -48,7 +48,7 @@ int main(void)
     for (int i = 0; i < N * HSEP_SOLUTION_ABREAST; i++) {
         hsep_at(solution, solution->work)[i] = next();
     }
-    hsep_solution_leverages(solution, leverages);
+    hsep_solution_leverages(solution, HSEP_SOLUTION_ABREAST, leverages);
     hsep_cholesky_solve(hsep_at(solution, solution->factor), N + 1, least);
     for (int i = 0; i < N; i++) {
         printf("%a %a\n", hsep_at(solution, solution->weights)[i], least[i]);

@@ -78,13 +78,15 @@ class CSolution:
     gram : CGram
         Its rows, settled.
     penalties : (m,) array
-        Of its first ``m`` features; where these are all, the second half of them is the head, else there is none.
+        Of its first ``m`` features.
     other, weight : CGram and float, optional
         Rows that are added with a weight, settled.
     later : (k, m + 1) array, optional
         Rows ``[φ | target]`` that come once the solution has begun.
     amounts : list of float
         Multiply-adds that are spent before each of them; what is left is done in the end.
+    n_head : int, optional
+        Features of the head, the last ones; half of them if left out, or none where ``m`` features are not all.
     """
 
     def __init__(
@@ -95,9 +97,11 @@ class CSolution:
         weight: float = 1.0,
         later: Array | None = None,
         amounts: list[float] | None = None,
+        n_head: int | None = None,
     ) -> None:
         self.library, m = gram.library, len(penalties)
-        n_head = m - m // 2 if m == gram.n else 0
+        if n_head is None:
+            n_head = m - m // 2 if m == gram.n else 0
         later = np.empty((0, m + 1)) if later is None else np.ascontiguousarray(later)
         sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later))]
         self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
@@ -111,12 +115,12 @@ class CSolution:
             other.settle()
         added = None if other is None else other._block
         self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
-        self.lefts = [self.left]
+        self.lefts = [self.left(len(later))]
         for i, row in enumerate(later):
             self.add(row[None])
             if amounts is not None:
                 self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
-                self.lefts.append(self.left)
+                self.lefts.append(self.left(len(later) - 1 - i))
         self.finish()
 
     def add(self, rows: Array) -> None:
@@ -130,9 +134,8 @@ class CSolution:
             self._part("penalties", len(penalties))[:] = penalties
         self.residual_sum = self.library.hsep_solution_finish(self._block)
 
-    @property
-    def left(self) -> float:
-        return float(self.library.hsep_solution_left(self._block))
+    def left(self, coming: int) -> float:
+        return float(self.library.hsep_solution_left(self._block, ctypes.c_uint64(coming)))
 
     @property
     def valid(self) -> bool:
@@ -158,6 +161,7 @@ class CSolution:
             side_by_side = np.vstack((some, np.zeros((ABREAST - len(some), self.m)))).T
             self._part("work", ABREAST * self.m)[:] = side_by_side.ravel()
             leverages = np.full(ABREAST, np.nan)
-            self.library.hsep_solution_leverages(self._block, pointer(leverages))
+            count = ctypes.c_uint64(len(some))
+            self.library.hsep_solution_leverages(self._block, count, pointer(leverages))
             found += leverages[: len(some)].tolist()
         return np.array(found)

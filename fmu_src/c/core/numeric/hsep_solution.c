@@ -122,11 +122,18 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     self->waiting++;
 }
 
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self)
+/* Multiply-adds to take in rows together. */
+static hsep_real solution_together(const hsep_solution *self)
+{
+    return 8.0 * (hsep_real)self->n_head * (hsep_real)(self->n_head + self->n_tail + 1);
+}
+
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word coming)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
     const hsep_real tail = (hsep_real)self->n_tail + 1.0;
-    return (all * all * all - tail * tail * tail) / 6.0;
+    const hsep_word groups = (self->waiting + coming + SOLUTION_TOGETHER - 1) / SOLUTION_TOGETHER;
+    return (all * all * all - tail * tail * tail) / 6.0 + (hsep_real)groups * solution_together(self);
 }
 
 /* Take in the last rows that wait: four, with rows of 0 in their place if there are fewer, or one. */
@@ -156,10 +163,10 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
             hsep_at(self, self->factor), width, self->factored, self->factored + count, hsep_at(self, self->least));
         self->factored += count;
         amount -= 0.5 * (hsep_real)HSEP_CHOLESKY_PANEL * height * height;
-        all = 0;
     }
-    if (self->factored == self->n_head && (all || self->waiting >= SOLUTION_TOGETHER)) {
+    while (self->waiting >= (all ? 1 : SOLUTION_TOGETHER) && amount > 0.0) {
         solution_take_in(self);
+        amount -= solution_together(self);
     }
     return amount;
 }
@@ -171,10 +178,7 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *w = hsep_at(self, self->weights);
     hsep_real *least = hsep_at(self, self->least), *diagonal = tail, *row = hsep_at(self, self->factor);
     if (!self->finished) {
-        (void)hsep_solution_advance(self, INFINITY, 0);
-        while (self->waiting > 0) {
-            solution_take_in(self);
-        }
+        (void)hsep_solution_advance(self, INFINITY, 1);
         memcpy(left, tail, (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real));
         self->finished = 1;
     } else {
@@ -204,30 +208,26 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
 }
 
 /* x_j -= y_0 r_0j + y_1 r_1j + y_2 r_2j + y_3 r_3j for the entries j behind four, of HSEP_SOLUTION_ABREAST rows side by
- * side. r: four rows of R. */
-static void solution_take(
-    hsep_real *restrict x, const hsep_real y[4 * HSEP_SOLUTION_ABREAST], const hsep_real *const r[4], hsep_word n)
+ * side, the first vectors of them. r: four rows of R. */
+static inline void solution_take(
+    hsep_real *restrict x, const hsep_lanes at[4 * HSEP_OF_FOUR], const hsep_real *const r[4], hsep_word n, int vectors)
 {
     const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-    hsep_lanes at[4 * HSEP_OF_FOUR];
-    memcpy(at, y, sizeof at);
     for (hsep_word j = 0; j < n; j++, x += HSEP_SOLUTION_ABREAST) {
         hsep_lanes *to = hsep_lanes_at(x);
-        for (int l = 0; l < HSEP_OF_FOUR; l++) {
+        for (int l = 0; l < vectors; l++) {
             to[l] -= (r0[j] * at[l] + r1[j] * at[HSEP_OF_FOUR + l]) +
                      (r2[j] * at[2 * HSEP_OF_FOUR + l] + r3[j] * at[3 * HSEP_OF_FOUR + l]);
         }
     }
 }
 
-HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+/* The leverages of the first vectors of the rows. */
+static inline void solution_leverages(hsep_solution *self, hsep_lanes sums[HSEP_OF_FOUR], int vectors)
 {
     const hsep_word m = self->n_head + self->n_tail;
-    hsep_lanes sums[HSEP_OF_FOUR];
     const hsep_real *row = hsep_at(self, self->factor);
     hsep_real *rows = hsep_at(self, self->work);
-    memset(leverages, 0, HSEP_SOLUTION_ABREAST * sizeof *leverages);
-    memcpy(sums, leverages, sizeof sums);
     /* R' y = phi from the first feature to the last, which takes each of them from the entries behind it. */
     for (hsep_word first = 0; first < m; first += 4) {
         const hsep_word left = m - first, height = left < 4 ? left : 4;
@@ -236,12 +236,12 @@ HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_real leverages[H
         for (hsep_word i = 0; i < height; i++) {
             hsep_lanes *y = hsep_lanes_at(x) + HSEP_OF_FOUR * i;
             const hsep_real inverse = 1.0 / row[0];
-            for (int l = 0; l < HSEP_OF_FOUR; l++) {
+            for (int l = 0; l < vectors; l++) {
                 y[l] *= inverse;
                 sums[l] += y[l] * y[l];
             }
             for (hsep_word j = 1; i + j < height; j++) {
-                for (int l = 0; l < HSEP_OF_FOUR; l++) {
+                for (int l = 0; l < vectors; l++) {
                     y[HSEP_OF_FOUR * j + (hsep_word)l] -= row[j] * y[l];
                 }
             }
@@ -249,8 +249,22 @@ HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_real leverages[H
             row += m + 1 - (first + i);
         }
         if (left > 4) {
-            solution_take(x + 4 * HSEP_SOLUTION_ABREAST, x, r, left - 4);
+            hsep_lanes at[4 * HSEP_OF_FOUR];
+            memcpy(at, x, sizeof at);
+            solution_take(x + 4 * HSEP_SOLUTION_ABREAST, at, r, left - 4, vectors);
         }
+    }
+}
+
+HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+{
+    hsep_lanes sums[HSEP_OF_FOUR];
+    memset(leverages, 0, HSEP_SOLUTION_ABREAST * sizeof *leverages);
+    memcpy(sums, leverages, sizeof sums);
+    if (count > 1) {
+        solution_leverages(self, sums, HSEP_OF_FOUR);
+    } else {
+        solution_leverages(self, sums, 1);
     }
     memcpy(leverages, sums, sizeof sums);
 }

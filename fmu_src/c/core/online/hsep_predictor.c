@@ -191,8 +191,8 @@ static void predictor_open(hsep_predictor *self)
 static void predictor_go_on(hsep_predictor *self)
 {
     const hsep_word late = self->late, published = self->n_published, left = self->Np - published;
-    const hsep_word part = hsep_residual_part(hsep_predictor_model(self)),
-                    last = published + (left < part ? left : part);
+    const hsep_word part = hsep_residual_part(hsep_predictor_model(self), published);
+    const hsep_word last = published + (left < part ? left : part);
     const hsep_word first = published > 0 ? late + published : 0;
     const hsep_residual_window window = hsep_predictor_window(self);
     hsep_residual_predict(hsep_predictor_model(self), &window, first, late + last);

@@ -123,11 +123,14 @@ HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
     }
 }
 
-HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self)
+HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self, hsep_word predicted)
 {
     const hsep_word part = (self->Np - 1) / residual_parts + 1;
-    /* Two at least, because the spread of errors follows from differences; variances come side by side. */
-    return self->trusted ? (part > HSEP_SOLUTION_ABREAST ? part : HSEP_SOLUTION_ABREAST) : self->Np;
+    if (!self->trusted) {
+        return self->Np;
+    }
+    /* The first part comes with the weights; variances of the others side by side. */
+    return predicted == 0 ? 1 : part > HSEP_SOLUTION_ABREAST ? part : HSEP_SOLUTION_ABREAST;
 }
 
 HSEP_API void hsep_residual_predict(

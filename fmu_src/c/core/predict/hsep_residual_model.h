@@ -55,8 +55,8 @@ HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
-/* Samples that are predicted in one go. Constant cost. */
-HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self);
+/* Samples that are predicted in one go, where so many of the window are predicted. Constant cost. */
+HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self, hsep_word predicted);
 
 /* Predict the residuals of samples first ... last - 1; first is 0, or where the last call ended. */
 HSEP_API void hsep_residual_predict(
