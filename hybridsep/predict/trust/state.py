@@ -51,6 +51,9 @@ _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the next one's solutions begin: a controller factors
 most of them in these samples."""
 
+_ABREAST = 4
+"""Rows that a controller takes in together: where that many samples are left, they are a multiple of it."""
+
 LEAST = 1e-150
 """Magnitude of a feature, and effect of one, that count as 0."""
 
@@ -197,8 +200,8 @@ class TrustedModel:
     @property
     def early(self) -> int:
         """Samples of a window after which the next one's solutions begin."""
-        Np = self.fixed.settings.Np
-        return Np - min(Np // 2, _AHEAD)
+        ahead = min(self.fixed.settings.Np // 2, _AHEAD)
+        return self.fixed.settings.Np - (ahead if ahead < _ABREAST else ahead - ahead % _ABREAST)
 
     def begin_solutions(self, learned: Learned) -> TrustedModel:
         """Return the model with the penalties of the next solutions, as they follow from what is learned so far."""

@@ -52,7 +52,8 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = settings->measurement_delay;
-    self->early = self->Np - (self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD);
+    const hsep_word ahead = self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD;
+    self->early = self->Np - (ahead < HSEP_TRUSTED_ABREAST ? ahead : ahead - ahead % HSEP_TRUSTED_ABREAST);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
