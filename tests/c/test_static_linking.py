@@ -105,7 +105,9 @@ def run_shared(archives: dict[str, Path]) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", ["SepCompensator", *(pytest.param(model, marks=pytest.mark.nightly) for model in ROLES.values())]
+)
 def test_nothing_but_the_fmi_functions_has_external_linkage(
     archives: dict[str, Path], headers: Path, tmp_path: Path, model: str
 ) -> None:

@@ -66,7 +66,7 @@ def trace(library: Library, resources: Path) -> list[bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["HybridPredictor", "FeedDrive_als25010_x"])
+@pytest.mark.parametrize("name", [pytest.param("HybridPredictor", marks=pytest.mark.nightly), "FeedDrive_als25010_x"])
 def test_a_table_is_what_the_header_is(folders: Folders, tmp_path: Path, name: str) -> None:
     """The library with a compiled-in table has the same outputs and states, bit for bit."""
     folder = folders(name)
