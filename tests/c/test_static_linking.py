@@ -142,7 +142,7 @@ def test_an_importer_may_choose_the_prefix(archives: dict[str, Path], headers: P
 @pytest.mark.slow
 def test_three_fmus_run_in_one_program(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
     # Another optimisation than the libraries', to whose bits it comes all the same
-    objects = [compile_all(archives[model], headers, tmp_path, "-O1") for model in MODELS]
+    objects = [compile_all(archives[model], headers, tmp_path, "-O0") for model in MODELS]
     (tmp_path / "wiring.h").write_text(wiring(archives))
     program = tmp_path / "three_fmus"
     host = ROOT / "tests" / "c" / "three_fmus.c"
