@@ -71,7 +71,11 @@ def loaded(code: str) -> set[str]:
         [],
         ["--help"],
         ["--version"],
-        *([name, "--help"] for name in ("demo", "build", "cosim", "backtest", "identify", "init", "tune")),
+        ["cosim", "--help"],
+        *(
+            pytest.param([name, "--help"], marks=pytest.mark.nightly)
+            for name in ("demo", "build", "backtest", "identify", "init", "tune")
+        ),
     ],
 )
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:

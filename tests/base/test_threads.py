@@ -34,7 +34,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.base.threads import one_blas_thread
 
-N = 1600
+N = 1100
 
 
 def blas_threads() -> set[int]:

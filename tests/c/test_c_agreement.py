@@ -11,21 +11,19 @@ from random_loops import random_loop, run_c, run_library
 
 LOOPS = [
     # change_max of 0.1 mm: nearly every plan is bounded by it
-    *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (202, 225)),
-    (261, "als25010_x", {"change_max": 1e-4}),
+    (202, "spring_mass_damper", {"change_max": 1e-4}),
     # and others, with the trajectory's limits for the drive, or anything between
-    *((seed, "spring_mass_damper", {}) for seed in (38, 256)),
+    (38, "spring_mass_damper", {}),
     # with trust
-    (4, "als25010_y", {"trust": 1}),
     (6, "als25010_x", {"trust": 1}),
     (202, "spring_mass_damper", {"trust": 1, "change_max": 1e-4}),
 ]
 AT_NIGHT = [
-    *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (213, 231, 233)),
-    (264, "als25010_x", {"change_max": 1e-4}),
-    *((seed, "spring_mass_damper", {}) for seed in (241, 250)),
+    *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (213, 225, 231, 233)),
+    *((seed, "als25010_x", {"change_max": 1e-4}) for seed in (261, 264)),
+    *((seed, "spring_mass_damper", {}) for seed in (241, 250, 256)),
     (267, "als25010_x", {}),
-    (7, "als25010_y", {"trust": 1}),
+    *((seed, "als25010_y", {"trust": 1}) for seed in (4, 7)),
     (9, "als25010_x", {"trust": 1}),
 ]
 

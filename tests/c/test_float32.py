@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
+from c_core import object_files
 from controllers import target_or_skip
 
 from benchmarks.targets.cases import KINDS, OUTPUTS, Case, header, recorded
@@ -20,15 +21,33 @@ AGREES = 5e-3
 """Relative difference of the RMS of predictions' errors that the README states for the paper's drive."""
 
 
+def options(*, single: bool) -> list[str]:
+    """Return the options of a precision for the compiler of this machine."""
+    # Constants are doubles without gcc's option; optimised, the core would take longer to compile than to run
+    return [*(["-O0", "-DHSEP_FLOAT32", "-Wno-conversion"] if single else ["-O2"]), *include_flags()]
+
+
+@cache
+def core(*, single: bool) -> list[Path]:
+    """Return the library's object files, the same for all cases; in double precision those of the other tests."""
+    sources = core_sources()
+    if not single:
+        names = {source.stem for source in sources}
+        return [path for path in map(Path, object_files()) if path.stem in names]
+    folder = build_folder() / "core_single"
+    folder.mkdir()
+    for source in sources:
+        run_compiler([*options(single=single), "-c", source, "-o", folder / f"{source.stem}.o"])
+    return sorted(folder.iterdir())
+
+
 def played(case: Case, *, single: bool) -> Replay:
     """Return a replay with the compiler of this machine, not counted."""
     folder = build_folder() / f"{case.kind}_{case.Np}_{case.windows}_{case.warm}_{single}"
     folder.mkdir()
     (folder / "case.h").write_text(header(case), encoding="utf-8")
-    sources = [HERE / "replay.c", HERE / "board_host.c", *core_sources()]
-    precision = ["-DHSEP_FLOAT32", "-Wno-conversion"] if single else []  # constants are doubles without gcc's option
-    options = ["-O2", *precision, f"-I{HERE}", f"-I{folder}", *include_flags()]
-    run_compiler([*options, *sources, "-lm", "-o", folder / "program"])
+    files = [HERE / "replay.c", HERE / "board_host.c", *core(single=single)]
+    run_compiler([*options(single=single), f"-I{HERE}", f"-I{folder}", *files, "-lm", "-o", folder / "program"])
     return replay(TARGETS["x86-64"], folder / "program", count=False)
 
 
@@ -48,7 +67,7 @@ def errors(case: Case, single: bool) -> tuple[float, Replay]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("warm", [False, True])
+@pytest.mark.parametrize("warm", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_predictions_are_as_good(warm: bool) -> None:
     case = Case("predictor", 20, 20, 60, warm)
     (single, of_single), (double, of_double) = errors(case, True), errors(case, False)

@@ -34,8 +34,11 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "n", "fixed"),
-    [(34, 550, {}), (38, 1000, {}), (233, 800, {"change_max": 1e-4})],
-    ids=["jerk bounds side by side", "limits of the trajectory", "change of 0.1 mm"],
+    [
+        pytest.param(34, 550, {}, id="jerk bounds side by side"),
+        pytest.param(38, 1000, {}, id="limits of the trajectory", marks=pytest.mark.nightly),
+        pytest.param(233, 800, {"change_max": 1e-4}, id="change of 0.1 mm", marks=pytest.mark.nightly),
+    ],
 )
 def test_the_minimum_is_that_of_another_solver(
     monkeypatch: pytest.MonkeyPatch, seed: int, n: int, fixed: dict[str, float]

@@ -49,12 +49,22 @@ def run(sep: SepCompensator, machine: Machine = STAGE, **more: object) -> Run:
 
 
 @cache
+def by_physics() -> Run:
+    return run(compensator(compensate="physics"))
+
+
+@cache
+def cold(period: float = 0.0) -> tuple[Run, bytes]:
+    """Return the run of a compensator that learns the moves, and the compensator after it."""
+    sep = compensator(predictor=replace(TRUSTED, period=period))
+    found = run(sep)
+    sep.restart(0.0)
+    return found, sep.to_bytes()
+
+
 def learned(period: float = 0.0) -> bytes:
     """Return a compensator that has learned the moves."""
-    sep = compensator(predictor=replace(TRUSTED, period=period))
-    run(sep)
-    sep.restart(0.0)
-    return sep.to_bytes()
+    return cold(period)[1]
 
 
 def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
@@ -116,10 +126,9 @@ def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
 
     predictor = HybridPredictor(STAGE.model, TRUSTED, disturbances=(sine, cosine))
     own = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS))
-    known = compensator(predictor=replace(TRUSTED, period=2e-3))
-    for sep in (own, known):
-        run(sep)
-        sep.restart(0.0)
+    run(own)
+    own.restart(0.0)
+    known = SepCompensator.from_bytes(learned(2e-3))
     x_d = moves()[:200]
     plans = [sep.plan(x_d) for sep in (SepCompensator.from_bytes(own.to_bytes(), (sine, cosine)), known)]
     assert np.abs(plans[1].x_dm - x_d[:50]).max() > 1e-6
@@ -138,13 +147,12 @@ def test_without_anything_learned_the_physics_model_plans() -> None:
 
 @pytest.mark.slow
 def test_plans_follow_friction_that_follows_the_command() -> None:
-    physics = run(compensator(compensate="physics"))
-    sep = compensator()
-    cold, warm = run(sep), run(sep, t_init=0.0)
+    physics, (first, sep) = by_physics(), cold()
+    warm = run(SepCompensator.from_bytes(sep), t_init=0.0)
     assert warm.state.max() == SepState.HYBRID
-    assert cold.tracking_rms < 0.6 * physics.tracking_rms
+    assert first.tracking_rms < 0.6 * physics.tracking_rms
     assert warm.tracking_rms < 0.2 * physics.tracking_rms
-    for found in (cold, warm):
+    for found in (first, warm):
         assert beyond(found.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6
 
 
@@ -222,7 +230,7 @@ def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
     def wrong(k: int, x_meas: float) -> float:
         return x_meas + (1e-3 if k == 430 else 0.0)
 
-    sound, other = run(compensator()), run(compensator(), sensor=wrong)
+    sound, other = cold()[0], run(compensator(), sensor=wrong)
     assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
 
 
@@ -231,7 +239,7 @@ def test_missing_measurements_are_bridged() -> None:
     def missing(k: int, x_meas: float) -> float:
         return math.nan if 400 <= k < 460 or k % 97 == 0 else x_meas
 
-    physics, found = run(compensator(compensate="physics")), run(compensator(), sensor=missing)
+    physics, found = by_physics(), run(compensator(), sensor=missing)
     assert np.isfinite(found.x_dm).all()
     assert found.tracking_rms < 0.8 * physics.tracking_rms
 

@@ -125,11 +125,12 @@ def test_fmus_equal_the_library(runs: Callable[[str, str], Run], flavour: str, c
 
 @pytest.fixture(scope="module")
 def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run]:
-    """A cold run of the library with the machine's settings, the state it ends with, and the warm run after it."""
+    """The library with the machine's settings over the first moves, cold, the state it ends with, and warm after it."""
     compensator, trained = MACHINE.new_compensator(), tmp_path_factory.mktemp("trained") / "trained.state"
-    cold = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    r = staircase()[:2000]
+    cold = cosimulate(compensator, MACHINE.new_plant(), r, encoder=Encoder(5e-6, 1))
     compensator.predictor.save(trained)
-    warm = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
+    warm = cosimulate(compensator, MACHINE.new_plant(), r, encoder=Encoder(5e-6, 2), t_init=0.0)
     return cold, trained, warm
 
 
@@ -138,17 +139,19 @@ def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run
 def test_recommended_settings_cold_and_warm(flavour: str, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]) -> None:
     pair = fmus(name_of("SepCompensator", MACHINE, flavour)), fmus(name_of("FeedDrive", MACHINE, flavour))
     first, weights, second = by_library
-    # The figures are the library's: the beginning is enough, up to where it sees the end.
-    r = staircase()[:2000] if flavour == "native" else staircase()[:1200]
+    # The figures are of the native FMU: it takes a tenth of the library's time.
+    r = staircase() if flavour == "native" else staircase()[:1200]
     cold = cosimulate(*pair, r, plant_values={"seed": 1})
-    same = until_its_end_is_seen(cold)
+    shorter = cold if flavour == "python" else first
+    same = until_its_end_is_seen(shorter)
     assert_same(cold, first, same)
     trained = fmus(name_of("SepCompensator", MACHINE, flavour), weights=weights)
     warm = cosimulate(trained, pair[1], r, plant_values={"seed": 2})
     assert_same(warm, second, same)
-    assert second.summary()["share_hybrid"] == 1.0
-    assert first.summary()["tracking_rms_um"] < 4.2
-    assert second.summary()["tracking_rms_um"] < 0.6
+    assert warm.summary()["share_hybrid"] == 1.0
+    if flavour == "native":
+        assert cold.summary()["tracking_rms_um"] < 4.2
+        assert warm.summary()["tracking_rms_um"] < 0.6
 
 
 @pytest.mark.slow

@@ -62,7 +62,7 @@ def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator"])
+@pytest.mark.parametrize("model", ["HybridPredictor", pytest.param("SepCompensator", marks=pytest.mark.nightly)])
 def test_library_and_fmu_take_each_others_place(python_fmu: Fmu, model: str) -> None:
     def new_controller() -> Any:
         return MACHINE.new_predictor() if model == "HybridPredictor" else MACHINE.new_compensator()

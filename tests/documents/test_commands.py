@@ -17,6 +17,7 @@ from places import ROOT
 from quick_fits import without_other_windows
 
 from benchmarks.pictures import RECORD, judged_figures
+from hybridsep import staircase
 
 PAGES = [
     ROOT / "README.md",
@@ -26,11 +27,15 @@ PAGES = [
 RUN = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np 100 --v_max ")
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
+BY_NIGHT = tuple(f"hybridsep identify recordings/{kind}.csv" for kind in ("log", "sweep", "frf"))
+"""Begin of lines that run at night: ``test_identify_command`` has identify read each kind of file."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 3001
 """Lines of the example log that are left once it is written, and at night once the README's fit is over: of the others
 it is tested that they work."""
+MOVES = 3500
+"""Samples of the staircase that blocks of Python run by day."""
 
 
 def test_every_block_is_run_or_shown() -> None:
@@ -60,13 +65,16 @@ def test_the_pages_run_from_first_to_last(
     whole: bool, hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     without_other_windows(monkeypatch)
+    if not whole:
+        monkeypatch.setattr("hybridsep.staircase", lambda: staircase()[:MOVES])
+    elsewhere = ELSEWHERE if whole else (*ELSEWHERE, *BY_NIGHT)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     done: set[str] = set()
     for page in PAGES:
         for language, text in RUN.findall(page.read_text(encoding="utf-8")):
             for piece in [text] if language == "python" else text.splitlines():
-                if piece in done or piece.startswith(ELSEWHERE):
+                if piece in done or piece.startswith(elsewhere):
                     continue
                 done.add(piece)
                 if language == "python":

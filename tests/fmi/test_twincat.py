@@ -85,7 +85,13 @@ def test_what_does_not_fit_is_refused(hybridsep: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model",
+    [  # in these two are all functions of the core and of both versions of FMI
+        pytest.param(model, marks=[] if model in ("SepCompensator", "HybridPredictorFmi3") else [pytest.mark.nightly])
+        for model in MODELS
+    ],
+)
 @pytest.mark.parametrize("compiler", ["clang for Microsoft's system", "zig for mingw"])
 def test_a_compiler_for_windows_takes_the_sources(fmus: BuiltFmus, compiler: str, model: str, tmp_path: Path) -> None:
     sources = unpacked(fmus(model), tmp_path)

@@ -6,6 +6,7 @@ import itertools
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,10 +20,16 @@ from hybridsep.intake.finding import HOPELESS, NAMES, Finding
 from hybridsep.intake.relation import shifted
 from hybridsep.logs.log import Log, read_log
 
-SPOILED = ("staircase", "cnc_a_axis2.csv")
+SPOILED = ("staircase", pytest.param("cnc_a_axis2.csv", marks=pytest.mark.nightly))
 """Logs that every fault is made in; ``benchmarks/intake.py`` does so in more."""
 
 MACHINES = {"staircase": "spring_mass_damper", "stage x": "als25010_x", "EMPS": "emps"}
+
+
+def by_day(name: str) -> Any:
+    """Return a log's name as a parameter: of the simulated stage one axis by day, of the random drives one."""
+    alike = name == "stage y" or (name.startswith("random drive") and name != "random drive 3")
+    return pytest.param(name, marks=[pytest.mark.nightly] if alike else [])
 
 
 def needed(name: str) -> Log:
@@ -36,7 +43,7 @@ def names(findings: tuple[Finding, ...]) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", GOOD)
+@pytest.mark.parametrize("name", [by_day(name) for name in GOOD])
 def test_a_good_log_is_not_accused(name: str) -> None:
     log = needed(name)
     machine = load_machine(MACHINES[name]) if name in MACHINES else None
@@ -97,7 +104,7 @@ def test_one_column_for_both_positions_is_found() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MACHINES)
-@pytest.mark.parametrize("delay", [10.0, 6.5, -8.0])
+@pytest.mark.parametrize("delay", [pytest.param(10.0, marks=pytest.mark.nightly), 6.5, -8.0])
 def test_a_delay_is_measured_against_the_model(name: str, delay: float) -> None:
     log = needed(name)
     (finding,) = check(replace(log, x_meas=shifted(log.x_meas, delay)), load_machine(MACHINES[name])).findings
@@ -124,7 +131,7 @@ def test_a_resonance_behind_a_servo_is_not_shifted() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["flipped", "offset of a third", "slow sensor", "five spikes", "10 samples late"])
-@pytest.mark.parametrize("scale", [1e-4, 30.0])
+@pytest.mark.parametrize("scale", [1e-4, pytest.param(30.0, marks=pytest.mark.nightly)])
 def test_findings_do_not_depend_on_the_scale(fault: str, scale: float) -> None:
     """Only the unit is a matter of scale, and it is not if it is stated."""
     spoiled = FAULTS[fault][1](needed("staircase"))
@@ -317,7 +324,7 @@ def test_what_is_no_wrapping_is_not_unwrapped() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["staircase", "random drive 3", "random drive 15", "random drive 33"])
+@pytest.mark.parametrize("name", [by_day(name) for name in ("staircase", *(f"random drive {i}" for i in (3, 15, 33)))])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_following_error_is_no_velocity(name: str, sign: float) -> None:
     log = needed(name)

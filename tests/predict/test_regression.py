@@ -167,7 +167,9 @@ def test_parameters_out_of_range(n: int, lam: float, message: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "q", "tolerance"), [(50, 3, 1e-9), (100, 99, 1e-7)])
+@pytest.mark.parametrize(
+    ("p", "q", "tolerance"), [(50, 3, 1e-9), pytest.param(100, 99, 1e-7, marks=pytest.mark.nightly)]
+)
 def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, tolerance: float) -> None:
     n, lam = 6000, 1e-12
     x_d, x = staircase.commanded()[:n], staircase.measured(0)[:n]

@@ -53,15 +53,15 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@on_adapters(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS, needs="agreement")
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
-    # 1e-11 m at every sample; a pythonfmu FMU is the library.
-    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    # 1e-11 m at every sample; a pythonfmu FMU is the library, over the first quarter.
+    tolerance, part = (0.0, 4) if new_stream.implementation == PYTHON else (1e-11, 1)
     path, model = weights(new_stream.model), new_stream.model
     loop = closed_loop(model, 6001 if model == PREDICTOR else 1501, weights=path)
-    stream = new_stream(weights=path)
+    stream, last = new_stream(weights=path), len(loop.r) // part
     stream.initialise(loop.values)
-    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(replay(stream, loop, last=last), loop.outputs[: last + 1], rtol=0, atol=tolerance)
     # The learned weights are used from the first predicted window on.
     if model == PREDICTOR:
         assert (loop.column(model, "hybrid_active")[100:] == 1.0).all()
@@ -73,10 +73,10 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
 
 
 @pytest.mark.slow
-@on_adapters((COMPENSATOR,))
+@on_adapters((COMPENSATOR,), needs="agreement")
 def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, led: Path) -> None:
     """Its counterpart doubts it, and has a part in the plans."""
-    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-10
+    tolerance = 0.0 if new_stream.implementation == PYTHON else 1e-10
     loop = closed_loop(COMPENSATOR, 700, weights=led)
     stream = new_stream(weights=led)
     stream.initialise(loop.values)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
 import staircase_data
 from places import EMPS, RECORDINGS
 
-from benchmarks.random_drives.generator import RandomDrive, random_drives
+from benchmarks.random_drives.generator import random_drive
 from hybridsep import load_machine, simulate, spiral
 from hybridsep.base.signals import Array
 from hybridsep.intake.relation import shifted
@@ -27,13 +27,9 @@ def log_of(x_d: Array, x_meas: Array, T_s: float = 1e-3) -> Log:
     return Log(T_s * np.arange(len(x_d), dtype=np.float64), x_d, x_meas, T_s, Path("log.csv"))
 
 
-@lru_cache(maxsize=1)
-def _random_drives() -> dict[int, RandomDrive]:
-    return {drive.index: drive for drive in random_drives(_RANDOM)}
-
-
+@cache
 def _random(index: int) -> Log:
-    drive = _random_drives()[index]
+    drive = random_drive(index)
     return log_of(drive.x_d, drive.x_meas)
 
 
