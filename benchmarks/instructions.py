@@ -33,8 +33,8 @@ __all__ = ["count"]
 
 WINDOWS = 60
 LIMITS = {
-    "predictor, cold": 0.33e6,
-    "predictor, warm": 0.4e6,
+    "predictor, cold": 0.35e6,
+    "predictor, warm": 0.42e6,
     "compensator, cold": 3.8e6,
     "compensator, warm": 4.1e6,
 }

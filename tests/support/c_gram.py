@@ -78,15 +78,13 @@ class CSolution:
     gram : CGram
         Its rows, settled.
     penalties : (m,) array
-        Of its first ``m`` features.
+        Of its first ``m`` features; where these are all, the second half of them is the head, else there is none.
     other, weight : CGram and float, optional
         Rows that are added with a weight, settled.
     later : (k, m + 1) array, optional
         Rows ``[φ | target]`` that come once the solution has begun.
     amounts : list of float
         Multiply-adds that are spent before each of them; what is left is done in the end.
-    n_head : int, optional
-        Features of the head, the last ones; half of them if left out, or none where ``m`` features are not all.
     """
 
     def __init__(
@@ -97,11 +95,9 @@ class CSolution:
         weight: float = 1.0,
         later: Array | None = None,
         amounts: list[float] | None = None,
-        n_head: int | None = None,
     ) -> None:
         self.library, m = gram.library, len(penalties)
-        if n_head is None:
-            n_head = m - m // 2 if m == gram.n else 0
+        n_head = m - m // 2 if m == gram.n else 0
         later = np.empty((0, m + 1)) if later is None else np.ascontiguousarray(later)
         sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later))]
         self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
@@ -115,12 +111,12 @@ class CSolution:
             other.settle()
         added = None if other is None else other._block
         self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
-        self.lefts = [self.left(len(later))]
+        self.lefts = [self.left]
         for i, row in enumerate(later):
             self.add(row[None])
             if amounts is not None:
                 self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
-                self.lefts.append(self.left(len(later) - 1 - i))
+                self.lefts.append(self.left)
         self.finish()
 
     def add(self, rows: Array) -> None:
@@ -134,8 +130,9 @@ class CSolution:
             self._part("penalties", len(penalties))[:] = penalties
         self.residual_sum = self.library.hsep_solution_finish(self._block)
 
-    def left(self, coming: int) -> float:
-        return float(self.library.hsep_solution_left(self._block, ctypes.c_uint64(coming)))
+    @property
+    def left(self) -> float:
+        return float(self.library.hsep_solution_left(self._block))
 
     @property
     def valid(self) -> bool:

@@ -15,9 +15,12 @@ from .constants import CONSTANTS
 from .disturbances import LEAST_VELOCITY
 from .expert import ExpertPrediction, SolvedExpert, solve
 from .stack import COMMAND, DOUBTING, HOLD, LAGGED, N_EXPERTS, STATIC
-from .state import LEAST, OF_COMMAND, OF_PHYSICS, TrustedModel
+from .state import OF_COMMAND, OF_PHYSICS, TrustedModel
 
 __all__ = ["TrustedForecast", "forecast", "forecast_by", "scales_of", "solved"]
+
+_LEAST = 1e-150
+"""Magnitude of a feature that counts as 0."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,15 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
 def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
     """Return an expert with the weights that follow from rows."""
     settings, kind = state.fixed.settings, state.kind_of(expert)
+    square = state.learned.scales[kind].largest_square
+    effect = settings.effect or math.sqrt(square)
     if kind == OF_COMMAND:
-        return solve(rows, state.noise_of(expert), state.priors, state.fixed.command.p)
-    effect = settings.effect or math.sqrt(state.learned.scales[kind].largest_square)
-    priors = effect * state.fixed.static.shares / np.maximum(scales.largest, LEAST)
-    return solve(rows, state.noise_of(expert), priors, 0 if expert == STATIC else settings.p)
+        command = state.fixed.command
+        p, shares, largest = command.p, command.shares, command.largest(scales.step)
+    else:
+        p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
+    priors = effect * shares / np.maximum(largest, _LEAST)
+    return solve(rows, state.noise_of(expert), priors, p)
 
 
 def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:

@@ -64,7 +64,7 @@ def _folded(
 ) -> TrustedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
-    The next window's solutions begin before the last rows.
+    Variances of the noise for the next window are taken before the last rows.
     """
     settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
     accepted = ~bridged[-n:]
@@ -88,7 +88,7 @@ def _folded(
         return of_physics, of_command
 
     state = replace(state, evidence=learned((one.discount(kept) for one in state.evidence), slice(early)))
-    state = state.begin_solutions(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
+    state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
     return replace(state, evidence=learned(state.evidence, slice(early, n)))
 
 
@@ -132,7 +132,7 @@ def _judged(
     anew = {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(DOUBTING)}
     learned = replace(learned.with_errors(anew), stack=Stack.init())
     evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
-    return replace(state, learned=learned, evidence=evidence).begin_solutions(learned)
+    return replace(state, learned=learned, evidence=evidence).with_noise(learned)
 
 
 def learn(

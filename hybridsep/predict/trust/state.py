@@ -10,7 +10,6 @@ are the same in that unit.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -31,7 +30,6 @@ from .reach import Reach
 from .stack import COMMAND, DOUBTING, LAGGED, N_JUDGED, Stack
 
 __all__ = [
-    "LEAST",
     "OF_COMMAND",
     "OF_PHYSICS",
     "Learned",
@@ -48,14 +46,8 @@ OF_PHYSICS, OF_COMMAND, N_RESIDUALS = range(3)
 """Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
 
 _AHEAD = 20
-"""Samples before the end of a window, half of it at most, at which the next one's solutions begin: a controller factors
-most of them in these samples."""
-
-_ABREAST = 4
-"""Rows that a controller takes in together: where that many samples are left, they are a multiple of it."""
-
-LEAST = 1e-150
-"""Magnitude of a feature, and effect of one, that count as 0."""
+"""Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
+penalties come from: a controller factors most of that solution in them."""
 
 _ROUNDING = 1e-6
 """What rounding may have added to the sum of the stack's weights."""
@@ -172,8 +164,6 @@ class TrustedModel:
         Rows of the residuals of the physics model, and of the command.
     noise : tuple of float, m²
         Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
-    priors : (p_A + 2,) array
-        Prior standard deviations of the weights of the command's features without lags, in that solution.
     leading : int
         Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
     run : RunState
@@ -185,7 +175,6 @@ class TrustedModel:
     learned: Learned
     evidence: tuple[Evidence, Evidence]
     noise: tuple[float, ...] = field(metadata=within())
-    priors: Array = field(metadata=within())
     leading: int
     run: RunState
 
@@ -199,13 +188,13 @@ class TrustedModel:
 
     @property
     def early(self) -> int:
-        """Samples of a window after which the next one's solutions begin."""
-        ahead = min(self.fixed.settings.Np // 2, _AHEAD)
-        return self.fixed.settings.Np - (ahead if ahead < _ABREAST else ahead - ahead % _ABREAST)
+        """Samples of a window after which the variances for the next one are taken."""
+        Np = self.fixed.settings.Np
+        return Np - min(Np // 2, _AHEAD)
 
-    def begin_solutions(self, learned: Learned) -> TrustedModel:
-        """Return the model with the penalties of the next solutions, as they follow from what is learned so far."""
-        settings, command = self.fixed.settings, self.fixed.command
+    def with_noise(self, learned: Learned) -> TrustedModel:
+        """Return the model with the variances of the noise that follow from what is learned so far."""
+        settings = self.fixed.settings
 
         def noise(expert: int) -> float:
             kind = self.kind_of(expert)
@@ -215,9 +204,7 @@ class TrustedModel:
             kept = CONSTANTS.less if expert == DOUBTING else 1.0
             return learned.errors_of(expert).variance(self.evidence[kind].target_square(kept), first, least)
 
-        effect = max(settings.effect or math.sqrt(learned.scales[OF_COMMAND].largest_square), LEAST)
-        priors = effect * command.shares / np.maximum(command.largest(learned.largest_step), LEAST)
-        return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)), priors=priors)
+        return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
 
     @property
     def doubts(self) -> bool:
@@ -265,8 +252,7 @@ def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Distur
     static = StaticFeatures(discrete, settings.q, settings.period, own)
     fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
     evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
-    noise, priors = (0.0,) * N_JUDGED, np.zeros(fixed.command.p + 2)
-    return TrustedModel(fixed, Learned.init(fixed), evidence, noise, priors, LAGGED, RunState.init(fixed))
+    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, LAGGED, RunState.init(fixed))
 
 
 def restart(state: TrustedModel) -> TrustedModel:
@@ -279,8 +265,8 @@ def restart(state: TrustedModel) -> TrustedModel:
         stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
     learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
     evidence = of_physics, of_command
-    begun = TrustedModel(fixed, learned, evidence, state.noise, state.priors, leading, RunState.init(fixed))
-    return begun.begin_solutions(learned)
+    begun = TrustedModel(fixed, learned, evidence, state.noise, leading, RunState.init(fixed))
+    return begun.with_noise(learned)
 
 
 def plan_ahead(state: TrustedModel) -> TrustedModel:

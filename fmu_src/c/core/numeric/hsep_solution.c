@@ -122,18 +122,11 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     self->waiting++;
 }
 
-/* Multiply-adds to take in rows together. */
-static hsep_real solution_together(const hsep_solution *self)
-{
-    return 8.0 * (hsep_real)self->n_head * (hsep_real)(self->n_head + self->n_tail + 1);
-}
-
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word coming)
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
     const hsep_real tail = (hsep_real)self->n_tail + 1.0;
-    const hsep_word groups = (self->waiting + coming + SOLUTION_TOGETHER - 1) / SOLUTION_TOGETHER;
-    return (all * all * all - tail * tail * tail) / 6.0 + (hsep_real)groups * solution_together(self);
+    return (all * all * all - tail * tail * tail) / 6.0;
 }
 
 /* Take in the last rows that wait: four, with rows of 0 in their place if there are fewer, or one. */
@@ -163,10 +156,10 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
             hsep_at(self, self->factor), width, self->factored, self->factored + count, hsep_at(self, self->least));
         self->factored += count;
         amount -= 0.5 * (hsep_real)HSEP_CHOLESKY_PANEL * height * height;
+        all = 0;
     }
-    while (self->waiting >= (all ? 1 : SOLUTION_TOGETHER) && amount > 0.0) {
+    if (self->factored == self->n_head && (all || self->waiting >= SOLUTION_TOGETHER)) {
         solution_take_in(self);
-        amount -= solution_together(self);
     }
     return amount;
 }
@@ -178,7 +171,10 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *w = hsep_at(self, self->weights);
     hsep_real *least = hsep_at(self, self->least), *diagonal = tail, *row = hsep_at(self, self->factor);
     if (!self->finished) {
-        (void)hsep_solution_advance(self, INFINITY, 1);
+        (void)hsep_solution_advance(self, INFINITY, 0);
+        while (self->waiting > 0) {
+            solution_take_in(self);
+        }
         memcpy(left, tail, (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real));
         self->finished = 1;
     } else {

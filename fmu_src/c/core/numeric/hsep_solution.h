@@ -4,10 +4,10 @@
  *
  * The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot of its Cholesky factor is
  * less than its penalty. Penalties of the head of the features are known before the last rows are, penalties of the
- * tail, if it has any, are not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the
- * head by and by, hsep_solution_row takes rows that come meanwhile, which go into the factor by reflections. What is
- * left for hsep_solution_finish are the last rows, mostly one, and the tail. The solution is the same to rounding as
- * with all rows at once.
+ * tail are not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
+ * hsep_solution_row takes rows that come meanwhile, which go into the factor by reflections. What is left for
+ * hsep_solution_finish are the last rows, mostly one, and the tail. The solution is the same to rounding as with all
+ * rows at once.
  *
  * Rows of a Gram matrix have the tail first. The head is factored from its last feature to its first: where these are
  * lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
@@ -63,11 +63,11 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
 /* Take another row of features, as the Gram matrix has them, and its target; the rows behind room are not taken. */
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
 
-/* Multiply-adds that are left to factor the head, and to take in the rows that wait and coming ones. */
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word coming);
+/* Multiply-adds that are left to factor the head. */
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self);
 
-/* Factor the head, by panels of about 4 n^2 multiply-adds, then take in rows that wait, four for 8 n_head n of them, or
- * with all fewer, until an amount is spent; return what is left of it. */
+/* Factor the head, by panels of about 4 n^2 multiply-adds until an amount is spent, and return what is left of it. Once
+ * the head is factored, take in four rows that wait, or with all fewer, for 8 n_head n multiply-adds. */
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
 
 /* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the rows

@@ -55,9 +55,8 @@
 #define HSEP_OF_COMMAND 1
 #define HSEP_N_RESIDUALS 2
 #define HSEP_TRUSTED_AHEAD 20
-#define HSEP_TRUSTED_ABREAST 4
-#define HSEP_TRUSTED_LEAST HSEP_TINY(1e-150)
 #define HSEP_TRUSTED_ROUNDING 1e-06
+#define HSEP_TRUSTED_LEAST HSEP_TINY(1e-150)
 #define HSEP_TRUSTED_BRIDGED 3
 
 /* hybridsep/predict/trust/constants.py */

@@ -36,8 +36,7 @@ static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shap
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
-    self->solution = hsep_take_block(
-        &end, hsep_solution_size(shape->p + (shape->n_static - shape->n_late), shape->n_late, shape->ahead));
+    self->solution = hsep_take_block(&end, hsep_solution_size(shape->p, shape->n_static, shape->ahead));
     return end * sizeof(hsep_real);
 }
 
@@ -47,8 +46,7 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 {
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
-    hsep_solution_init(
-        hsep_expert_solution(self), shape->p + (shape->n_static - shape->n_late), shape->n_late, shape->ahead);
+    hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->ahead);
     for (hsep_word i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
             hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
@@ -59,9 +57,7 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 {
     hsep_expert got;
     return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape)) &&
-           hsep_solution_valid(
-               hsep_at_bytes(block, got.solution), shape->p + (shape->n_static - shape->n_late), shape->n_late,
-               shape->ahead);
+           hsep_solution_valid(hsep_at_bytes(block, got.solution), shape->p, shape->n_static, shape->ahead);
 }
 
 /* Least sum of squares that counts, of targets whose squares have a sum. */
@@ -70,31 +66,20 @@ static hsep_real expert_resolved(hsep_real square)
     return hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_SOLUTION_RESOLUTION) * square;
 }
 
-/* Penalties on the weights of the features without lags. */
-static void expert_penalise(const hsep_expert *self, const hsep_real scales[], hsep_real penalties[])
-{
-    for (hsep_word i = 0; i < self->n_static; i++) {
-        penalties[i] = self->variance / (scales[i] * scales[i]);
-    }
-}
-
 HSEP_API void hsep_expert_begin_solution(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
-    hsep_real least, const hsep_real scales[])
+    hsep_real least)
 {
     const hsep_gram *of_run = hsep_evidence_of_run(evidence), *earlier = hsep_evidence_earlier(evidence);
     const hsep_real of_earlier = earlier->n_rows > 0.0 ? weight * hsep_gram_square(earlier) : 0.0;
     const hsep_real resolved = expert_resolved(hsep_gram_square(of_run) + of_earlier);
     const hsep_real noise = errors->noise_variance > 0.0 ? errors->noise_variance : first;
     hsep_solution *solution = hsep_expert_solution(self);
-    hsep_real *penalties = hsep_at(solution, solution->penalties);
-    const hsep_real *lag_scales = hsep_at(self, self->lag_scales);
+    hsep_real *penalties = hsep_at(solution, solution->penalties) + self->n_static;
+    const hsep_real *scales = hsep_at(self, self->lag_scales);
     self->variance = hsep_fmax(hsep_fmax(noise, least), resolved) * errors->correlation;
     for (hsep_word i = 0; i < self->p; i++) {
-        penalties[self->n_static + i] = self->variance / (lag_scales[i] * lag_scales[i]);
-    }
-    if (solution->n_tail == 0) {
-        expert_penalise(self, scales, penalties);
+        penalties[i] = self->variance / (scales[i] * scales[i]);
     }
     hsep_solution_begin(solution, of_run, earlier->n_rows > 0.0 ? earlier : NULL, weight);
 }
@@ -102,8 +87,9 @@ HSEP_API void hsep_expert_begin_solution(
 HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[])
 {
     hsep_solution *solution = hsep_expert_solution(self);
-    if (solution->n_tail > 0) {
-        expert_penalise(self, scales, hsep_at(solution, solution->penalties));
+    hsep_real *penalties = hsep_at(solution, solution->penalties);
+    for (hsep_word i = 0; i < self->n_static; i++) {
+        penalties[i] = self->variance / (scales[i] * scales[i]);
     }
     self->rows_variance = hsep_fmax(hsep_solution_finish(solution), expert_resolved(solution->square)) / n_rows;
 }
@@ -146,7 +132,6 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
 {
     const hsep_word n_static = self->n_static, p = self->p;
     hsep_solution *solution = hsep_expert_solution(self);
-    const int backwards = solution->n_tail == 0; /* the head */
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
     for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
         const hsep_word sample = k + (c < count ? c : count - 1); /* what is beyond is a copy */
@@ -155,7 +140,7 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
             to[HSEP_SOLUTION_ABREAST * (p - 1 - i) + c] = lags[i];
         }
         for (hsep_word i = 0; i < n_static; i++) {
-            to[HSEP_SOLUTION_ABREAST * (p + (backwards ? n_static - 1 - i : i)) + c] = row[i];
+            to[HSEP_SOLUTION_ABREAST * (p + i) + c] = row[i];
         }
     }
     hsep_solution_leverages(solution, count, leverages);

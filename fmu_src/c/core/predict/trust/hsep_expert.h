@@ -28,7 +28,6 @@ typedef struct {
 typedef struct {
     hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
     hsep_word n_static, p; /* features without lags, lags */
-    hsep_word n_late;      /* the first ones of these whose scales follow from the coming commands: all or none */
     hsep_word ahead;       /* samples of a window that come once its solution is begun */
 } hsep_expert_shape;
 
@@ -47,11 +46,11 @@ typedef struct {
     hsep_word response;   /* (n + p,) the recursion's impulse response, behind it 0 */
     hsep_word squares;    /* (n,) its squares, oldest first */
     hsep_word variances;  /* (n,) m2, of the rows */
-    hsep_word solution;   /* hsep_solution, whose tail are the features whose scales come late */
+    hsep_word solution;   /* hsep_solution, whose head are the lags */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
-HSEP_ASSERT_WORDS(hsep_expert_shape, 6);
+HSEP_ASSERT_WORDS(hsep_expert_shape, 5);
 HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
 HSEP_ASSERT_WORDS(hsep_expert, 17);
 
@@ -76,14 +75,13 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
 }
 
 /* Begin to solve for the weights from the rows so far, both parts of them settled, rows of earlier runs weighed by
- * weight. first, least: m2, variance of the noise while it is not known, and the least one; scales: (n_static,) prior
- * standard deviations of the weights without lags, unless they come late. */
+ * weight. first, least: m2, variance of the noise while it is not known, and the least one. */
 HSEP_API void hsep_expert_begin_solution(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
-    hsep_real least, const hsep_real scales[]);
+    hsep_real least);
 
 /* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
- * without lags, if they come late. Costs a hsep_solution_finish. */
+ * without lags. Costs a hsep_solution_finish. */
 HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[]);
 
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */

@@ -14,13 +14,15 @@
 #include "hsep_disturbances.h"
 #include "hsep_evidence.h"
 #include "hsep_expert.h"
-#include "hsep_math.h"
 #include "hsep_reach.h"
 #include "hsep_stack.h"
 
 /* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
+
+/* The last samples of a window have no factoring, one for so many rows that come while there is some. */
+#define HSEP_TRUSTED_ROWS 8
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
@@ -103,12 +105,6 @@ static inline hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_word exp
 
 /* HSEP_OF_COMMAND if an expert predicts the residual of the command, else HSEP_OF_PHYSICS. */
 HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expert);
-
-/* Standard deviation of the effect that a feature may have, m, with the largest mean square of a window, m2. */
-static inline hsep_real hsep_trusted_effect(const hsep_trusted *self, hsep_real square)
-{
-    return self->effect > 0.0 ? self->effect : hsep_sqrt(square);
-}
 
 /* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(hsep_trusted *self);

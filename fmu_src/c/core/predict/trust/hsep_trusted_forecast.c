@@ -6,6 +6,10 @@
 
 #include <stddef.h>
 
+/* Features without lags of an expert, at most. */
+#define TRUSTED_OF_COMMAND (HSEP_TRUST_LAGS_OF_COMMAND + 2)
+#define TRUSTED_MOST (TRUSTED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? TRUSTED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
+
 /* Take the scales of velocity and command; return whether the commanded velocity outgrows what was learned. A
  * compensator begins to move before the path, with a creep: its first scale is the path's. */
 static int trusted_outgrown(hsep_trusted *self, const hsep_real x_d[], const hsep_real path[], hsep_word n_path)
@@ -48,32 +52,31 @@ static int trusted_scale(
     return outgrown;
 }
 
-/* Prior standard deviations of the weights of the features of motion, from the largest ones with this window. */
-static void trusted_scales_of_motion(hsep_trusted *self, hsep_real scales[])
+/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
+static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
 {
-    const hsep_real effect = hsep_trusted_effect(self, self->learned.scales[HSEP_OF_PHYSICS].largest_square);
-    const hsep_real *largest = hsep_at(self, self->forecast_largest);
-    for (hsep_word i = 0; i < self->n_static; i++) {
-        const hsep_real share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
-        scales[i] = effect * share / hsep_fmax(largest[i], HSEP_TRUSTED_LEAST);
-    }
-}
-
-/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. scales:
- * (n_static,) of the features of motion; those of the command are known to its solution. */
-static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight, const hsep_real scales[])
-{
-    hsep_evidence *evidence = hsep_trusted_evidence(self, hsep_trusted_kind_of(self, place));
+    const hsep_word kind = hsep_trusted_kind_of(self, place);
+    hsep_evidence *evidence = hsep_trusted_evidence(self, kind);
     const hsep_real n_rows = hsep_evidence_of_run(evidence)->n_rows + weight * hsep_evidence_earlier(evidence)->n_rows;
-    hsep_expert_solve(hsep_trusted_expert(self, place), n_rows, scales);
+    const hsep_real square = self->learned.scales[kind].largest_square;
+    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
+    hsep_expert *expert = hsep_trusted_expert(self, place);
+    hsep_real scales[TRUSTED_MOST];
+    for (hsep_word i = 0; i < expert->n_static; i++) {
+        const int of_command = kind == HSEP_OF_COMMAND;
+        const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];
+        const hsep_real largest = !of_command ? of_motion : i > 0 ? self->forecast_step : 1.0;
+        const hsep_real share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
+                                           : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        scales[i] = effect * share / hsep_fmax(largest, HSEP_TRUSTED_LEAST);
+    }
+    hsep_expert_solve(expert, n_rows, scales);
 }
 
 /* Solve for the weights of the experts that know something. */
 static void trusted_solved(hsep_trusted *self, int outgrown)
 {
     hsep_word *predicted = self->predicted, known[HSEP_N_RESIDUALS];
-    hsep_real scales[HSEP_DISTURBANCES_MOST];
-    trusted_scales_of_motion(self, scales);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         known[i] =
             hsep_evidence_n_rows(hsep_trusted_evidence(self, i)) > 0.0 && self->learned.scales[i].largest_square > 0.0;
@@ -85,7 +88,7 @@ static void trusted_solved(hsep_trusted *self, int outgrown)
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         predicted[i] = predicted[i] && hsep_trusted_expert(self, i)->variance > 0.0;
         if (predicted[i]) {
-            trusted_solve(self, i, i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0, scales);
+            trusted_solve(self, i, i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0);
         }
     }
 }

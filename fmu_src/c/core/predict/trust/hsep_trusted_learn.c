@@ -139,17 +139,17 @@ static void trusted_begin_next(hsep_trusted *self, const hsep_real e[])
 /* Go on with them after sample last - 1: their heads are factored before the last rows come. */
 static void trusted_advance(hsep_trusted *self, hsep_word last)
 {
-    const hsep_word left = self->Np - last; /* samples with this one; the last one's row comes with the window's end */
+    const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / HSEP_TRUSTED_ROWS + 1;
     hsep_real amount = 0.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_solution *solution = hsep_trusted_solution(self, i);
-        amount += solution != NULL ? hsep_solution_left(solution, left - 1) : 0.0;
+        amount += solution != NULL ? hsep_solution_left(solution) : 0.0;
     }
-    amount /= (hsep_real)left;
+    amount /= left > of_rows + 1 ? (hsep_real)(left - of_rows) : 1.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         hsep_solution *solution = hsep_trusted_solution(self, i);
         if (solution != NULL) {
-            amount = hsep_solution_advance(solution, left > 1 ? amount : INFINITY, left == 1);
+            amount = hsep_solution_advance(solution, amount, left == 1);
         }
     }
 }

@@ -25,10 +25,10 @@ static hsep_expert_shape trusted_shape(const hsep_trusted *self, hsep_word exper
 {
     if (hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND) {
         return (hsep_expert_shape){
-            self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, 0, self->Np - self->early};
+            self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, self->Np - self->early};
     }
     const hsep_word p = expert == HSEP_STATIC ? 0 : self->p;
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, self->n_static, self->Np - self->early};
+    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, self->Np - self->early};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
@@ -52,8 +52,7 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = settings->measurement_delay;
-    const hsep_word ahead = self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD;
-    self->early = self->Np - (ahead < HSEP_TRUSTED_ABREAST ? ahead : ahead - ahead % HSEP_TRUSTED_ABREAST);
+    self->early = self->Np - (self->Np / 2 < HSEP_TRUSTED_AHEAD ? self->Np / 2 : HSEP_TRUSTED_AHEAD);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
@@ -135,25 +134,12 @@ HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expe
     return trained ? hsep_expert_solution(hsep_trusted_expert(self, expert)) : NULL;
 }
 
-/* Prior standard deviations of the weights of the command's features without lags, from the largest step so far. */
-static void trusted_scales_of_command(hsep_trusted *self, hsep_real square, hsep_real scales[])
-{
-    const hsep_command *command = hsep_trusted_command(self);
-    const hsep_real effect = hsep_fmax(hsep_trusted_effect(self, square), HSEP_TRUSTED_LEAST);
-    for (hsep_word i = 0; i < command->count; i++) {
-        const hsep_real largest = i > 0 ? self->learned.largest_step : 1.0;
-        scales[i] = effect * hsep_command_share(command, i) / hsep_fmax(largest, HSEP_TRUSTED_LEAST);
-    }
-}
-
 HSEP_API void hsep_trusted_begin_solutions(
     hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[])
 {
-    hsep_real of_command[HSEP_TRUST_LAGS_OF_COMMAND + 2];
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
     }
-    trusted_scales_of_command(self, scales[HSEP_OF_COMMAND].largest_square, of_command);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_word kind = hsep_trusted_kind_of(self, i);
         const hsep_real square = scales[kind].largest_square, weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
@@ -162,7 +148,7 @@ HSEP_API void hsep_trusted_begin_solutions(
         if (hsep_trusted_solution(self, i) != NULL) {
             hsep_expert_begin_solution(
                 hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors[i - HSEP_LAGGED],
-                first, least, of_command);
+                first, least);
         }
     }
 }
