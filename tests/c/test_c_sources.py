@@ -23,7 +23,7 @@ SUFFIXES = (".c", ".h", ".cpp")
 SANITISED = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 """Not optimised: that would take three times as long to compile."""
 ALIKE = sorted(c_core.TABLES.keys() - {"compensator_2", "trajectory"})
-"""Tables of models whose functions those of the two others call too, or are of a drive."""
+"""Tables that run at night: each has the same sources as the two others, and calls some of their functions."""
 
 
 def at_night(*values: object) -> Any:

@@ -88,7 +88,7 @@ def compiled_by(compiler: list[str], model: str, fmi: str, *, at_night: bool = F
 @pytest.mark.parametrize(
     ("compiler", "model", "fmi"),
     [
-        # The core by clang, all else by gcc, with which the other tests of the C core compile it file by file
+        # The core by clang once; by gcc the other tests of the C core compile it file by file
         compiled_by(CLANG, "HybridPredictor", "2"),
         compiled_by(GCC, "SepCompensator", "2"),
         compiled_by(GCC, "FeedDrive", "2"),

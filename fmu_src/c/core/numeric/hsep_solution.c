@@ -7,9 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Rows that are taken in together. */
-#define SOLUTION_TOGETHER 4
-
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real solution_lay_out(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room)
 {
@@ -133,12 +130,12 @@ HSEP_API hsep_real hsep_solution_left(const hsep_solution *self)
 static void solution_take_in(hsep_solution *self)
 {
     const hsep_word width = self->n_head + self->n_tail + 1;
-    const hsep_word count = self->waiting < SOLUTION_TOGETHER ? self->waiting : SOLUTION_TOGETHER;
+    const hsep_word count = self->waiting < HSEP_SOLUTION_ABREAST ? self->waiting : HSEP_SOLUTION_ABREAST;
     hsep_real *work = hsep_at(self, self->work);
     self->waiting -= count;
     memcpy(work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
     if (count > 1) {
-        memset(work + width * count, 0, (size_t)(width * (SOLUTION_TOGETHER - count)) * sizeof(hsep_real));
+        memset(work + width * count, 0, (size_t)(width * (HSEP_SOLUTION_ABREAST - count)) * sizeof(hsep_real));
         hsep_cholesky_take_four(hsep_at(self, self->factor), width, self->n_head, work);
     } else if (count == 1) {
         hsep_cholesky_take_one(hsep_at(self, self->factor), width, self->n_head, work);
@@ -158,7 +155,7 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
         amount -= 0.5 * (hsep_real)HSEP_CHOLESKY_PANEL * height * height;
         all = 0;
     }
-    if (self->factored == self->n_head && (all || self->waiting >= SOLUTION_TOGETHER)) {
+    if (self->factored == self->n_head && (all || self->waiting >= HSEP_SOLUTION_ABREAST)) {
         solution_take_in(self);
     }
     return amount;
@@ -255,8 +252,7 @@ static inline void solution_leverages(hsep_solution *self, hsep_lanes sums[HSEP_
 HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
     hsep_lanes sums[HSEP_OF_FOUR];
-    memset(leverages, 0, HSEP_SOLUTION_ABREAST * sizeof *leverages);
-    memcpy(sums, leverages, sizeof sums);
+    memset(sums, 0, sizeof sums);
     if (count > 1) {
         solution_leverages(self, sums, HSEP_OF_FOUR);
     } else {

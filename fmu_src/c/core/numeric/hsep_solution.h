@@ -30,7 +30,7 @@
 #define HSEP_SOLUTION_RESOLUTION 1e-14
 #endif
 
-#define HSEP_SOLUTION_ABREAST 4 /* rows whose leverages are computed side by side */
+#define HSEP_SOLUTION_ABREAST 4 /* rows that are taken in together, or whose leverages are computed side by side */
 
 typedef struct {
     hsep_word n_head, n_tail; /* features */

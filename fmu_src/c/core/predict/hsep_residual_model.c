@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Parts in which the trusted model predicts a window, as variances are dear. */
+/* Parts in which the trusted model predicts a window behind its first sample, as variances are dear. */
 static const hsep_word residual_parts = 25;
 
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
