@@ -35,8 +35,8 @@ WINDOWS = 60
 LIMITS = {
     "predictor, cold": 0.35e6,
     "predictor, warm": 0.42e6,
-    "compensator, cold": 3.8e6,
-    "compensator, warm": 4.1e6,
+    "compensator, cold": 1.35e6,
+    "compensator, warm": 1.45e6,
 }
 """Instructions of the dearest sample."""
 

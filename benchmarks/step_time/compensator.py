@@ -52,7 +52,7 @@ TAIL_MAX = 300e3
 MEDIAN_OVER_PREDICTOR_MAX = 2.0
 TRUST_MEDIAN_MAX = 6.0
 """Limit of the median with trust, relative to the paper's settings."""
-TRUST_MOST = 6.5e6
+TRUST_MOST = 2e6
 """Limit of the instructions of the most expensive step with trust."""
 TRUST_LONGEST = 0.5
 """Limit of the longest step with trust, if nothing interrupts it, relative to T_s."""

@@ -68,9 +68,11 @@ def _compensator(case: Case) -> SepCompensator:
 def recorded(case: Case) -> tuple[Array, bytes]:
     """Return the samples ``(x_d_ahead, x_meas)``, (n, 2), m, of a run of the library on the paper's drive, and weights.
 
-    The weights are those that it has learned at the end of its cold run; empty for a cold one.
+    The weights are those that it has learned at the end of its cold run; empty for a cold one. The commands are numbers
+    of single precision, so that the library and every replay plan the same motion: the jerk of commands that are
+    rounded differs by hundredths of a limit.
     """
-    command = np.tile(staircase()[:-1], 3)
+    command = np.tile(staircase()[:-1], 3).astype(np.float32).astype(np.float64)
     drive, encoder = load_machine("spring_mass_damper").new_plant(), Encoder(5e-6, 7)
     controller = _predictor(case) if case.kind == "predictor" else _compensator(case)
     predictor = controller if isinstance(controller, HybridPredictor) else controller.predictor

@@ -13,10 +13,10 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..base.settings import Limits
 from ..base.signals import Array
-from .interior import EXACT, PRIMAL_RESIDUAL, Minimum, Tolerance, minimise
+from .interior import EXACT, Ending, Minimum, Tolerance, minimise
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["Bounds", "DriveBounds", "solve"]
+__all__ = ["Bounds", "DriveBounds", "solve", "solve_again"]
 
 _ROUNDING = 1e-9
 """Tolerance for rounding, as a share of a limit: bounds are tightened by it; rows that change by less do not bind."""
@@ -49,9 +49,9 @@ class Bounds:
         values = self.rows @ c
         return bool(np.all(values >= self.low) and np.all(values <= self.high))
 
-    def step(self, rest: Array, c: Array) -> float:
-        """Return the largest feasible step length, 0 … 1, from the feasible ``rest`` towards ``c``."""
-        here, step = self.rows @ rest, self.rows @ (c - rest)
+    def step(self, start: Array, c: Array) -> float:
+        """Return the largest feasible step length, 0 … 1, from feasible coefficients ``start`` towards ``c``."""
+        here, step = self.rows @ start, self.rows @ (c - start)
         margin = np.where(step > 0, self.high - here, here - self.low)
         beyond = np.abs(step) > np.maximum(margin, _ROUNDING)
         return float(np.min(margin[beyond] / np.abs(step[beyond]), initial=1.0))
@@ -138,7 +138,6 @@ def solve(
     n_pinned: int,
     *,
     always: bool = False,
-    may_bind: bool = True,
     tolerance: Tolerance = EXACT,
 ) -> Minimum | None:
     """Return the minimiser of the cost within the bounds.
@@ -156,15 +155,13 @@ def solve(
         Coefficients that a bounded plan does not change, < n.
     always : bool
         Whether no plan changes them.
-    may_bind : bool
-        Whether the bounds may be active, which takes steps of the interior-point solver.
     tolerance : Tolerance
-        Of these steps.
+        Of the interior-point solver, where the bounds are active.
 
     Returns
     -------
     Minimum or None
-        ``(n,)``, m; None if there is no finite minimiser, or none within bounds that may not be active.
+        ``(n,)``, m; None if there is no finite minimiser.
     """
     n_kept = n_pinned if always else 0
     c = _unbounded(cost, rest, n_kept)
@@ -172,9 +169,30 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    if not may_bind:
-        return None
-    return _bounded(cost, bounds, rest, n_pinned, _cost_scale(cost, c, rest, n_kept), tolerance)
+    return _bounded(cost, bounds, rest, n_pinned, rest, _cost_scale(cost, c, rest, n_kept), tolerance)
+
+
+def solve_again(
+    cost: PlanCost,
+    bounds: Bounds,
+    rest: Array,
+    n_pinned: int,
+    start: Array,
+    last: Ending,
+    tolerance: Tolerance,
+) -> Minimum:
+    """Return the minimiser of a cost near that of the last plan, which the same bounds bound.
+
+    Parameters
+    ----------
+    cost, bounds, rest, n_pinned, tolerance
+        As in :func:`solve`, with ``always``.
+    start : (n,) array, m
+        Where the last plan ended.
+    last : Ending
+        Of the last plan.
+    """
+    return _bounded(cost, bounds, rest, n_pinned, start, last, tolerance)
 
 
 def _unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
@@ -193,15 +211,25 @@ def _cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
     return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
 
 
-def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float, tolerance: Tolerance) -> Minimum:
+def _bounded(
+    cost: PlanCost,
+    bounds: Bounds,
+    rest: Array,
+    n_pinned: int,
+    start: Array,
+    scale: float | Ending,
+    tolerance: Tolerance,
+) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from ``rest``, and solver steps.
 
     Parameters
     ----------
     cost, bounds, rest, n_pinned, tolerance
         As in :func:`solve`.
-    scale : float, m²
-        :func:`_cost_scale`.
+    start : (n,) array, m
+        Initial iterate.
+    scale : float or Ending
+        :func:`_cost_scale`, m², or the end of a programme that is nearly the same.
     """
     pinned, problem = rest[:n_pinned], cost.without(rest[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
@@ -210,13 +238,17 @@ def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: 
         problem.P,
         problem.v,
         rows[touched],
-        (bounds.low - taken)[touched] + PRIMAL_RESIDUAL,
-        (bounds.high - taken)[touched] - PRIMAL_RESIDUAL,
-        rest[n_pinned:],
+        (bounds.low - taken)[touched] + tolerance.margin,
+        (bounds.high - taken)[touched] - tolerance.margin,
+        start[n_pinned:],
         scale,
         tolerance,
     )
+    assert found.ending is not None
+    inner = found.ending.inner
+    start = rest if inner is None else np.concatenate((pinned, inner))
     best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():
-        return Minimum(rest, found.steps)
-    return Minimum(rest + bounds.step(rest, best) * (best - rest), found.steps)
+        return found._replace(x=rest)
+    # Bounds that are exceeded, as steps are limited, are so by little
+    return found._replace(x=start + bounds.step(start, best) * (best - start))

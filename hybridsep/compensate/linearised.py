@@ -32,6 +32,10 @@ _OWN_REACH = 1e-3
 the friction's is the tangent."""
 
 
+_APART = 4
+"""Samples behind the window that share the variance of the first one's features."""
+
+
 class DisturbanceSlopes(NamedTuple):
     """Slopes of the disturbances at given commands.
 
@@ -88,12 +92,15 @@ class PlanModel:
         Commands between there and the preview, relative to the start.
     start : float, m
     x_d, path : (n,) array, m
-        Commands from which the scales of the features and the variances of predictions follow; and unmodified commands.
+        Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
+        last plan; and unmodified commands.
         Both relative to the start.
 
     Attributes
     ----------
     scales : FeatureScales
+    of_rest : TrustedForecast
+        Prediction under ``x_d``, whose variances all others have.
     """
 
     def __init__(self, model: TrustedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
@@ -102,7 +109,10 @@ class PlanModel:
         window = self._window(x_d)
         self.scales = scales_of(model, window, path)
         self._solved = solved(model, self.scales)
-        self._held = forecast_by(model, self._solved, window, self.scales).predictions
+        counts = np.arange(len(late) + len(x_d))
+        behind = counts[len(late) + model.fixed.settings.Np :]
+        behind -= np.arange(len(behind)) % _APART
+        self.of_rest = forecast_by(model, self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the preview under commands ``x_d``, and what is late before it."""
@@ -117,7 +127,7 @@ class PlanModel:
 
     def predict(self, x_d: Array) -> TrustedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
-        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self._held)
+        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self.of_rest.predictions)
 
     def position(self, at: TrustedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""

@@ -9,7 +9,6 @@ import numpy as np
 from ..base.signals import Array, as_published
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .interior import EXACT, Tolerance
 from .plan import SepState
 from .planning import ChosenPlan, Planning, Preview, PublishedPosition
 
@@ -23,7 +22,6 @@ class PaperPlanning(Planning):
     """Real-time solvers take 3 steps in each."""
 
     ALWAYS: ClassVar[bool] = False
-    TOLERANCE: ClassVar[Tolerance] = EXACT
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the plan of the best model that has one, else the remainder of the last plan."""

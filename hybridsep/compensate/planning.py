@@ -14,7 +14,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.residual_window import FeatureScales
 from ..predict.window import Prediction
 from .constraints import Bounds, DriveBounds, solve
-from .interior import Tolerance
+from .interior import EXACT, Tolerance
 from .plan import SepState
 from .splines import N_DECIDED, SplineBasis
 
@@ -87,13 +87,10 @@ class Planning(ABC):
         Leading samples of a window in which a plan follows the last one.
     ALWAYS : bool
         Whether every plan follows the last one there; else only plans that the drive's limits bound.
-    TOLERANCE : Tolerance
-        Of the solver.
     """
 
     PINNED: ClassVar[int]
     ALWAYS: ClassVar[bool]
-    TOLERANCE: ClassVar[Tolerance]
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         assert settings.preview is not None
@@ -121,7 +118,9 @@ class Planning(ABC):
             If it diverges.
         """
 
-    def affine_plan(self, g: Array, free: Array, preview: Preview, bounds: Bounds) -> Array | None:
+    def affine_plan(
+        self, g: Array, free: Array, preview: Preview, bounds: Bounds, tolerance: Tolerance = EXACT
+    ) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""
         rest = preview.rest
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
@@ -129,7 +128,7 @@ class Planning(ABC):
         cost = self.basis.cost(
             g, free, preview.command, rest[:N_DECIDED], preview.delta_before, self.settings.jerk_weight
         )
-        found = solve(cost, bounds, rest[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=self.TOLERANCE)
+        found = solve(cost, bounds, rest[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))
 
     def limits(self, preview: Preview, *, may_turn: bool = False) -> Bounds:

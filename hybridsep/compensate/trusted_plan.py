@@ -2,10 +2,10 @@
 
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
-of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
-velocity (Levenberg-Marquardt). The first samples of a plan follow the last plan, and the plan is made while they act.
-Steps, tries and the solver's steps are limited, so that the work fits into these samples. Predictions are shrunk by
-their variance, so where the model knows nothing the plan is the physics model's.
+of the linearised model (Gauss-Newton), and goes to its minimum, or less far if only that lowers the cost. The first
+samples of a plan follow the last plan, and the plan is made while they act. Steps, their lengths and the steps of the
+solver are limited, so that the work fits into these samples. Predictions are shrunk by their variance, so where the
+model knows nothing the plan is the physics model's.
 """
 
 from __future__ import annotations
@@ -16,29 +16,27 @@ import numpy as np
 
 from ..base.signals import Array
 from ..predict.trust.forecast import TrustedForecast
-from .constraints import Bounds, solve
+from .constraints import Bounds, solve, solve_again
 from .interior import Tolerance
 from .linearised import PlanModel
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
+__all__ = ["ALONE", "TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
 
-TOLERANCE = Tolerance(1e-4, 1e-2, 10)
-"""Of the solver: a plan is judged by the model itself, and taken if it is better than the others."""
+TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
+"""Of the solver: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
+small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
+within the bounds."""
 
-_REACHES = (0.1, 0.03, 0.01, 0.0)
-"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
-that changes nearby."""
+ALONE = TOLERANCE._replace(steps=10)
+"""Of the physics model's plan where it is the only one."""
 
-_TRIES, _TRIES_TOGETHER = 6, 8
-"""Largest number of penalties tried in a step, and in all steps."""
+_STEPS = ((0.1, 5), (0.01, 3), (0.0, 3))
+"""Of each Newton step the reach of friction's slope, relative to the model's velocity scale, and the solver's steps. A
+tangent is blind to a sign that changes nearby. A bounded programme that follows one begins where that ended."""
 
-_SOLVER_STEPS = 34
-"""Interior-point steps after which no further programme that the drive's limits bound is begun: the plan is what was
-found before."""
-
-_FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
-"""Penalty on the change of velocity, in the unit of the jerk's weight: its first value, and how it follows success."""
+_LENGTHS = (1.0, 0.3)
+"""Lengths of a step that are tried, relative to the way to the minimum."""
 
 _GAIN, _LEAST_GAIN = 1e-3, 1e-9
 """Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
@@ -124,40 +122,35 @@ class TrustedPlanner:
             Free splines filtered by ``G_pb``.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
-        velocity = np.diff(splines, axis=0, prepend=0.0)
-        damping = velocity.T @ velocity
-        here, penalty, tries, steps = self._at(rest), 0.0, 0, 0
-        for reach in _REACHES:
+        here, last = self._point(rest, self._model.of_rest), None
+        for reach, steps in _STEPS:
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
             P = W.T @ W + self._jerk_weight * (third.T @ third)
             target = self._x_d - here.x_h + W @ at
             v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
-            best = None
-            for _ in range(min(_TRIES, _TRIES_TOGETHER - tries)):
-                tries += 1
-                cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
-                may_bind = steps < _SOLVER_STEPS
-                found = solve(
-                    cost, bounds, rest[N_DECIDED:], n_pinned, always=True, may_bind=may_bind, tolerance=TOLERANCE
-                )
-                if found is None:
-                    break
-                steps += found.steps
-                there = self._at(np.concatenate((rest[:N_DECIDED], found.x)))
-                if is_better(there.cost, here.cost):
-                    best = there
-                    break
-                penalty = max(_RAISE * penalty, _FIRST_PENALTY)
+            cost, tolerance = PlanCost.regular(P, v), TOLERANCE._replace(steps=steps)
+            found = (
+                solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
+                if last is None
+                else solve_again(cost, bounds, rest[N_DECIDED:], n_pinned, at, last, tolerance)
+            )
+            if found is None:
+                break
+            last = found.ending
+            ends = (np.concatenate((rest[:N_DECIDED], at + length * (found.x - at))) for length in _LENGTHS)
+            best = next((end for end in map(self._at, ends) if is_better(end.cost, here.cost)), None)
             if best is None:
                 break
-            gain, here, penalty = here.cost - best.cost, best, _LOWER * penalty
+            gain, here = here.cost - best.cost, best
             if gain < _GAIN * (gain + here.cost):
                 break
         return here.coefficients, here.cost
 
     def _at(self, coefficients: Array) -> _Point:
-        prediction = self._model.predict(self._x_d + self._basis.values @ coefficients)
+        return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
+
+    def _point(self, coefficients: Array, prediction: TrustedForecast) -> _Point:
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(prediction)
         error = self._x_d - x_h

@@ -14,11 +14,10 @@ from ..base.signals import Array
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.state import TrustedModel
 from ..predict.window import Prediction
-from .interior import Tolerance
 from .linearised import PlanModel
 from .plan import SepState
 from .planning import ChosenPlan, Planning, Preview, PublishedPosition
-from .trusted_plan import TOLERANCE, TrustedPlanner, is_better, runs_away
+from .trusted_plan import ALONE, TOLERANCE, TrustedPlanner, is_better, runs_away
 
 __all__ = ["TrustedPlanning"]
 
@@ -26,11 +25,10 @@ __all__ = ["TrustedPlanning"]
 class TrustedPlanning(Planning):
     """Plans with the trusted model, which watches itself."""
 
-    PINNED: ClassVar[int] = 20
+    PINNED: ClassVar[int] = 24
     """Every plan follows the last plan in these samples, as it takes more work than a plan on the paper's model."""
 
     ALWAYS: ClassVar[bool] = True
-    TOLERANCE: ClassVar[Tolerance] = TOLERANCE
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the physics model's plan, or a better one by Newton steps on the trusted model."""
@@ -41,10 +39,11 @@ class TrustedPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, rest, scales)
         g, free = predictor.physics_operator(self.preview)
-        physics = self.affine_plan(g, free, preview, self.limits(preview))
+        follows = most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned
+        physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE if follows else ALONE)
         if physics is None:
             return ChosenPlan(SepState.OFF, rest, scales)
-        if not (most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned):
+        if not follows:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = TrustedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)

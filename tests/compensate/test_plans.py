@@ -19,9 +19,10 @@ from staircase_data import commanded
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState, direct_samples
-from hybridsep.compensate.constraints import Bounds, DriveBounds, solve
+from hybridsep.compensate.constraints import Bounds, DriveBounds, solve, solve_again
 from hybridsep.compensate.interior import EXACT, Minimum, Tolerance
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
+from hybridsep.compensate.trusted_plan import TOLERANCE
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
@@ -90,6 +91,46 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
     _, residual = nnls(normals.T, gradient)
     assert residual <= 1e-3 * np.linalg.norm(cost.v)
+
+
+def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
+    """Return the cost, bounds and remainder of a plan whose command is at the drive's limits."""
+    rng = np.random.default_rng(seed)
+    preview, basis = 120, SplineBasis(120, 2)
+    g = HybridPredictor(MODEL, PredictorSettings(trust=False), start=0.0).operator(preview).g_pb
+    path = rest_to_rest([0.0, 0.004 + 0.004 * rng.random()], PAPER_LIMITS, TS)
+    x_d = np.concatenate((np.zeros(30), path, np.full(preview, path[-1])))[:preview]
+    rest, before = np.zeros(basis.values.shape[1]), np.zeros(3)
+    free = np.cumsum(1e-6 * rng.normal(size=preview))
+    cost = basis.cost(g, free, x_d, before, before, 1.0)
+    return cost, DriveBounds(basis, TS, PAPER_LIMITS, 1e-3).bounds(x_d, before, before, rest), rest[N_DECIDED:]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
+    """The remainder touches bounds: on the way from it a plan that exceeds one of them by a millionth would be none."""
+    cost, bounds, rest = at_the_limits(seed)
+    n_pinned = 4
+    P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
+    v = cost.without(rest[:n_pinned]).v
+    least = clarabel_minimum(P, v, rows, bounds.low, bounds.high)
+
+    def above_least(c: Array) -> float:
+        return float(0.5 * (c @ P @ c - least @ P @ least) - v @ (c - least))
+
+    found = solve(cost, bounds, rest, n_pinned, always=True, tolerance=TOLERANCE)
+    assert found is not None
+    assert found.ending is not None  # bounds are active
+    values = bounds.rows @ found.x
+    assert np.max(np.maximum(values - bounds.high, bounds.low - values)) < 1e-9
+    assert above_least(found.x[n_pinned:]) < 0.02 * above_least(rest[n_pinned:])
+    # Of a cost that is nearly the same three steps more are nearer than five from the remainder
+    other = PlanCost(cost.P, cost.v * 1.0001)
+    again = solve_again(other, bounds, rest, n_pinned, found.x, found.ending, TOLERANCE._replace(steps=3))
+    values = bounds.rows @ again.x
+    assert np.max(np.maximum(values - bounds.high, bounds.low - values)) < 1e-9
+    assert above_least(again.x[n_pinned:]) < 0.5 * above_least(found.x[n_pinned:])
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from hybridsep import load_machine
 from hybridsep.base.errors import StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.compensate import linearised
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.compensate.linearised import PlanModel
 from hybridsep.compensate.splines import SplineBasis
@@ -97,8 +98,9 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("late", [1, 30])
-def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
+def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
+    monkeypatch.setattr(linearised, "_APART", 1)  # the window is another one, and what is behind it
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
     x_d, basis = moves()[: late + n], SplineBasis(n, 2)
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
@@ -111,6 +113,17 @@ def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
     assert np.abs(expected[late:]).max() > 0.1
     np.testing.assert_array_equal(expected[:late], 0.0)
     np.testing.assert_allclose(model.slope(at, changes, passed, 0.01), expected[late:], rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_samples_behind_the_window_share_a_variance(monkeypatch: pytest.MonkeyPatch) -> None:
+    sep, x_d = SepCompensator.from_bytes(learned(2e-3)), moves()[:200]
+    Np = sep.predictor.settings.Np
+    shared = plan_model(sep, x_d).predict(x_d)
+    monkeypatch.setattr(linearised, "_APART", 1)
+    own = plan_model(sep, x_d).predict(x_d)
+    np.testing.assert_array_equal(shared.e_h[: Np + 1], own.e_h[: Np + 1])
+    assert 0.0 < np.std(shared.e_h - own.e_h) < 0.1 * np.std(own.e_h)
 
 
 @pytest.mark.slow

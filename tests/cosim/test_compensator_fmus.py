@@ -186,8 +186,8 @@ def test_summary_is_what_the_signals_say(short: Run) -> None:
     assert summary["change_max_um"] == pytest.approx(np.max(np.abs(change)))
     assert summary["peak_jerk_m_s3"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 3))) * 1e9)
     assert summary["peak_acceleration_m_s2"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 2))) * 1e6)
-    # Nothing is learned before the first window, of 50 samples; the second follows its plan for 20 more.
-    assert summary["share_physics"] == pytest.approx(70 / 600)
+    # Nothing is learned before the first window, of 50 samples; the second follows its plan for 24 more.
+    assert summary["share_physics"] == pytest.approx(74 / 600)
     assert summary["share_off"] + summary["share_physics"] + summary["share_hybrid"] == pytest.approx(1.0)
     assert summary["n_samples"] == 600
 

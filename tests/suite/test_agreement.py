@@ -286,11 +286,11 @@ def slow(k: int, x_meas: float, last: float) -> float:
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 def test_a_plan_that_runs_away_ends_the_hybrids_plans(new_stream: StreamMaker) -> None:
-    values: dict[str, Value] = {"p": 10, "change_max": 2e-4}
+    values: dict[str, Value] = {"p": 10, "change_max": 2.5e-4}
     loop = assert_agreement(new_stream, 900, values, 1e-9, sensor=slow)
     state = loop.column(COMPENSATOR, "sep_state")
     planned = np.flatnonzero(state == 2.0)
-    assert 0 < len(planned) < 100
+    assert 0 < len(planned) <= 100
     assert (state[planned[-1] + 1 :] == 1.0).all()
     sound = closed_loop(new_stream.model, 900, values).column(COMPENSATOR, "sep_state")
     assert (sound[planned[0] :] == 2.0).all()

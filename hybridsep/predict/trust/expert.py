@@ -150,7 +150,13 @@ class SolvedExpert(NamedTuple):
         return self.solution.weights[self.n_static :]
 
     def predict(
-        self, rows: Array, past: Array, largest_square: float, bound: float, held: ExpertPrediction | None = None
+        self,
+        rows: Array,
+        past: Array,
+        largest_square: float,
+        bound: float,
+        held: ExpertPrediction | None = None,
+        counts: NDArray[np.intp] | None = None,
     ) -> ExpertPrediction:
         """Predict the residual over a window in free run.
 
@@ -170,6 +176,8 @@ class SolvedExpert(NamedTuple):
             On the prediction.
         held : ExpertPrediction, optional
             Prediction whose shrinking is held; else it is computed.
+        counts : (n,) array, optional
+            Sample whose row counts for the variance of each sample; its own if left out.
         """
         w_e = self.lag_weights
         p = len(w_e)
@@ -182,7 +190,13 @@ class SolvedExpert(NamedTuple):
             kept = held.kept
         else:
             lagged = lags(np.concatenate((past[:p][::-1], e[:-1])), p) if p else np.empty((len(e), 0))
-            variance = self.variance * self.solution.leverage(np.hstack((rows, lagged)))
+            features = np.hstack((rows, lagged))
+            if counts is None:
+                leverage = self.solution.leverage(features)
+            else:
+                places, back = np.unique(counts, return_inverse=True)
+                leverage = self.solution.leverage(features[places])[back]
+            variance = self.variance * leverage
             if p:
                 variance = np.asarray(lfilter(response**2, [1.0], variance))
             most = _DIVERGED * bound**2

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.signals import Array
 from ..regression import RidgeRegression
@@ -114,35 +115,45 @@ def forecast_by(
     window: ResidualWindow,
     scales: FeatureScales,
     held: Mapping[int, ExpertPrediction] | None = None,
+    counts: NDArray[np.intp] | None = None,
 ) -> TrustedForecast:
-    """Predict as :func:`forecast` by the experts of :func:`solved`, with the shrinking of ``held`` if there is."""
+    """Predict as :func:`forecast` by the experts of :func:`solved`.
+
+    Parameters
+    ----------
+    state, experts, window, scales
+    held : mapping, optional
+        Predictions whose shrinking is held.
+    counts : (n,) array, optional
+        As :meth:`~hybridsep.predict.trust.expert.SolvedExpert.predict` has it.
+    """
     x_d, x_pb, _ = window
     learned, command, run = state.learned, state.fixed.command, state.run
     bound, growth = CONSTANTS.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
 
-    def predicted(expert: int, features: Array) -> ExpertPrediction:
+    def predicted(expert: int, features: Array, counts: NDArray[np.intp] | None) -> ExpertPrediction:
         kind = state.kind_of(expert)
         scale = learned.scales[OF_COMMAND].grown(growth) if kind == OF_COMMAND else learned.scales[OF_PHYSICS]
         most = CONSTANTS.bound_of_command * scale.largest if kind == OF_COMMAND else bound
         shrunk = None if held is None else held.get(expert)
-        return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk)
+        return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk, counts)
 
     x, rows = x_pb, np.empty((len(x_d), 0))
     if STATIC in experts:
         # The stiffness acts at the position, which the physics model alone does not give well enough.
         rows, _ = state.fixed.static.rows(run.static, window, x_pb, scales.velocity)
-        x = x_pb + predicted(STATIC, rows).e_h
+        x = x_pb + predicted(STATIC, rows, None).e_h
         rows, _ = state.fixed.static.rows(run.static, window, x, scales.velocity)
     found: dict[int, ExpertPrediction] = {}
     stacked = np.zeros((N_EXPERTS, len(x_d)))
     stacked[HOLD] = min(max(state.last, -bound), bound)
     for expert in experts:
         if state.kind_of(expert) == OF_COMMAND:
-            found[expert] = predicted(expert, command.rows(run.commands, x_d))
+            found[expert] = predicted(expert, command.rows(run.commands, x_d), counts)
             follows = command.late(run.commands, x_d) - x_pb
             stacked[expert] = np.clip(found[expert].e_h + follows, -growth * bound, growth * bound)
         else:
-            found[expert] = predicted(expert, rows)
+            found[expert] = predicted(expert, rows, counts)
             stacked[expert] = found[expert].e_h
     weights = learned.stack.weights
     e_h = weights @ stacked

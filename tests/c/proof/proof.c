@@ -137,7 +137,7 @@ void prove_constraints(void)
         .limit = {1e-3, 1e-4, 1e-5, 1e-5},
         .no_reversal = 1,
         .pinned = HSEP_PINNED};
-    static double x_d[PREVIEW - SHORT], way[HSEP_ORDERS * PREVIEW];
+    static double x_d[PREVIEW - SHORT], from[HSEP_ORDERS * PREVIEW], way[HSEP_ORDERS * PREVIEW];
     double least, most;
     hsep_planner *planner = (hsep_planner *)plan;
     if (hsep_planner_size(&parameters) > sizeof plan) {
@@ -149,10 +149,11 @@ void prove_constraints(void)
         planner->delta_before[i] = Frama_C_double_interval(-1.0, 1.0);
     }
     fill(x_d, PREVIEW - SHORT);
+    fill(from, HSEP_ORDERS * PREVIEW);
     fill(way, HSEP_ORDERS * PREVIEW);
     hsep_constraints_total(planner, x_d);
     hsep_constraints_range(planner, (uint64_t)Frama_C_interval(0, HSEP_ORDERS * PREVIEW - 1), &least, &most);
-    (void)hsep_constraints_share(planner, way);
+    (void)hsep_constraints_share(planner, from, way);
     (void)hsep_constraints_allow(planner, way);
 }
 

@@ -7,7 +7,8 @@
 #include <string.h>
 
 /* A plan starts from the last one: what is far from the minimum would let differences of rounding grow. */
-static const hsep_tolerance compensator_tolerance = {1e-15, 1e-9, HSEP_INTERIOR_STEPS};
+static const hsep_tolerance compensator_tolerance = {
+    .mu = 1e-15, .dual_residual = 1e-9, .margin = 1e-11, .steps = HSEP_INTERIOR_STEPS};
 
 static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
@@ -139,22 +140,22 @@ static void compensator_publish(hsep_compensator *self, hsep_word last)
 }
 
 /* Do parts of a plan with trust, at least one: this sample's equal share of the work that may be left until the plan is
- * due. Return whether the plan is made. */
+ * due, to the nearest part. Return whether the plan is made. */
 static int compensator_advance(hsep_compensator *self, hsep_word samples)
 {
     hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
     const hsep_trusted_task task = compensator_task(self);
-    const hsep_real due = samples > 1 ? hsep_trusted_planner_left(trusted, &task) / (hsep_real)samples : INFINITY;
-    hsep_real next = hsep_trusted_planner_next(trusted, &task), done = 0.0;
-    while (next > 0.0 && (done + next <= due || done == 0.0)) {
+    hsep_real next = hsep_trusted_planner_next(trusted, &task), done = 0.0, due = INFINITY;
+    while (next > 0.0 && done + 0.5 * next <= due) {
         hsep_trusted_planner_advance(trusted, &task);
         done += next;
         next = hsep_trusted_planner_next(trusted, &task);
+        due = samples > 1 ? (done + hsep_trusted_planner_left(trusted, &task)) / (hsep_real)samples : INFINITY;
     }
     return !(next > 0.0);
 }
 
-/* Half steps of the solver of a bounded plan; return whether it is solved. */
+/* Parts of the solver's steps of a bounded plan; return whether it is solved. */
 static int compensator_step(hsep_compensator *self, hsep_word due)
 {
     int done = 0;
@@ -170,7 +171,8 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_word pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_word left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    const hsep_word due = left > 0 ? 2 * ((HSEP_INTERIOR_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
+    const hsep_word due =
+        left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_INTERIOR_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
     if (self->trusted ? compensator_advance(self, left) : compensator_step(self, due)) {
         self->solving = 0;
         self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
@@ -187,7 +189,9 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance);
+    const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self), 0)
+                                        ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance)
+                                        : HSEP_PLAN_FAILED;
     self->state = (hsep_word)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }

@@ -52,7 +52,7 @@ HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep
     *most = hsep_fmax(*most, total + constraints_interior_share);
 }
 
-HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real way[])
+HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
     const hsep_word rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
@@ -60,7 +60,8 @@ HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_r
     for (hsep_word r = 0; r < rows; r++) {
         hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);
-        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - total[r] : total[r] - least;
+        const hsep_real here = total[r] + from[r];
+        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - here : here - least;
         if (to > constraints_rounding && room < share * to) {
             share = room / to;
         }

@@ -14,8 +14,9 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[]);
  * interior-point method needs an interior. */
 HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep_real *least, hsep_real *most);
 
-/* Largest feasible step length, 0 ... 1, from the remainder, whose rows are in total, by a step with rows way. */
-HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real way[]);
+/* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
+ * remainder and from. */
+HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[]);
 
 /* Whether the remainder and a step with rows way are feasible. */
 HSEP_API int hsep_constraints_allow(const hsep_planner *self, const hsep_real way[]);

@@ -14,6 +14,7 @@ static const hsep_real interior_regularisation = 1e-14; /* proximal term of z, r
 typedef struct {
     hsep_word n;         /* entries of x */
     hsep_real *x, *v;    /* (n,) iterate and linear term */
+    hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
     hsep_real *factor;   /* triangle of n rows */
     hsep_slacks slacks;
@@ -33,6 +34,7 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_word preview, hsep_word
     hsep_real end = HSEP_WORDS(hsep_interior);
     a->x = interior_take(block, &end, columns);
     a->v = interior_take(block, &end, columns);
+    a->inner = interior_take(block, &end, columns);
     a->r_d = interior_take(block, &end, columns);
     a->dx = interior_take(block, &end, columns);
     a->slacks.Ax = interior_take(block, &end, rows);
@@ -63,7 +65,7 @@ HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max)
 {
     hsep_interior got;
     memcpy(&got, block, sizeof got);
-    return got.first <= first_max && got.steps <= got.tolerance.steps && got.begun <= 1 &&
+    return got.first <= first_max && got.steps <= got.tolerance.steps && got.part < HSEP_INTERIOR_PARTS &&
            got.tolerance.steps <= HSEP_INTERIOR_STEPS;
 }
 
@@ -86,7 +88,12 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
 {
     const interior_arrays a = interior_open(self, splines);
-    return (hsep_problem){.v = a.v, .x = a.x, .low = a.slacks.side[0].b, .high = a.slacks.side[1].b};
+    return (hsep_problem){
+        .v = a.v,
+        .x = a.x,
+        .inner = self->beyond < self->tolerance.margin ? a.inner : NULL,
+        .low = a.slacks.side[0].b,
+        .high = a.slacks.side[1].b};
 }
 
 /* The rows of P, a triangle, from the first free spline. */
@@ -107,22 +114,37 @@ static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real 
     return interior_regularisation * hsep_splines_energy(splines) / largest;
 }
 
+/* Start at x, with or without the multipliers that are there. */
+static void interior_start(
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance, int again)
+{
+    interior_arrays a = interior_open(self, splines);
+    self->tolerance = *tolerance;
+    self->steps = self->part = 0;
+    a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
+    hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
+    hsep_slacks_begin(&a.slacks, self->cost, again);
+}
+
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
     const hsep_tolerance *tolerance)
 {
-    self->tolerance = *tolerance;
     self->first = first;
-    self->steps = self->begun = 0;
     self->sides = 0.0;
-    interior_arrays a = interior_open(self, splines);
-    a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
-    hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
+    const interior_arrays a = interior_open(self, splines);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->sides += 2.0 * (hsep_real)(a.slacks.range[order].end - a.slacks.range[order].begin);
     }
     self->cost = cost / self->sides;
-    hsep_slacks_begin(&a.slacks, self->cost);
+    self->beyond = tolerance->margin;
+    interior_start(self, splines, P, tolerance, 0);
+}
+
+HSEP_API void hsep_interior_again(
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance)
+{
+    interior_start(self, splines, P, tolerance, 1);
 }
 
 /* r_d := v - P x, P being the triangle of the splines first ... n - 1. */
@@ -165,32 +187,48 @@ static void interior_direction(const interior_arrays *a, const hsep_splines *spl
     hsep_splines_rows(splines, a->dx, first, a->slacks.Adx);
 }
 
-/* Begin a step: residuals, and the factor of P + A' W A; return whether there is none, as the plan is solved. */
-static int interior_factor(
+/* Begin a step with its residuals; return whether there is none, as the plan is solved. */
+static int interior_residuals(
     hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
 {
-    hsep_real r_p;
-    P = interior_free_rows(self, splines, P);
+    hsep_real r_p, beyond;
     hsep_splines_rows(splines, a->x, self->first, a->slacks.Ax);
-    const hsep_real mu = hsep_slacks_residuals(&a->slacks, &r_p);
+    const hsep_real mu = hsep_slacks_residuals(&a->slacks, &r_p, &beyond);
+    if (beyond < self->beyond) {
+        self->beyond = beyond;
+        memcpy(a->inner, a->x, (size_t)a->n * sizeof(hsep_real));
+    }
     const hsep_real r_d = interior_dual_residual(a, splines, self->first, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
-        (mu < self->tolerance.mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < self->tolerance.dual_residual)) {
+        (mu < self->tolerance.mu * self->cost && r_p < self->tolerance.margin && r_d < self->tolerance.dual_residual)) {
         return 1;
     }
     self->steps++;
     self->mu = mu;
+    return 0;
+}
+
+/* Half of the factor of P + A' W A; return whether there is none. Its first rows take as much work as all others. */
+static int interior_factor(
+    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
+{
+    const hsep_word half = a->n / 6 / HSEP_CHOLESKY_PANEL * HSEP_CHOLESKY_PANEL;
+    if (self->part == 3) {
+        return !hsep_cholesky_rows(a->factor, a->n, half, a->n, NULL);
+    }
     memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
     hsep_splines_gram(splines, a->slacks.Adx, self->first, a->factor, a->slacks.work);
-    return !hsep_cholesky_factor(a->factor, a->n, NULL);
+    return !hsep_cholesky_rows(a->factor, a->n, 0, half, NULL);
 }
 
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    if (!self->begun) {
-        self->begun = !interior_factor(self, &a, splines, P);
-        return !self->begun;
+    const hsep_word part = self->part;
+    P = interior_free_rows(self, splines, P);
+    self->part = (part + 1) % HSEP_INTERIOR_PARTS;
+    if (part < HSEP_INTERIOR_PARTS - 1) {
+        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
@@ -201,6 +239,5 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     for (hsep_word j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];
     }
-    self->begun = 0;
     return 0;
 }

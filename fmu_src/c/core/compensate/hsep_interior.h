@@ -1,5 +1,5 @@
-/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), half a step a
- * call:
+/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), a part of
+ * a step a call:
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
  * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
@@ -12,30 +12,31 @@
 #include "hsep_real.h"
 #include "hsep_splines.h"
 
-#define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
-
 /* Where the solver ends. */
 typedef struct {
     hsep_real mu;            /* complementarity mu at the end, as a share of the cost per bound */
     hsep_real dual_residual; /* dual residual at the end, as a share of its largest term */
+    hsep_real margin;        /* shares by which its bounds are tighter, and may be exceeded at the end */
     hsep_word steps;         /* at most */
 } hsep_tolerance;
 
 #define HSEP_INTERIOR_STEPS 24 /* the most of any tolerance */
+#define HSEP_INTERIOR_PARTS 4  /* of a step */
 
 typedef struct {
     hsep_tolerance tolerance;
-    hsep_word first; /* the splines before it are fixed; x is (n - first,) */
-    hsep_word steps; /* begun for this plan */
-    hsep_word begun; /* whether one is: its factor is there */
-    hsep_real mu;    /* m2, of its beginning */
-    hsep_real cost;  /* m2, scale of the cost per bound */
-    hsep_real sides; /* number of bounds, low and high ones */
-    hsep_real rho;   /* 1/m2, proximal regularisation of the multipliers */
+    hsep_word first;  /* the splines before it are fixed; x is (n - first,) */
+    hsep_word steps;  /* begun for this plan */
+    hsep_word part;   /* of the last one that comes next: 0 residuals, 1 and 2 the factor, 3 directions */
+    hsep_real mu;     /* m2, of its beginning */
+    hsep_real cost;   /* m2, scale of the cost per bound */
+    hsep_real sides;  /* number of bounds, low and high ones */
+    hsep_real rho;    /* 1/m2, proximal regularisation of the multipliers */
+    hsep_real beyond; /* shares, by how much inner exceeds the worst bound; the margin: there is none */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 10);
+HSEP_ASSERT_WORDS(hsep_interior, 12);
 
 HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n); /* bytes of the block, counted as a number */
 
@@ -43,6 +44,7 @@ HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n); /* bytes 
 typedef struct {
     hsep_real *v;          /* (n,) m */
     hsep_real *x;          /* (n,) m, start and result */
+    hsep_real *inner;      /* (n,) m, result: the iterate farthest inside the bounds without their margin, or NULL */
     hsep_real *low, *high; /* (4 preview,), in shares */
 } hsep_problem;
 
@@ -58,9 +60,14 @@ HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
-/* Do half a step, its factor or what follows from it; P as in hsep_interior_begin. Returns whether the plan is solved.
- * Cost: n^3 / 6 multiply-adds for the factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
- * plan beside both. */
+/* Begin as near a minimum as one of a programme with the same bounds and nearly the same cost is: with its multipliers,
+ * and with its scale of the cost. The splines that are free are the same. */
+HSEP_API void hsep_interior_again(
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance);
+
+/* Do a part of a step, its residuals, half of its factor or its directions; P as in hsep_interior_begin. Returns
+ * whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and 2 n^2 after it, and about
+ * 900 operations and 8 divisions a sample of the plan in all. */
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif

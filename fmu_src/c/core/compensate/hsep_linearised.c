@@ -28,6 +28,11 @@ static hsep_real linearised_weight(const hsep_trusted *model, hsep_word expert, 
     return model->predicted[expert] && of_kind ? model->learned.stack.weights[expert] : 0.0;
 }
 
+HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert)
+{
+    return linearised_weight(model, expert, HSEP_OF_PHYSICS) > 0.0;
+}
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
@@ -204,7 +209,6 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
         const hsep_word place = linearised_of_command[i];
         const hsep_real weight = linearised_weight(model, place, HSEP_OF_COMMAND);
         if (weight > 0.0) {
-            linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * self->n);
             linearised_of_increments(
                 self, hsep_trusted_expert(model, place), change, dead_time,
                 hsep_at(self, self->of_command) + i * self->preview);
@@ -215,10 +219,9 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
     }
 }
 
-/* Slopes of the disturbances at the samples of a prediction, (n, count), sample after sample: of each friction with the
- * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s, and of what
- * repeats with the position, 1/m. */
-static void linearised_slopes(
+/* They are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of the stiffness with
+ * the position, m, of the damping with its velocity, m/s, and of what repeats with the position, 1/m. */
+HSEP_API void hsep_linearised_slopes(
     hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(model);
@@ -251,28 +254,38 @@ static void linearised_slopes(
     }
 }
 
-HSEP_API void hsep_linearised_at(
-    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
-    const hsep_linearised_change *change, hsep_real reach)
+HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
 {
-    const hsep_word n = self->n, first = linearised_first(self, model);
-    linearised_slopes(self, model, x_d, x_pb, reach);
+    const hsep_word first = linearised_first(self, model);
     linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
     linearised_command(self, model, change);
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-        const hsep_real *weights = hsep_expert_weights(expert);
-        if (hsep_trusted_kind_of(model, linearised_experts[i]) == HSEP_OF_COMMAND) {
-            continue;
+        if (hsep_trusted_kind_of(model, linearised_experts[i]) != HSEP_OF_COMMAND) {
+            const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
+            linearised_pass(
+                hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
+                hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
         }
-        const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS);
-        linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
-        linearised_gains(
-            self, weights + first, hsep_trusted_disturbances(model)->T_s,
-            hsep_at(self, self->gains) + i * LINEARISED_GAINS * n);
-        linearised_pass(
-            weights + 1, first - 1, change->passed, self->preview,
-            hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
+    }
+}
+
+HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_trusted *model)
+{
+    const hsep_word n = self->n, first = linearised_first(self, model);
+    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++) {
+        const hsep_word place = linearised_of_command[i];
+        const hsep_real weight = linearised_weight(model, place, HSEP_OF_COMMAND);
+        linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * n);
+    }
+    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        if (hsep_trusted_kind_of(model, linearised_experts[i]) != HSEP_OF_COMMAND) {
+            const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
+            const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS);
+            linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
+            linearised_gains(
+                self, hsep_expert_weights(expert) + first, hsep_trusted_disturbances(model)->T_s,
+                hsep_at(self, self->gains) + i * LINEARISED_GAINS * n);
+        }
     }
 }
 
@@ -389,13 +402,15 @@ HSEP_API void hsep_linearised_columns(
     }
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-        if (!(linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS) > 0.0)) {
+        if (!hsep_linearised_counts(model, linearised_experts[i])) {
             continue;
         }
-        const hsep_word words = HSEP_PHYSICS_ABREAST * padded; /* columns that are shorter, or none, end with zeros */
-        memset(hsep_at(self, self->disturbance), 0, (size_t)words * sizeof(hsep_real));
-        for (hsep_word c = 0; c < count; c++) {
-            linearised_disturbance(self, i, first + c * spacing, c);
+        for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
+            const hsep_word begin = c < count ? first + c * spacing : self->preview;
+            linearised_disturbance(self, i, begin, c);
+            for (hsep_word u = self->preview - begin; u < padded; u++) {
+                hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
+            }
         }
         linearised_filter(self, padded);
         linearised_take_lags(self, expert);

@@ -58,17 +58,25 @@ typedef struct {
     const hsep_real *passed; /* (preview,) m, the same behind G_pb */
 } hsep_linearised_change;
 
-/* Linearise at commands x_d that the model, which has learned, was last tried with, with the response x_pb, both
- * (n,), m, newest first, for a change that may begin at any sample of the preview. reach: half of the change of
- * velocity that the friction's slope is taken over, relative to the velocity scale; 0: the tangent.
- * Cost: 12 tanh a sample. */
-HSEP_API void hsep_linearised_at(
-    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[],
-    const hsep_linearised_change *change, hsep_real reach);
+/* Begin to linearise a model that has learned, for a change that may begin at any sample of the preview: what does not
+ * depend on the commands. Cost: p multiply-adds a sample for each expert of the command. */
+HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change);
+
+/* Slopes of the disturbances at commands x_d that the model was last tried with, with the response x_pb, both (n,), m,
+ * newest first. reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity
+ * scale; 0: the tangent. Cost: 12 tanh a sample. */
+HSEP_API void hsep_linearised_slopes(
+    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
+
+/* Linearise there, with these slopes. */
+HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_trusted *model);
+
+/* Whether columns take work for an expert: it counts, and predicts the residual of the physics model. */
+HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert);
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
  * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,).
- * Cost: for each expert of the physics model's residual HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a
+ * Cost: for each expert of hsep_linearised_counts HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a
  * sample. */
 HSEP_API void hsep_linearised_columns(
     hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_word spacing, hsep_word count,

@@ -164,40 +164,43 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     }
 }
 
-/* Hand the bounded problem over: x are the splines after the pinned ones, its bounds what the pinned ones leave. */
-static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
+/* Hand the bounded problem over: x begins at the splines after the pinned ones of a plan, (3 + n,), and its bounds are
+ * what the pinned ones leave. */
+static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real margin)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_interior *interior = planner_interior(self);
     const hsep_word first = self->n_pinned, preview = splines->preview;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *total = hsep_at(self, self->total);
-    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
     for (hsep_word r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);
-        low[r] = least - other + HSEP_INTERIOR_PRIMAL;
-        high[r] = most - other - HSEP_INTERIOR_PRIMAL;
+        low[r] = least - other + margin;
+        high[r] = most - other - margin;
     }
-    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(hsep_real));
-    hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost, tolerance);
+    memcpy(problem.x, start + HSEP_DECIDED + first, (size_t)(splines->n - first) * sizeof(hsep_real));
+}
+
+HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
+{
+    const hsep_word first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
+    hsep_real *factor = hsep_at(self, self->factor);
+    memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
+    return hsep_cholesky_factor(factor, n, NULL);
 }
 
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_word first = pinned ? self->n_pinned : 0, n = splines->n - first;
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + first, *factor = hsep_at(self, self->factor);
-    const hsep_real *row = hsep_planner_quadratic(self, first);
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + first;
+    const hsep_real *row = hsep_planner_quadratic(self, first), *factor = hsep_at(self, self->factor);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
 
-    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
-    if (!hsep_cholesky_factor(factor, n, NULL)) {
-        return HSEP_PLAN_FAILED;
-    }
     memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
     hsep_real cost = 0.0, finite = 0.0;
@@ -227,8 +230,15 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     if (!pinned) {
         hsep_planner_pin(self);
     }
-    planner_bound(self, cost, tolerance);
+    planner_bound(self, hsep_at(self, self->c), tolerance->margin);
+    hsep_interior_begin(planner_interior(self), splines, hsep_at(self, self->P), self->n_pinned, cost, tolerance);
     return HSEP_PLAN_BOUNDED;
+}
+
+HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start[], const hsep_tolerance *tolerance)
+{
+    planner_bound(self, start, tolerance->margin);
+    hsep_interior_again(planner_interior(self), hsep_planner_splines(self), hsep_at(self, self->P), tolerance);
 }
 
 HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self)
@@ -236,9 +246,9 @@ HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self)
     return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
 }
 
-HSEP_API int hsep_planner_within_step(const hsep_planner *self)
+HSEP_API hsep_word hsep_planner_part(const hsep_planner *self)
 {
-    return ((const hsep_interior *)hsep_at_const(self, self->interior))->begun != 0;
+    return ((const hsep_interior *)hsep_at_const(self, self->interior))->part;
 }
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
@@ -249,19 +259,22 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
         return 0;
     }
     const hsep_problem problem = hsep_interior_problem(interior, splines);
-    hsep_real *way = problem.x, *rows = problem.low;
+    hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high;
     hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
+    const hsep_real *inner = problem.inner != NULL ? problem.inner : rest;
     const hsep_word n = splines->n - self->n_pinned;
     hsep_real finite = 0.0;
     for (hsep_word j = 0; j < n; j++) {
-        way[j] -= rest[j];
+        at[j] = inner[j] - rest[j];
+        way[j] -= inner[j];
         finite += hsep_fabs(way[j]);
     }
-    if (isfinite(finite)) {
+    if (isfinite(finite)) { /* bounds that are exceeded, as steps are limited, are so by little */
         hsep_splines_rows(splines, way, self->n_pinned, rows);
-        const hsep_real share = hsep_constraints_share(self, rows);
+        hsep_splines_rows(splines, at, self->n_pinned, from);
+        const hsep_real share = hsep_constraints_share(self, from, rows);
         for (hsep_word j = 0; j < n; j++) {
-            rest[j] += share * way[j];
+            rest[j] += at[j] + share * way[j];
         }
     }
     return 1;

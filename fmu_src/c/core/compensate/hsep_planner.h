@@ -20,7 +20,7 @@
 /* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
  * takes more work. */
 #define HSEP_PINNED 8
-#define HSEP_PINNED_WITH_TRUST 20
+#define HSEP_PINNED_WITH_TRUST 24
 
 typedef struct {
     hsep_word Np;                 /* samples of a window */
@@ -85,17 +85,24 @@ HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
 
+/* Begin to plan at this cost; return whether it has a minimum. pinned: as below. Cost: n^3 / 6 multiply-adds. */
+HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
+
 /* Plan at this cost, which is used up. pinned: whether the first samples (hsep_planner_pinned) stay as they are in
  * every plan, and the cost is of the other splines alone; otherwise they stay in a bounded plan only. A bounded plan is
- * solved within the tolerance. Cost: n^3 / 6 multiply-adds. */
+ * solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
-/* Do half a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
+/* Plan at another cost, near that of the last plan, which was bounded, within the same bounds: from the coefficients
+ * start, (3 + n,), m, where that one ended, with its multipliers. The pinned samples stay as they are. */
+HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start[], const hsep_tolerance *tolerance);
+
+/* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
-/* Steps that the last bounded plan took so far; whether the second half of the last step is still to be done. */
+/* Steps that the last bounded plan took so far; the part of one that comes next. */
 HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self);
-HSEP_API int hsep_planner_within_step(const hsep_planner *self);
+HSEP_API hsep_word hsep_planner_part(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);

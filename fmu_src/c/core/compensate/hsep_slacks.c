@@ -7,7 +7,8 @@
 
 static const hsep_real slacks_least = 0.3;     /* smallest initial slack, in shares */
 static const hsep_real slacks_first_mu = 10.0; /* initial mu, as a share of the cost per bound */
-static const hsep_real slacks_tau = 0.995;     /* fraction of the step to the nearest bound */
+static const hsep_real slacks_least_again = 0.03, slacks_first_mu_again = 0.1; /* both, for another programme */
+static const hsep_real slacks_tau = 0.995; /* fraction of the step to the nearest bound */
 
 /* Of the sides: B = A, B = -A. */
 static const hsep_real slacks_sign[2] = {1.0, -1.0};
@@ -15,14 +16,16 @@ static const hsep_real slacks_sign[2] = {1.0, -1.0};
 /* B x - b of a row: A x - low, or high - A x. */
 static inline hsep_real slacks_distance(int i, hsep_real Ax, hsep_real b) { return i == 0 ? Ax - b : b - Ax; }
 
-HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost)
+HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost, int again)
 {
+    const hsep_real least = again ? slacks_least_again : slacks_least;
+    const hsep_real mu = (again ? slacks_first_mu_again : slacks_first_mu) * cost;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (hsep_word r = self->range[order].begin; r < self->range[order].end; r++) {
             for (int i = 0; i < 2; i++) {
                 const hsep_side *side = &self->side[i];
-                side->s[r] = hsep_fmax(slacks_distance(i, self->Ax[r], side->b[r]), slacks_least);
-                side->z[r] = slacks_first_mu * cost / side->s[r];
+                side->s[r] = hsep_fmax(slacks_distance(i, self->Ax[r], side->b[r]), least);
+                side->z[r] = hsep_fmax(again ? side->z[r] : 0.0, mu / side->s[r]);
                 side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
             }
         }
@@ -126,11 +129,15 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
     return (hsep_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
-HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal)
+HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal, hsep_real *beyond)
 {
-    slacks_values sum, largest;
+    slacks_values sum, largest, outside;
     memset(&sum, 0, sizeof sum);
     memset(&largest, 0, sizeof largest);
+    for (int l = 0; l < HSEP_OF_FOUR; l++) {
+        outside.of_four[l] = (hsep_lanes){0.0} - INFINITY;
+    }
+    outside.left = -INFINITY;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
@@ -145,6 +152,7 @@ HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *pri
                     const hsep_lanes r_p = distance - s, weight = z * inverse;
                     sum.of_four[l] += product;
                     largest.of_four[l] = hsep_lanes_larger(hsep_lanes_larger(r_p, -r_p), largest.of_four[l]);
+                    outside.of_four[l] = hsep_lanes_larger(-distance, outside.of_four[l]);
                     *hsep_lanes_at(side->r_p + at) = r_p;
                     *hsep_lanes_at(side->r_c + at) = -product * inverse;
                     if (i == 0) {
@@ -158,9 +166,10 @@ HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *pri
             }
             for (; r < self->range[order].end; r++) {
                 const hsep_real s = side->s[r], z = side->z[r], weight = z * side->inverse[r];
-                const hsep_real r_p = slacks_sign[i] * (self->Ax[r] - side->b[r]) - s;
+                const hsep_real distance = slacks_sign[i] * (self->Ax[r] - side->b[r]), r_p = distance - s;
                 sum.left += s * z;
                 largest.left = hsep_fabs(r_p) > largest.left ? hsep_fabs(r_p) : largest.left;
+                outside.left = -distance > outside.left ? -distance : outside.left;
                 side->r_p[r] = r_p;
                 side->r_c[r] = -(s * z) * side->inverse[r];
                 self->Adx[r] = i == 0 ? weight : self->Adx[r] + weight;
@@ -169,6 +178,7 @@ HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *pri
         }
     }
     *primal = slacks_largest(&largest);
+    *beyond = slacks_largest(&outside);
     return slacks_sum(&sum) / self->sides;
 }
 

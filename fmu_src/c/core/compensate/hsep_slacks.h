@@ -37,12 +37,14 @@ typedef struct {
     hsep_real primal, dual;
 } hsep_lengths;
 
-/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. */
-HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost);
+/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. again: whether z are
+ * those of a programme with the same bounds and nearly the same cost. */
+HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost, int again);
 
-/* Return mu, the mean of s z; *primal: the largest primal residual. The weights of A' W A go to Adx, z's difference of
+/* Return mu, the mean of s z; *primal: the largest primal residual; *beyond: by how much the worst bound is exceeded,
+ * negative inside all of them. The weights of A' W A go to Adx, z's difference of
  * the sides to work, and the predictor's r_c is set, as if s z = 0 could be reached at once. */
-HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal);
+HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *primal, hsep_real *beyond);
 
 /* work := B' sides of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
 HSEP_API void hsep_slacks_push(const hsep_slacks *self);

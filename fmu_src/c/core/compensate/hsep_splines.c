@@ -312,18 +312,6 @@ HSEP_API void hsep_splines_difference_gram(
     }
 }
 
-HSEP_API void hsep_splines_difference_product(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, const hsep_real c[], hsep_real y[])
-{
-    for (hsep_word d = 0; d < splines_neighbours(self, order, n); d++) {
-        const hsep_real sum = weight * splines_overlap(self, order, d);
-        for (hsep_word i = 0; i + d < n; i++) {
-            y[i] += sum * c[i + d];
-            y[i + d] += d > 0 ? sum * c[i] : 0.0;
-        }
-    }
-}
-
 HSEP_API void hsep_splines_project_jerk(
     const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_word first, hsep_real v[])
 {

@@ -73,10 +73,6 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
 HSEP_API void hsep_splines_difference_gram(
     const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[]);
 
-/* Multiply coefficients by the matrix of hsep_splines_difference_gram: y, (n,), += weight D' D c. */
-HSEP_API void hsep_splines_difference_product(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, const hsep_real c[], hsep_real y[]);
-
 /* v, (n,), := W' target - weight D' third with the third differences D, target and third (preview,). */
 HSEP_API void hsep_splines_project(
     const hsep_splines *self, const hsep_real filtered[], const hsep_real target[], hsep_real weight,

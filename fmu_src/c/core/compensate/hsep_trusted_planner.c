@@ -9,13 +9,30 @@
 
 /* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
  * that changes nearby. */
-static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.01, 0.0};
+static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.01, 0.0};
 
-/* Penalty on the change of velocity: its first value, and how it follows success. */
-static const hsep_real trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
+/* Length of a step after one that did not lower the cost. */
+static const hsep_real trusted_planner_shorter = 0.3;
 
-/* Tolerance of a programme, which is judged by the model itself. */
-static const hsep_tolerance trusted_planner_tolerance = {1e-4, 1e-2, HSEP_TRUSTED_SOLVED};
+/* Where the solver ends: a plan is judged by the model itself. With a margin as small as rounding an end that exceeds a
+ * bound by a millionth would be no plan; with a larger one there may be none within the bounds. In single precision
+ * rounding leaves up to 2e-4 of a bound of third differences. */
+static const hsep_real trusted_planner_mu = 1e-4, trusted_planner_dual_residual = 1e-2;
+#ifdef HSEP_FLOAT32
+static const hsep_real trusted_planner_margin = 1e-4F;
+#else
+static const hsep_real trusted_planner_margin = 1e-5;
+#endif
+static const hsep_word trusted_planner_solved[1 + HSEP_TRUSTED_STEPS] = HSEP_TRUSTED_SOLVED;
+
+static hsep_tolerance trusted_planner_tolerance(hsep_word steps)
+{
+    return (hsep_tolerance){
+        .mu = trusted_planner_mu,
+        .dual_residual = trusted_planner_dual_residual,
+        .margin = trusted_planner_margin,
+        .steps = steps};
+}
 
 /* Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
  * rounding tells apart are equal. */
@@ -51,16 +68,32 @@ static void trusted_planner_command(
     }
 }
 
-/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. varied: samples
- * whose variance is computed; 0: the variance under the remainder of the last plan is kept. */
-static hsep_real trusted_planner_predict(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
+/* Predict the commands of a plan in two calls, with the variances under the remainder of the last plan; return
+ * whether all are predicted. */
+static int trusted_planner_predicts(hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[])
+{
+    const hsep_word all = self->preview + self->late;
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (self->predicted == 0) {
+        self->predicted = all / HSEP_TRUSTED_AT_FIRST;
+        trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
+        hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, self->predicted, 0);
+        return 0;
+    }
+    hsep_trusted_go_on(task->model, x_pb, e_h, self->predicted, all, 0);
+    self->predicted = 0;
+    return 1;
+}
+
+/* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
+static hsep_real trusted_planner_cost(
+    const hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[])
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_word count = HSEP_DECIDED + self->n;
-    const hsep_real *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
-    hsep_real *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
-    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, varied);
+    const hsep_real *x_pb = hsep_at_const(self, self->x_pb), *e_h = hsep_at_const(self, self->e_h);
+    const hsep_real *before = task->planner->delta_before;
+    hsep_real d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
     for (hsep_word k = 0; k < self->preview; k++) {
         const hsep_word j = self->preview - 1 - k;
         const hsep_real e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -73,12 +106,27 @@ static hsep_real trusted_planner_predict(
     return error + task->planner->jerk_weight * jerk;
 }
 
-/* The same for the commands of a plan. */
-static hsep_real trusted_planner_at(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[], hsep_word varied)
+/* The plan is made: its window is to be predicted. */
+static void trusted_planner_end(hsep_trusted_planner *self)
 {
-    trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
-    return trusted_planner_predict(self, task, c, varied);
+    self->predicted = 0;
+    self->stage = HSEP_TRUSTED_PREDICT;
+}
+
+/* Some of the window's samples under the plan, and their variances. */
+static void trusted_planner_window(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_word first = self->predicted, all = self->late + self->Np, left = all - first;
+    const hsep_word last = first + (left < HSEP_TRUSTED_VARIED ? left : HSEP_TRUSTED_VARIED);
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (first == 0) {
+        trusted_planner_command(self, task, hsep_planner_coefficients(task->planner), HSEP_DECIDED + self->n);
+        hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, 1);
+    } else {
+        hsep_trusted_go_on(task->model, x_pb, e_h, first, last, 1);
+    }
+    self->predicted = last;
+    self->stage = last < all ? HSEP_TRUSTED_PREDICT : HSEP_TRUSTED_DONE;
 }
 
 /* The physics model's plan is made: try a better one, if there may be one. */
@@ -86,17 +134,20 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
     self->planned = 1;
-    self->stage = self->follows ? HSEP_TRUSTED_REST : HSEP_TRUSTED_PREDICT;
-    if (self->follows) {
+    if (!self->follows) {
+        trusted_planner_end(self);
+    } else {
+        self->stage = HSEP_TRUSTED_STEP;
         trusted_planner_copy(self, hsep_at(self, self->of_physics), c);
         trusted_planner_copy(self, hsep_at(self, self->best), rest);
         trusted_planner_copy(self, c, rest);
         hsep_planner_let_turn(task->planner);
         hsep_planner_decide_pinned(task->planner);
+        trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n); /* it was predicted last */
     }
 }
 
-/* Begin the physics model's plan; without one the remainder of the last plan goes on. */
+/* Begin the physics model's plan. */
 static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb);
@@ -108,11 +159,21 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_aim(task->planner, task->spline, target);
     hsep_planner_pin(task->planner);
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
+    self->stage = HSEP_TRUSTED_AIMED;
+}
+
+/* Solve it; without one the remainder of the last plan goes on. */
+static void trusted_planner_solve_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_word steps = self->follows ? trusted_planner_solved[0] : HSEP_TRUSTED_ALONE;
+    const hsep_tolerance tolerance = trusted_planner_tolerance(steps);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
     if (status == HSEP_PLAN_DONE) {
         trusted_planner_continue(self, task);
+    } else if (status == HSEP_PLAN_BOUNDED) {
+        self->stage = HSEP_TRUSTED_PHYSICS;
     } else {
-        self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_PREDICT;
+        trusted_planner_end(self);
     }
 }
 
@@ -121,8 +182,7 @@ HSEP_API void hsep_trusted_planner_begin(
 {
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
-    self->penalty = 0.0;
+    self->steps = self->tries = self->planned = self->predicted = self->bounded = 0;
     trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
@@ -140,39 +200,58 @@ HSEP_API void hsep_trusted_planner_begin(
         hsep_at(self, self->e_h), self->varied);
     self->follows = best > 1 && !self->ended && task->model->predicted[HSEP_STATIC];
     if (best == 0) {
-        self->stage = HSEP_TRUSTED_PREDICT;
+        trusted_planner_end(self);
     } else {
         self->stage = self->follows ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
     }
 }
 
-/* Variances of some of the samples under the remainder of the last plan. */
+/* Some of the samples under the remainder of the last plan, and their variances. */
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_word all = self->preview + self->late, left = all - self->varied;
-    const hsep_word last = self->varied + (left < HSEP_TRUSTED_VARIED ? left : HSEP_TRUSTED_VARIED);
-    hsep_trusted_vary(task->model, self->varied, last);
+    const hsep_word all = self->late + self->preview, window = self->late + self->Np;
+    const int is_within = self->varied < window;
+    const hsep_word apart = is_within ? 1 : HSEP_TRUSTED_APART, left = (is_within ? window : all) - self->varied;
+    const hsep_word most = apart * HSEP_TRUSTED_VARIED, last = self->varied + (left < most ? left : most);
+    hsep_trusted_go_on(task->model, hsep_at(self, self->x_pb), hsep_at(self, self->e_h), self->varied, last, apart);
     self->varied = last;
-    self->stage = last < all ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
+    if (last == all) {
+        self->cost = trusted_planner_cost(self, task, hsep_at(self, self->rest));
+        self->stage = HSEP_TRUSTED_CHANGE;
+    }
 }
 
-/* Begin a Newton step: linearise at the best plan, which was predicted last. */
-static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
+/* What linearisations of this window have in common. */
+static void trusted_planner_change(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_linearised_change change = {
         .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
+    hsep_linearised_begin((hsep_linearised *)hsep_at(self, self->linearised), task->model, &change);
+    self->stage = HSEP_TRUSTED_BEGIN;
+}
+
+/* Begin a Newton step: slopes at the best plan, which was predicted last. */
+static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    hsep_linearised_slopes(
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command),
+        hsep_at(self, self->x_pb), trusted_planner_reaches[self->steps]);
+    self->steps++;
+    self->stage = HSEP_TRUSTED_AT;
+}
+
+/* Linearise with these slopes. */
+static void trusted_planner_linearise(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     hsep_real *target = hsep_at(self, self->target);
-    hsep_linearised_at(
-        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb, &change,
-        trusted_planner_reaches[self->steps]);
+    hsep_linearised_at((hsep_linearised *)hsep_at(self, self->linearised), task->model);
     for (hsep_word k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
         const hsep_word j = self->preview - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
     }
-    self->steps++;
-    self->columns = self->n_pinned;
+    self->columns = self->rows = self->n_pinned;
     self->tries = 0;
     self->stage = HSEP_TRUSTED_COLUMN;
 }
@@ -203,14 +282,16 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
     self->stage = self->columns < self->n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
 }
 
-/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term, for the splines that are not pinned;
- * the plan that is linearised at has the pinned ones in it. */
+/* Some rows of the programme of a Newton step, P = W' W + jerk_weight D' D, and of its linear term, for the splines
+ * that are not pinned; the plan that is linearised at has the pinned ones in it. */
 static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_word n = self->n, preview = self->preview, spacing = splines->spacing, first = self->n_pinned;
-    hsep_real *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
-    for (hsep_word i = first; i < n; i++) {
+    const hsep_word begin = self->rows, end = begin + HSEP_TRUSTED_PRODUCTS < n ? begin + HSEP_TRUSTED_PRODUCTS : n;
+    hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
+    hsep_real *P = hsep_planner_quadratic(task->planner, begin);
+    for (hsep_word i = begin; i < end; i++) {
         const hsep_real *left = trusted_planner_column_of(self, i, spacing);
         hsep_word j = i; /* column j begins (j - i) spacing later */
         for (; j + 4 <= n; j += 4, P += 4) {
@@ -230,52 +311,64 @@ static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trus
         }
         v[i - first] = hsep_dot(left, target + i * spacing, preview - i * spacing);
     }
-    hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, n - first, hsep_at(self, self->P));
-    hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), first, v);
-    self->stage = HSEP_TRUSTED_TRY;
+    self->rows = end;
+    if (end == n) {
+        self->stage = HSEP_TRUSTED_FACTOR;
+    }
 }
 
-/* Solve the programme with a penalty on the change of velocity. */
-static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_task *task)
+/* Complete the programme of a Newton step, and factor it if it does not follow a bounded one. */
+static void trusted_planner_factor(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED + self->n_pinned;
-    const hsep_word free = self->n - self->n_pinned;
-    hsep_real *P = hsep_planner_quadratic(task->planner, self->n_pinned), *v = hsep_planner_linear(task->planner);
-    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(free) * sizeof(hsep_real));
-    memcpy(v, hsep_at(self, self->v), (size_t)free * sizeof(hsep_real));
-    if (self->penalty > 0.0) {
-        hsep_splines_difference_gram(splines, 1, self->penalty, free, P);
-        hsep_splines_difference_product(splines, 1, self->penalty, free, at, v);
-    }
-    hsep_planner_regularise(task->planner, self->n_pinned);
-    self->tries++;
-    self->tries_in_all++;
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
-    self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
-    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < HSEP_TRUSTED_SOLVER) {
+    const hsep_word first = self->n_pinned;
+    const hsep_real jerk_weight = task->planner->jerk_weight;
+    hsep_splines_difference_gram(
+        splines, 3, jerk_weight, self->n - first, hsep_planner_quadratic(task->planner, first));
+    hsep_splines_project_jerk(
+        splines, jerk_weight, hsep_planner_third(task->planner), first, hsep_planner_linear(task->planner));
+    hsep_planner_regularise(task->planner, first);
+    const int begins = self->bounded || hsep_planner_factor(task->planner, 1);
+    self->stage = begins ? HSEP_TRUSTED_SOLVE : HSEP_TRUSTED_COMPARE;
+}
+
+/* Solve it. */
+static void trusted_planner_solve(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_tolerance tolerance = trusted_planner_tolerance(trusted_planner_solved[self->steps]);
+    if (self->bounded) { /* so it is again */
+        hsep_planner_solve_again(task->planner, hsep_at(self, self->best), &tolerance);
         self->stage = HSEP_TRUSTED_BOUNDED;
+        return;
+    }
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
+    self->bounded = status == HSEP_PLAN_BOUNDED;
+    self->stage = HSEP_TRUSTED_COMPARE;
+    if (status != HSEP_PLAN_FAILED) {
+        self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_BOUNDED;
     }
 }
 
-/* Judge a try, and take it if it is better. */
+/* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
+ */
 static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    hsep_real *c = hsep_planner_coefficients(task->planner);
-    const hsep_real cost = trusted_planner_at(self, task, c, 0), gain = self->cost - cost;
-    const int may_try = self->tries_in_all < HSEP_TRUSTED_TOGETHER;
+    hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
+    const hsep_real cost = trusted_planner_cost(self, task, c), gain = self->cost - cost;
+    self->tries++;
     self->stage = HSEP_TRUSTED_COMPARE;
     if (trusted_planner_better(cost, self->cost)) {
         const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
-        trusted_planner_copy(self, hsep_at(self, self->best), c);
+        trusted_planner_copy(self, best, c);
         self->cost = cost;
-        self->penalty *= trusted_planner_lower;
-        self->stage = is_last || !may_try ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
-    } else {
-        self->penalty = hsep_fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
-        self->stage = self->tries < HSEP_TRUSTED_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
+        self->stage = is_last ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
+        trusted_planner_copy(self, c, hsep_at(self, self->rest));
+    } else if (self->tries < HSEP_TRUSTED_TRIES) {
+        for (hsep_word j = HSEP_DECIDED; j < HSEP_DECIDED + self->n; j++) {
+            c[j] = best[j] + trusted_planner_shorter * (c[j] - best[j]);
+        }
+        self->stage = HSEP_TRUSTED_JUDGE;
     }
-    trusted_planner_copy(self, c, hsep_at(self, self->rest));
 }
 
 /* Share of a window in which a plan is at the bound of the change. */
@@ -305,41 +398,52 @@ static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hse
 /* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_real cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 0);
+    const hsep_real cost = trusted_planner_cost(self, task, hsep_at(self, self->of_physics));
     int is_better = trusted_planner_better(self->cost, cost);
     if (is_better && trusted_planner_runs_away(self, task)) {
         self->ended = 1;
         is_better = 0;
     }
     self->planned = is_better ? 2 : 1;
-    self->stage = HSEP_TRUSTED_PREDICT;
     trusted_planner_copy(
         self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
+    trusted_planner_end(self);
 }
 
 HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    hsep_real *c = hsep_planner_coefficients(task->planner);
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         break;
     case HSEP_TRUSTED_VARY:
         trusted_planner_vary(self, task);
         break;
+    case HSEP_TRUSTED_CHANGE:
+        trusted_planner_change(self, task);
+        break;
     case HSEP_TRUSTED_BEGIN:
         trusted_planner_physics(self, task);
+        break;
+    case HSEP_TRUSTED_AIMED:
+        if (hsep_planner_factor(task->planner, 1)) {
+            self->stage = HSEP_TRUSTED_FACTORED;
+        } else {
+            trusted_planner_end(self);
+        }
+        break;
+    case HSEP_TRUSTED_FACTORED:
+        trusted_planner_solve_physics(self, task);
         break;
     case HSEP_TRUSTED_PHYSICS:
         if (hsep_planner_advance(task->planner)) {
             trusted_planner_continue(self, task);
         }
         break;
-    case HSEP_TRUSTED_REST:
-        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest), 0);
-        self->stage = HSEP_TRUSTED_STEP;
-        break;
     case HSEP_TRUSTED_STEP:
         trusted_planner_step(self, task);
+        break;
+    case HSEP_TRUSTED_AT:
+        trusted_planner_linearise(self, task);
         break;
     case HSEP_TRUSTED_COLUMN:
         trusted_planner_columns(self, task);
@@ -347,24 +451,29 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
     case HSEP_TRUSTED_PRODUCT:
         trusted_planner_products(self, task);
         break;
-    case HSEP_TRUSTED_TRY:
-        trusted_planner_try(self, task);
+    case HSEP_TRUSTED_FACTOR:
+        trusted_planner_factor(self, task);
+        break;
+    case HSEP_TRUSTED_SOLVE:
+        trusted_planner_solve(self, task);
         break;
     case HSEP_TRUSTED_BOUNDED:
         if (hsep_planner_advance(task->planner)) {
-            self->solver_steps += hsep_planner_steps(task->planner);
             self->stage = HSEP_TRUSTED_JUDGE;
         }
         break;
     case HSEP_TRUSTED_JUDGE:
-        trusted_planner_judge(self, task);
+        if (trusted_planner_predicts(self, task, hsep_planner_coefficients(task->planner))) {
+            trusted_planner_judge(self, task);
+        }
         break;
     case HSEP_TRUSTED_COMPARE:
-        trusted_planner_compare(self, task);
+        if (trusted_planner_predicts(self, task, hsep_at(self, self->of_physics))) {
+            trusted_planner_compare(self, task);
+        }
         break;
     case HSEP_TRUSTED_PREDICT:
-        (void)trusted_planner_at(self, task, c, self->late + self->Np);
-        self->stage = HSEP_TRUSTED_DONE;
+        trusted_planner_window(self, task);
         break;
     }
 }

@@ -1,8 +1,6 @@
 /* Memory of a planner on the residual model with trust: its layout, beginning and check. */
 #include "hsep_trusted_planner.h"
 
-#include "hsep_cholesky.h"
-
 #include <stddef.h>
 #include <string.h>
 
@@ -13,8 +11,8 @@ static hsep_real trusted_planner_lay_out(
     const hsep_word n = hsep_splines_count(planner->preview, planner->spacing);
     const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const hsep_word n_pinned = hsep_planner_n_pinned(planner), free = n - n_pinned;
-    const hsep_real columns = (hsep_real)free, coefficients = HSEP_DECIDED + (hsep_real)n;
+    const hsep_word n_pinned = hsep_planner_n_pinned(planner);
+    const hsep_real columns = (hsep_real)(n - n_pinned), coefficients = HSEP_DECIDED + (hsep_real)n;
     const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;
@@ -31,8 +29,6 @@ static hsep_real trusted_planner_lay_out(
     self->e_h = hsep_take(&end, all + (hsep_real)self->p);
     self->target = hsep_take(&end, preview);
     self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
-    self->P = hsep_take(&end, hsep_triangle(free));
-    self->v = hsep_take(&end, columns);
     self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
@@ -53,6 +49,7 @@ HSEP_API void hsep_trusted_planner_init(
     memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
     (void)trusted_planner_lay_out(self, parameters, planner);
     self->start = start;
+    self->columns = self->rows = self->n_pinned;
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
     for (int i = 0; i < 2; i++) {
         hsep_physics_init(
@@ -69,9 +66,10 @@ HSEP_API int hsep_trusted_planner_valid(
     memcpy(&got, block, sizeof got);
     (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
-           got.varied <= got.preview + got.late && got.steps <= HSEP_TRUSTED_STEPS && got.columns <= got.n &&
-           got.tries <= HSEP_TRUSTED_TRIES && got.tries_in_all <= HSEP_TRUSTED_TOGETHER &&
-           got.solver_steps < HSEP_TRUSTED_SOLVER + HSEP_TRUSTED_SOLVED && got.planned <= 2 && got.ended <= 1 &&
+           got.varied <= got.preview + got.late && got.predicted <= got.preview + got.late &&
+           got.steps <= HSEP_TRUSTED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
+           got.rows >= got.n_pinned && got.rows <= got.n && got.tries <= HSEP_TRUSTED_TRIES && got.planned <= 2 &&
+           got.bounded <= 1 && got.ended <= 1 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);

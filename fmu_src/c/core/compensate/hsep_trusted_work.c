@@ -3,64 +3,40 @@
 #include "hsep_trusted_planner.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_math.h"
 
-/* Multiply-adds that these count for: a tanh; the two halves of an interior-point step besides their matrices, for a
- * sample of a plan with its rows of 4 orders and 2 sides; the beginning of such a step; a linearisation besides
- * recursions and tanh, for a sample; a prediction, for a sample of an expert. */
-static const hsep_real work_tanh = 40.0, work_residuals = 200.0, work_slacks = 400.0, work_bounds = 550.0,
-                       work_sample = 550.0, work_of_expert = 270.0;
+/* Multiply-adds that these count for, on the whole: python -m benchmarks.instructions counts what they stand for. Of
+ * a prediction: a tanh; a sample's command besides; its part of the cost; its part of an expert; its lags without a
+ * row of its own. Of a linearisation: a sample's slopes besides tanh; what it has in common with others; the rest; a
+ * lag of a column. Of the programmes: what completes one, a sample; a product of columns, to begin; of the physics
+ * model's, a sample and a pair of splines; the bounds of a sample, and whether they allow the free minimum. Of a
+ * solver step, which has 4 rows and 2 sides a sample: residuals, directions, and their matrix, for a spline. */
+static const hsep_real work_tanh = 40.0, work_command = 135.0, work_cost = 185.0, work_of_expert = 60.0,
+                       work_held = 600.0;
+static const hsep_real work_slope = 30.0, work_change = 400.0, work_sample = 130.0, work_lag = 0.85;
+static const hsep_real work_completed = 50.0, work_product = 9.0, work_target = 250.0, work_shifted = 16.0,
+                       work_bounds = 280.0, work_allowed = 90.0;
+static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 200.0;
+
+static const hsep_word work_solved[1 + HSEP_TRUSTED_STEPS] = HSEP_TRUSTED_SOLVED;
 
 /* Disturbances that are filtered for a prediction: friction once, stiffness and damping twice. */
 static const hsep_real work_filtered = 10.0, work_of_mode = 9.0;
+
+/* Of the experts that predict: their number, features, squares of these, and lags. */
+typedef struct {
+    hsep_real count, features, squares, lags;
+} work_experts;
 
 /* The sizes as they are used. */
 typedef struct {
     hsep_real all, preview, spacing; /* samples */
     hsep_real free;                  /* splines that are not pinned */
     hsep_real modes;
+    work_experts experts;
+    hsep_word n_columns;               /* experts that columns take work for, */
+    hsep_real columns[HSEP_N_EXPERTS]; /* and their lags */
 } work_sizes;
-
-static work_sizes work_of(const hsep_trusted_planner *self, const hsep_trusted_task *task)
-{
-    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
-    return (work_sizes){
-        .all = (hsep_real)(self->preview + self->late),
-        .preview = (hsep_real)self->preview,
-        .spacing = (hsep_real)hsep_planner_splines(task->planner)->spacing,
-        .free = (hsep_real)(self->n - self->n_pinned),
-        .modes = (hsep_real)physics->n_modes};
-}
-
-/* A factor of the free splines, and solutions with it. */
-static hsep_real work_factor(const work_sizes *sizes, hsep_real solutions)
-{
-    return sizes->free * sizes->free * (sizes->free / 6.0 + solutions);
-}
-
-/* An interior-point step: its factor, and what follows from it. */
-static hsep_real work_factored(const work_sizes *sizes)
-{
-    return work_factor(sizes, 0.0) + 40.0 * sizes->spacing * sizes->free + work_residuals * sizes->preview;
-}
-
-static hsep_real work_directions(const work_sizes *sizes)
-{
-    return 2.0 * sizes->free * sizes->free + work_slacks * sizes->preview;
-}
-
-static hsep_real work_interior(const work_sizes *sizes) { return work_factored(sizes) + work_directions(sizes); }
-
-static hsep_real work_begin(const work_sizes *sizes)
-{
-    return work_factor(sizes, 1.0) + sizes->free * sizes->preview + work_bounds * sizes->preview;
-}
-
-static hsep_real work_try(const work_sizes *sizes) { return work_factor(sizes, 2.0) + work_bounds * sizes->preview; }
-
-/* Of the experts that predict: their number, features, squares of these, and lags. */
-typedef struct {
-    hsep_real count, features, squares, lags;
-} work_experts;
 
 static work_experts work_of_experts(hsep_trusted *model)
 {
@@ -78,143 +54,280 @@ static work_experts work_of_experts(hsep_trusted *model)
     return sum;
 }
 
-static hsep_real work_predict(const work_sizes *sizes, hsep_trusted *model)
+static work_sizes work_of(const hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const work_experts experts = work_of_experts(model);
-    return sizes->all * (experts.features + work_of_expert * experts.count + HSEP_DISTURBANCES_N_FRICTION * work_tanh +
-                         work_filtered * work_of_mode * sizes->modes);
-}
-
-/* Variances of count samples: leverages of rows, carried through the recursion. */
-static hsep_real work_vary(const work_sizes *sizes, hsep_trusted *model, hsep_real count)
-{
-    const work_experts experts = work_of_experts(model);
-    return count * (0.55 * experts.squares + 2.0 * experts.features + 2.0 * sizes->all);
-}
-
-static hsep_real work_step(const work_sizes *sizes, hsep_trusted *model)
-{
-    return sizes->all * (2.0 * HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_of_experts(model).lags + work_sample);
-}
-
-/* Columns that begin with spline j, side by side. */
-static hsep_real work_columns(const work_sizes *sizes, hsep_trusted *model, hsep_real j)
-{
-    const hsep_real length = sizes->preview - sizes->spacing * j;
-    hsep_real sum = 0.0;
+    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    work_sizes sizes = {
+        .all = (hsep_real)(self->preview + self->late),
+        .preview = (hsep_real)self->preview,
+        .spacing = (hsep_real)hsep_planner_splines(task->planner)->spacing,
+        .free = (hsep_real)(self->n - self->n_pinned),
+        .modes = (hsep_real)physics->n_modes,
+        .experts = work_of_experts(task->model)};
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (model->predicted[i] && hsep_trusted_kind_of(model, i) == HSEP_OF_PHYSICS) {
-            const hsep_real p = (hsep_real)hsep_trusted_expert(model, i)->p;
-            const hsep_real lags = length > p ? p * (length - 0.5 * p) : 0.5 * length * length;
-            sum += HSEP_PHYSICS_ABREAST * (lags + length * (work_of_mode * sizes->modes + 10.0));
+        if (hsep_linearised_counts(task->model, i)) {
+            sizes.columns[sizes.n_columns++] = (hsep_real)hsep_trusted_expert(task->model, i)->p;
         }
     }
-    return sum + HSEP_PHYSICS_ABREAST * length;
+    return sizes;
 }
 
-static hsep_real work_columns_left(
-    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_trusted *model, hsep_word j)
+/* A factor of the free splines, and solutions with it. */
+static hsep_real work_factor(const work_sizes *sizes, hsep_real solutions)
+{
+    return sizes->free * sizes->free * (sizes->free / 6.0 + solutions);
+}
+
+/* Parts of an interior-point step, and all of it. */
+static hsep_real work_interior_part(const work_sizes *sizes, hsep_word part)
+{
+    const hsep_real n = sizes->free;
+    if (part == 0) {
+        return n * n + work_residuals * sizes->preview;
+    }
+    if (part < HSEP_INTERIOR_PARTS - 1) {
+        return 0.5 * (work_factor(sizes, 0.0) + work_gram * sizes->spacing * n);
+    }
+    return 2.0 * n * n + work_slacks * sizes->preview;
+}
+
+static hsep_real work_interior(const work_sizes *sizes)
 {
     hsep_real sum = 0.0;
-    for (; j < self->n; j += HSEP_PHYSICS_ABREAST) {
-        sum += work_columns(sizes, model, (hsep_real)j);
+    for (hsep_word part = 0; part < HSEP_INTERIOR_PARTS; part++) {
+        sum += work_interior_part(sizes, part);
     }
     return sum;
 }
 
-static hsep_real work_products(const hsep_trusted_planner *self, const work_sizes *sizes)
+/* A programme up to its first step, of all the part after its factor, and of that the part of one that follows a
+ * bounded one. */
+static hsep_real work_bound(const work_sizes *sizes) { return work_bounds * sizes->preview; }
+
+static hsep_real work_factored(const work_sizes *sizes)
 {
-    const hsep_real n = sizes->free, longest = sizes->preview - sizes->spacing * (hsep_real)self->n_pinned;
-    return n * (n + 1.0) * (0.5 * longest - sizes->spacing * (n - 1.0) / 3.0);
+    return work_bound(sizes) + work_allowed * sizes->preview + 2.0 * sizes->free * sizes->free;
+}
+
+static hsep_real work_solve(const work_sizes *sizes) { return work_factor(sizes, 0.0) + work_factored(sizes); }
+
+/* The programme of the physics model. */
+static hsep_real work_aim(const work_sizes *sizes)
+{
+    return work_shifted * sizes->free * sizes->free + work_target * sizes->preview;
+}
+
+/* Commands of a plan with their disturbances, and count samples that the experts predict. */
+static hsep_real work_commands(const work_sizes *sizes)
+{
+    return sizes->all *
+           (HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_filtered * work_of_mode * sizes->modes + work_command);
+}
+
+static hsep_real work_run(const work_sizes *sizes, hsep_real count)
+{
+    return count * (sizes->experts.features + work_of_expert * sizes->experts.count);
+}
+
+/* A prediction and its cost. */
+static hsep_real work_predict(const work_sizes *sizes)
+{
+    return work_commands(sizes) + work_run(sizes, sizes->all) + work_cost * sizes->preview;
+}
+
+/* The part of a prediction that comes next. */
+static hsep_real work_next(const hsep_trusted_planner *self, const work_sizes *sizes)
+{
+    const hsep_real first = work_commands(sizes) + work_run(sizes, sizes->all / HSEP_TRUSTED_AT_FIRST);
+    return self->predicted > 0 ? work_predict(sizes) - first : first;
+}
+
+/* Count samples and their variances: leverages of rows, one for every apart, carried through the recursion. */
+static hsep_real work_samples(const work_sizes *sizes, hsep_real count, hsep_real apart)
+{
+    const hsep_real leverages = (0.6 * sizes->experts.squares + 2.2 * sizes->experts.features) / apart;
+    return work_run(sizes, count) + count * (leverages + 2.0 * sizes->all + (apart > 1.0 ? work_held : 0.0));
+}
+
+static hsep_real work_slopes(const work_sizes *sizes)
+{
+    return sizes->all * (2.0 * HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_slope);
+}
+
+static hsep_real work_linearise(const work_sizes *sizes) { return sizes->all * work_sample; }
+
+static hsep_real work_begin(const work_sizes *sizes) { return sizes->all * (sizes->experts.lags + work_change); }
+
+/* Columns that begin with spline j, side by side. */
+static hsep_real work_columns(const work_sizes *sizes, hsep_real j)
+{
+    const hsep_real length = sizes->preview - sizes->spacing * j;
+    hsep_real sum = 0.0;
+    for (hsep_word i = 0; i < sizes->n_columns; i++) {
+        const hsep_real p = sizes->columns[i];
+        const hsep_real lags = length > p ? p * (length - 0.5 * p) : 0.5 * length * length;
+        sum += HSEP_PHYSICS_ABREAST * (work_lag * lags + length * (work_of_mode * sizes->modes + 8.0));
+    }
+    return sum + HSEP_PHYSICS_ABREAST * length;
+}
+
+static hsep_real work_columns_left(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word j)
+{
+    hsep_real sum = 0.0;
+    for (; j < self->n; j += HSEP_PHYSICS_ABREAST) {
+        sum += work_columns(sizes, (hsep_real)j);
+    }
+    return sum;
+}
+
+/* Products of the last n columns with each other. */
+static hsep_real work_products(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word row)
+{
+    const hsep_real n = row < self->n ? (hsep_real)(self->n - row) : 0.0,
+                    longest = sizes->preview - sizes->spacing * (hsep_real)row;
+    return n * (n + 1.0) * (0.5 * longest - sizes->spacing * (n - 1.0) / 3.0 + work_product);
 }
 
 HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const work_sizes sizes = work_of(self, task);
-    hsep_trusted *model = task->model;
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         return 0.0;
     case HSEP_TRUSTED_VARY:
-        return work_vary(&sizes, model, HSEP_TRUSTED_VARIED);
-    case HSEP_TRUSTED_BEGIN:
+        return self->varied < self->late + self->Np
+                   ? work_samples(&sizes, HSEP_TRUSTED_VARIED, 1.0)
+                   : work_samples(&sizes, HSEP_TRUSTED_APART * HSEP_TRUSTED_VARIED, HSEP_TRUSTED_APART);
+    case HSEP_TRUSTED_CHANGE:
         return work_begin(&sizes);
+    case HSEP_TRUSTED_BEGIN:
+        return work_aim(&sizes);
+    case HSEP_TRUSTED_AIMED:
+        return work_factor(&sizes, 0.0);
+    case HSEP_TRUSTED_FACTOR:
+        return self->bounded ? work_completed * sizes.preview : work_factor(&sizes, 0.0);
+    case HSEP_TRUSTED_FACTORED:
+        return work_factored(&sizes);
+    case HSEP_TRUSTED_SOLVE:
+        return self->bounded ? work_bound(&sizes) : work_factored(&sizes);
     case HSEP_TRUSTED_PHYSICS:
     case HSEP_TRUSTED_BOUNDED:
-        return hsep_planner_within_step(task->planner) ? work_directions(&sizes) : work_factored(&sizes);
+        return work_interior_part(&sizes, hsep_planner_part(task->planner));
     case HSEP_TRUSTED_STEP:
-        return work_step(&sizes, model);
+        return work_slopes(&sizes);
+    case HSEP_TRUSTED_AT:
+        return work_linearise(&sizes);
     case HSEP_TRUSTED_COLUMN:
-        return work_columns(&sizes, model, (hsep_real)self->columns);
+        return work_columns(&sizes, (hsep_real)self->columns);
     case HSEP_TRUSTED_PRODUCT:
-        return work_products(self, &sizes);
-    case HSEP_TRUSTED_TRY:
-        return work_try(&sizes);
-    case HSEP_TRUSTED_REST:
+        return work_products(self, &sizes, self->rows) -
+               work_products(self, &sizes, self->rows + HSEP_TRUSTED_PRODUCTS);
     case HSEP_TRUSTED_JUDGE:
     case HSEP_TRUSTED_COMPARE:
-        return work_predict(&sizes, model);
+        return work_next(self, &sizes);
     case HSEP_TRUSTED_PREDICT:
         break;
     }
-    return work_predict(&sizes, model) + work_vary(&sizes, model, (hsep_real)(self->late + self->Np));
+    return (self->predicted > 0 ? 0.0 : work_commands(&sizes)) + work_samples(&sizes, HSEP_TRUSTED_VARIED, 1.0);
 }
 
-/* Newton steps and tries from here on, of which a programme's solver has done some steps. */
-static hsep_real work_newton_left(
-    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_trusted *model, hsep_word solved)
+/* Solver steps of a programme at most, after those that are done. */
+static hsep_real work_steps(
+    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word programme, hsep_word done)
 {
-    const hsep_word most = HSEP_TRUSTED_SOLVER - 1 + HSEP_TRUSTED_SOLVED, done = self->solver_steps + solved;
-    const hsep_real solver = done < most ? (hsep_real)(most - done) : 0.0;
-    const hsep_real steps = (hsep_real)(HSEP_TRUSTED_STEPS - self->steps);
-    const hsep_real tries = (hsep_real)(HSEP_TRUSTED_TOGETHER - self->tries_in_all);
-    return steps * (work_step(sizes, model) + work_columns_left(self, sizes, model, self->n_pinned) +
-                    work_products(self, sizes)) +
-           tries * (work_try(sizes) + work_predict(sizes, model)) + solver * work_interior(sizes);
+    const hsep_word most = programme > 0 || self->follows ? work_solved[programme] : HSEP_TRUSTED_ALONE;
+    return done < most ? (hsep_real)(most - done) * work_interior(sizes) : 0.0;
+}
+
+/* Lengths of a Newton step. */
+static hsep_real work_judge(const hsep_trusted_planner *self, const work_sizes *sizes)
+{
+    return (hsep_real)(HSEP_TRUSTED_TRIES - self->tries) * work_predict(sizes);
+}
+
+/* From the solution of a Newton step's programme on, up to the next step. */
+static hsep_real work_programme(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word step)
+{
+    const hsep_real begin = self->bounded || step > self->steps + 1 ? work_bound(sizes) : work_solve(sizes);
+    return begin + work_steps(self, sizes, step, 0) + HSEP_TRUSTED_TRIES * work_predict(sizes);
+}
+
+/* Newton steps that have not begun. */
+static hsep_real work_newton(const hsep_trusted_planner *self, const work_sizes *sizes)
+{
+    const hsep_real linearise = work_slopes(sizes) + work_linearise(sizes) +
+                                work_columns_left(self, sizes, self->n_pinned) +
+                                work_products(self, sizes, self->n_pinned);
+    hsep_real sum = 0.0;
+    for (hsep_word step = self->steps + 1; step <= HSEP_TRUSTED_STEPS; step++) {
+        sum += linearise + work_programme(self, sizes, step);
+    }
+    return sum;
 }
 
 HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const work_sizes sizes = work_of(self, task);
-    hsep_trusted *model = task->model;
-    const int follows = self->follows != 0;
-    const hsep_word solved = hsep_planner_steps(task->planner);
-    const hsep_real rest = hsep_planner_within_step(task->planner) ? work_directions(&sizes) : 0.0;
-    const hsep_real predict = work_predict(&sizes, model), newton = work_newton_left(self, &sizes, model, 0);
-    const hsep_real last = predict + work_vary(&sizes, model, (hsep_real)(self->late + self->Np)); /* of the plan */
-    const hsep_real after_physics = (follows ? predict + newton + predict : 0.0) + last,
-                    interior = work_interior(&sizes);
+    const hsep_real predict = work_predict(&sizes), window = (hsep_real)(self->late + self->Np);
+    const hsep_real last = work_commands(&sizes) + work_samples(&sizes, window, 1.0);
+    const hsep_real begun = self->predicted > 0 ? predict - work_next(self, &sizes) : 0.0; /* is done */
+    const hsep_real after_step = work_newton(self, &sizes) + predict + last;
+    const hsep_real after_physics = self->follows ? after_step : last;
+    const hsep_word programme = self->stage == HSEP_TRUSTED_BOUNDED ? self->steps : 0;
+    hsep_real bounded = work_steps(self, &sizes, programme, hsep_planner_steps(task->planner));
+    for (hsep_word part = hsep_planner_part(task->planner); part > 0 && part < HSEP_INTERIOR_PARTS; part++) {
+        bounded += work_interior_part(&sizes, part);
+    }
+    const hsep_real varied = (hsep_real)self->varied, within = varied < window ? window - varied : 0.0;
+    const hsep_real behind = sizes.all - hsep_fmax(varied, window);
+    const hsep_real solve = work_solve(&sizes) + work_steps(self, &sizes, 0, 0) + after_physics;
     hsep_real left = 0.0;
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         return 0.0;
     case HSEP_TRUSTED_VARY:
-        left = work_vary(&sizes, model, sizes.all - (hsep_real)self->varied);
-        return left + work_begin(&sizes) + HSEP_TRUSTED_SOLVED * interior + after_physics;
+        left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_TRUSTED_APART);
+        return left + work_begin(&sizes) + work_aim(&sizes) + solve;
+    case HSEP_TRUSTED_CHANGE:
+        return work_begin(&sizes) + work_aim(&sizes) + solve;
     case HSEP_TRUSTED_BEGIN:
-        return work_begin(&sizes) + HSEP_TRUSTED_SOLVED * interior + after_physics;
+        return work_aim(&sizes) + solve;
+    case HSEP_TRUSTED_AIMED:
+        return solve;
+    case HSEP_TRUSTED_FACTORED:
+        return solve - work_factor(&sizes, 0.0);
     case HSEP_TRUSTED_PHYSICS:
-        return rest + (hsep_real)(HSEP_TRUSTED_SOLVED - solved) * interior + after_physics;
-    case HSEP_TRUSTED_REST:
-        return after_physics;
+        return bounded + after_physics;
+    case HSEP_TRUSTED_AT:
+        left = work_linearise(&sizes) + work_columns_left(self, &sizes, self->n_pinned) +
+               work_products(self, &sizes, self->n_pinned) + work_programme(self, &sizes, self->steps);
+        break;
     case HSEP_TRUSTED_COLUMN:
-        left = work_columns_left(self, &sizes, model, self->columns) + work_products(self, &sizes);
+        left = work_columns_left(self, &sizes, self->columns) + work_products(self, &sizes, self->rows) +
+               work_programme(self, &sizes, self->steps);
         break;
     case HSEP_TRUSTED_PRODUCT:
-        left = work_products(self, &sizes);
+        left = work_products(self, &sizes, self->rows) + work_programme(self, &sizes, self->steps);
+        break;
+    case HSEP_TRUSTED_FACTOR:
+        left = work_programme(self, &sizes, self->steps);
+        break;
+    case HSEP_TRUSTED_SOLVE:
+        left = work_programme(self, &sizes, self->steps) - (self->bounded ? 0.0 : work_factor(&sizes, 0.0));
         break;
     case HSEP_TRUSTED_BOUNDED:
-        return rest + predict + work_newton_left(self, &sizes, model, solved) + predict + last;
+        left = bounded + work_judge(self, &sizes);
+        break;
     case HSEP_TRUSTED_JUDGE:
-        left = predict;
+        left = work_judge(self, &sizes) - begun;
         break;
     case HSEP_TRUSTED_COMPARE:
-        return predict + last;
+        return predict - begun + last;
     case HSEP_TRUSTED_PREDICT:
-        return last;
+        left = self->predicted > 0 ? 0.0 : work_commands(&sizes);
+        return left + work_samples(&sizes, window - (hsep_real)self->predicted, 1.0);
     case HSEP_TRUSTED_STEP:
-    case HSEP_TRUSTED_TRY:
         break;
     }
-    return left + newton + predict + last;
+    return left + after_step;
 }

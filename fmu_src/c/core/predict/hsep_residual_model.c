@@ -141,7 +141,7 @@ HSEP_API void hsep_residual_predict(
     } else if (first == 0) {
         hsep_trusted_forecast(hsep_residual_trusted(self), window->command, window->x_pb, NULL, 0, window->e_h, last);
     } else {
-        hsep_trusted_go_on(hsep_residual_trusted(self), window->x_pb, window->e_h, first, last, last);
+        hsep_trusted_go_on(hsep_residual_trusted(self), window->x_pb, window->e_h, first, last, 1);
     }
 }
 

@@ -127,14 +127,15 @@ static void expert_respond(hsep_expert *self, hsep_word first, hsep_word last)
 /* Largest variance that counts, m2. */
 static hsep_real expert_most(const hsep_expert *self) { return HSEP_EXPERT_DIVERGED * self->bound * self->bound; }
 
-/* Variances of the rows of count samples from k on, at most HSEP_SOLUTION_ABREAST. */
-static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_word k, hsep_word count)
+/* Variances of rows of samples k ... last - 1, of the first of every apart, at most HSEP_SOLUTION_ABREAST of them. */
+static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_word k, hsep_word last, hsep_word apart)
 {
-    const hsep_word n_static = self->n_static, p = self->p;
+    const hsep_word n_static = self->n_static, p = self->p, left = (last - k + apart - 1) / apart;
+    const hsep_word count = left < HSEP_SOLUTION_ABREAST ? left : HSEP_SOLUTION_ABREAST;
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
     for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
-        const hsep_word sample = k + (c < count ? c : count - 1); /* what is beyond is a copy */
+        const hsep_word sample = k + apart * (c < count ? c : count - 1); /* what is beyond is a copy */
         const hsep_real *row = rows + sample * n_static, *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
         for (hsep_word i = 0; i < p; i++) {
             to[HSEP_SOLUTION_ABREAST * (p - 1 - i) + c] = lags[i];
@@ -144,8 +145,8 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
         }
     }
     hsep_solution_leverages(solution, count, leverages);
-    for (hsep_word c = 0; c < count; c++) {
-        hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c];
+    for (hsep_word c = 0; c < apart * count && k + c < last; c++) {
+        hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c / apart];
     }
 }
 
@@ -175,19 +176,19 @@ static void expert_shrink(hsep_expert *self, hsep_word begin, hsep_word end)
     }
 }
 
-HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last)
+/* Variances of samples first ... last - 1, and what they leave of the prediction. */
+static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart)
 {
     hsep_real *kept = hsep_at(self, self->kept);
     if (self->p > 0) {
         expert_respond(self, first, last);
     }
-    for (hsep_word k = first; k < last; k += HSEP_SOLUTION_ABREAST) {
-        expert_vary_rows(self, rows, k, last - k < HSEP_SOLUTION_ABREAST ? last - k : HSEP_SOLUTION_ABREAST);
+    for (hsep_word k = first; k < last; k += apart * HSEP_SOLUTION_ABREAST) {
+        expert_vary_rows(self, rows, k, last, apart);
     }
     for (hsep_word k = first; k < last; k++) {
         kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, k));
     }
-    expert_shrink(self, self->n - last, self->n - first);
 }
 
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound)
@@ -199,17 +200,13 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
 }
 
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied)
+    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart)
 {
-    hsep_real *kept = hsep_at(self, self->kept);
     expert_free_run(self, rows, first, last);
-    if (varied > first) {
-        hsep_expert_vary(self, rows, first, varied);
-        for (hsep_word j = self->n - last; j < self->n - varied; j++) {
-            kept[j] = expert_kept(self, expert_most(self));
-        }
+    if (apart > 0) {
+        expert_vary(self, rows, first, last, apart);
     }
-    expert_shrink(self, self->n - last, self->n - (varied > first ? varied : first));
+    expert_shrink(self, self->n - last, self->n - first);
 }
 
 HSEP_API void hsep_expert_judge(

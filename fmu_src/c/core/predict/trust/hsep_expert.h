@@ -87,16 +87,12 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
 
-/* Predict samples first ... last - 1 in free run; first is 0, or where the last call ended. rows: (n, n_static), sample
- * after sample. Variances are computed of the samples before varied, while variances behind them are taken as unknown;
- * if varied is first, shrinking stays as in the last prediction. A sample costs n_static + p multiply-adds, and what
- * hsep_expert_vary does. */
+/* Predict samples first ... last - 1 in free run, and shrink them by their variances; first is 0, or where the last
+ * call ended. rows: (n, n_static), sample after sample. The row of the first of every apart samples, from first on,
+ * counts for their variances; apart = 0: shrinking stays as in the last prediction. A sample costs n_static + p and,
+ * for its variance, last multiply-adds, and each row that counts a quarter of hsep_solution_leverages. */
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word varied);
-
-/* Compute the variance of samples first ... last - 1 of that prediction, if samples before them have theirs, and
- * shrink them by it. Each costs a quarter of hsep_solution_leverages and last multiply-adds. */
-HSEP_API void hsep_expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last);
+    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart);
 
 /* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
  * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the

@@ -125,26 +125,22 @@ HSEP_API int hsep_trusted_sound(const hsep_trusted *self);
  * machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
-/* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals, as
- * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
- * them, m, of a compensator, for which all n are predicted, with variances of samples 0 ... last - 1 alone; or NULL.
- * Cost: for each expert a hsep_solution_finish, last m^2 / 2 multiply-adds with its m features and last n / 2; 6 n
- * tanh. */
+/* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals,
+ * as measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path
+ * of them, m, of a compensator; or NULL. Cost: for each expert a hsep_solution_finish, last m^2 / 2 multiply-adds
+ * with its m features and last n / 2; 6 n tanh. */
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
     hsep_real e[], hsep_word last);
 
-/* Predict samples first ... last - 1, too, where the last call ended; varied: as hsep_expert_predict's. */
+/* Predict samples first ... last - 1, too, where the last call ended; apart: as hsep_expert_predict's. */
 HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word varied);
+    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word apart);
 
-/* Predict other commands with the same scales and weights. e: (n + p,), m; varied: samples whose variance is computed,
- * the first ones, while predictions behind them mean nothing yet; 0: shrinking stays as in the last prediction. */
+/* Predict other commands with the same scales and weights, in the samples 0 ... last - 1; hsep_trusted_go_on predicts
+ * more. e: (n + p,), m. */
 HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied);
-
-/* Compute the variances of samples first ... last - 1 of that prediction, which the next one may hold. */
-HSEP_API void hsep_trusted_vary(hsep_trusted *self, hsep_word first, hsep_word last);
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last, hsep_word apart);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x);

@@ -167,13 +167,13 @@ static void trusted_stack(hsep_trusted *self, hsep_real e[], hsep_word begin, hs
 }
 
 HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word varied)
+    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word apart)
 {
     const hsep_word begin = self->n - last, end = self->n - first;
     hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
         hsep_expert *at_first = hsep_trusted_expert(self, HSEP_STATIC);
-        hsep_expert_predict(at_first, rows, first, last, varied > first ? last : first);
+        hsep_expert_predict(at_first, rows, first, last, apart > 0);
         for (hsep_word j = begin; j < end; j++) {
             x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
         }
@@ -184,7 +184,7 @@ HSEP_API void hsep_trusted_go_on(
     }
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
-            hsep_expert_predict(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last, varied);
+            hsep_expert_predict(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last, apart);
             trusted_take(self, i, x_pb, begin, end);
         }
     }
@@ -204,25 +204,16 @@ HSEP_API void hsep_trusted_forecast(
         hsep_at(self, self->stacked)[i] = i / self->n == HSEP_HOLD ? hold : 0.0;
     }
     trusted_begin(self, x_d, e + self->n);
-    hsep_trusted_go_on(self, x_pb, e, 0, path != NULL ? self->n : last, last); /* the scales left the rows at x_pb */
+    hsep_trusted_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */
 }
 
 HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word varied)
+    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last, hsep_word apart)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     hsep_real *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
     trusted_begin(self, x_d, e + self->n);
-    hsep_trusted_go_on(self, x_pb, e, 0, self->n, varied);
-}
-
-HSEP_API void hsep_trusted_vary(hsep_trusted *self, hsep_word first, hsep_word last)
-{
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            hsep_expert_vary(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last);
-        }
-    }
+    hsep_trusted_go_on(self, x_pb, e, 0, last, apart);
 }
