@@ -125,7 +125,7 @@ def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
     values = bounds.rows @ found.x
     assert np.max(np.maximum(values - bounds.high, bounds.low - values)) < 1e-9
     assert above_least(found.x[n_pinned:]) < 0.02 * above_least(rest[n_pinned:])
-    # Of a cost that is nearly the same three steps more are nearer than five from the remainder
+    # Three more steps, with nearly the same cost, come nearer to the minimum than the first five did
     other = PlanCost(cost.P, cost.v * 1.0001)
     again = solve_again(other, bounds, rest, n_pinned, found.x, found.ending, TOLERANCE._replace(steps=3))
     values = bounds.rows @ again.x

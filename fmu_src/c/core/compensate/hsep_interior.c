@@ -208,12 +208,12 @@ static int interior_residuals(
     return 0;
 }
 
-/* Half of the factor of P + A' W A; return whether there is none. Its first rows take as much work as all others. */
+/* The first or the second half of the factor of P + A' W A; return whether there is none. Work, not rows, is halved. */
 static int interior_factor(
-    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
+    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[], int second)
 {
     const hsep_word half = a->n / 6 / HSEP_CHOLESKY_PANEL * HSEP_CHOLESKY_PANEL;
-    if (self->part == 3) {
+    if (second) {
         return !hsep_cholesky_rows(a->factor, a->n, half, a->n, NULL);
     }
     memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
@@ -228,7 +228,7 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     P = interior_free_rows(self, splines, P);
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
     if (part < HSEP_INTERIOR_PARTS - 1) {
-        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P);
+        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part == 2);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);

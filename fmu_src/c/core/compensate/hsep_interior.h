@@ -2,8 +2,8 @@
  * a step a call:
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
- * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
- * them. A block as hsep_layout.h has them.
+ * An iterate stays inside the bounds once a full step has reached them. What is found after fewer steps may exceed
+ * them: the iterate that was farthest inside is kept beside it. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H

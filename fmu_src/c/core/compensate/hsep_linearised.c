@@ -219,7 +219,7 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
     }
 }
 
-/* They are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of the stiffness with
+/* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of the stiffness with
  * the position, m, of the damping with its velocity, m/s, and of what repeats with the position, 1/m. */
 HSEP_API void hsep_linearised_slopes(
     hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
