@@ -33,8 +33,8 @@ __all__ = ["count"]
 
 WINDOWS = 60
 LIMITS = {
-    "predictor, cold": 0.35e6,
-    "predictor, warm": 0.42e6,
+    "predictor, cold": 0.26e6,
+    "predictor, warm": 0.3e6,
     "compensator, cold": 1.35e6,
     "compensator, warm": 1.45e6,
 }

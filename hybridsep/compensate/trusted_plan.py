@@ -21,15 +21,12 @@ from .interior import Tolerance
 from .linearised import PlanModel
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["ALONE", "TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
+__all__ = ["TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
 """Of the solver: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
 small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
 within the bounds."""
-
-ALONE = TOLERANCE._replace(steps=10)
-"""Of the physics model's plan where it is the only one."""
 
 _STEPS = ((0.1, 5), (0.01, 3), (0.0, 3))
 """Of each Newton step the reach of friction's slope, relative to the model's velocity scale, and the solver's steps. A

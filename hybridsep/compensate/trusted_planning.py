@@ -17,7 +17,7 @@ from ..predict.window import Prediction
 from .linearised import PlanModel
 from .plan import SepState
 from .planning import ChosenPlan, Planning, Preview, PublishedPosition
-from .trusted_plan import ALONE, TOLERANCE, TrustedPlanner, is_better, runs_away
+from .trusted_plan import TOLERANCE, TrustedPlanner, is_better, runs_away
 
 __all__ = ["TrustedPlanning"]
 
@@ -40,7 +40,7 @@ class TrustedPlanning(Planning):
             return ChosenPlan(SepState.OFF, rest, scales)
         g, free = predictor.physics_operator(self.preview)
         follows = most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned
-        physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE if follows else ALONE)
+        physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, rest, scales)
         if not follows:

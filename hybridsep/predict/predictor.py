@@ -365,7 +365,10 @@ class HybridPredictor:
             arrays |= {"pending_x_d": forecast.window.x_d, "pending_x_pb": forecast.window.x_pb}
             meta["pending_start"] = forecast.window.start
             if isinstance(forecast, TrustedForecast):  # a compensator has its scales from its preview
-                arrays["pending_scales"] = np.array([forecast.scales.velocity, forecast.scales.step])
+                scales = forecast.scales
+                arrays["pending_scales"] = np.array(
+                    [scales.velocity, scales.step, scales.command_step, scales.command_square]
+                )
                 arrays["pending_largest"] = forecast.scales.largest
         return pack(_KIND, meta, arrays)
 
@@ -408,9 +411,9 @@ class HybridPredictor:
         if not len(self.state.late) < len(x_d):
             raise saved.error("the pending window must have samples")
         if isinstance(residual, TrustedModel):
-            velocity, step = saved.array("pending_scales", 2).tolist()
-            scales = FeatureScales(velocity, saved.array("pending_largest", residual.fixed.static.n), step)
-            if min(velocity, step, *scales.largest) < 0.0:
+            velocity, *others = saved.array("pending_scales", 4).tolist()
+            scales = FeatureScales(velocity, saved.array("pending_largest", residual.fixed.static.n), *others)
+            if min(velocity, *others, *scales.largest) < 0.0:
                 raise saved.error("the scales of the pending window must be ≥ 0")
         window = ResidualWindow(x_d, saved.array("pending_x_pb", len(x_d)), saved.real("pending_start"))
         with np.errstate(all="ignore"):

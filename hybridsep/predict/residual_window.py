@@ -37,11 +37,16 @@ class FeatureScales(NamedTuple):
         Largest magnitudes of the static features, so far and ahead.
     step : float, m
         Largest change of the command from sample to sample, so far and ahead.
+    command_step, command_square : float, m and m²
+        That change, and the largest mean square of the command's residual, that priors of the command's expert come
+        from.
     """
 
     velocity: float
     largest: Array
     step: float
+    command_step: float
+    command_square: float
 
 
 @dataclass(frozen=True)

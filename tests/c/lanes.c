@@ -44,8 +44,8 @@ int main(void)
         }
         hsep_solution_row(solution, row, next());
     }
-    printf("%a\n", hsep_solution_finish(solution));
-    for (int i = 0; i < N * HSEP_SOLUTION_ABREAST; i++) {
+    printf("%a\n", hsep_solution_finish(solution, 1));
+    for (int i = 0; i < (N + 1) * HSEP_SOLUTION_ABREAST; i++) {
         hsep_at(solution, solution->work)[i] = next();
     }
     hsep_solution_leverages(solution, HSEP_SOLUTION_ABREAST, leverages);
@@ -53,7 +53,10 @@ int main(void)
     for (int i = 0; i < N; i++) {
         printf("%a %a\n", hsep_at(solution, solution->weights)[i], least[i]);
     }
-    printf("%a %d\n", leverages[0] + leverages[3], HSEP_LANES);
+    for (int c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
+        printf("%a\n", leverages[c]);
+    }
+    printf("%d\n", HSEP_LANES);
     free(solution);
     free(gram);
     return 0;

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
-from c_gram import CGram, CSolution
+from c_gram import WORDS, CGram, CSolution
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -81,9 +81,43 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
     penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
     solution = CSolution(gram, penalties, later=later, amounts=amounts)
     assert_same(solution, library, penalties, rows)
+    assert_same(CSolution(gram, penalties, later=later, amounts=amounts, apart=False), library, penalties, rows)
     assert solution.lefts == sorted(solution.lefts, reverse=True)
-    assert solution.left == 0.0
+    assert solution.waiting == 1
     assert solution.valid
+
+
+@given(
+    st.integers(1, 40),
+    st.integers(0, 30),
+    st.floats(-3.0, 3.0),
+    st.sampled_from([(False, False), (False, True), (True, True)]),
+    st.integers(0, 9),
+)
+@settings(max_examples=100, deadline=None)
+def test_the_last_row_may_tell_more_than_all_others(
+    n: int, n_before: int, size: float, when: tuple[bool, bool], seed: int
+) -> None:
+    """It stays behind the factor, which is completed before or then, or enters it as far as squares resolve it."""
+    completed, apart = when
+    size = size if apart else min(size, 1.0)
+    gram, library, rows, _ = both(n, n_before + 1, seed)
+    penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
+    last = 10.0**size * np.random.default_rng(seed).normal(size=n + 1) * np.abs(np.append(rows[-1], 1.0))
+    solution = CSolution(gram, penalties, later=last[None], completed=completed, apart=apart)
+    library = library.update_stacked(np.array(last[None], order="F"))
+    for factor in (1.0, 1e-3, 1e3):
+        changed = np.where(np.arange(n) < n // 2, factor, 1.0) * penalties
+        solution.finish(changed)
+        assert_same(solution, library, changed, np.vstack((last[:-1], rows)))
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_a_last_row_without_features_counts_with_its_target(apart: bool) -> None:
+    gram, library, rows, _ = both(9, 40, 5)
+    penalties, last = np.abs(rows).max(axis=0) ** 2, np.append(np.zeros(9), 50.0)
+    solution = CSolution(gram, penalties, later=last[None], apart=apart)
+    assert_same(solution, library.update_stacked(np.array(last[None], order="F")), penalties, rows)
 
 
 def test_the_tails_penalties_may_change() -> None:
@@ -102,6 +136,7 @@ def test_no_more_rows_wait_than_there_is_room_for() -> None:
     later = np.column_stack((rows, target))[:3]
     solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2, later=later)
     solution.add(later)
+    solution.add(later)
     before = solution.block.copy()
     solution.add(later)
     np.testing.assert_array_equal(solution.block, before)
@@ -111,8 +146,8 @@ def test_a_solution_of_other_sizes_or_out_of_range_is_not_valid() -> None:
     gram, _, rows, _ = both(9, 40, 5)
     solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2)
     assert solution.valid
-    for word, value in ((3, 6), (4, 2), (5, 2), (8, 0)):
-        words = solution.block.view(np.uint64)
+    for name, value in (("factored", 6), ("waiting", 5), ("begun", 2), ("finished", 2), ("completed", 2), ("room", 0)):
+        words, word = solution.block.view(np.uint64), WORDS.index(name)
         before, words[word] = int(words[word]), value
         assert not solution.valid
         words[word] = before

@@ -40,8 +40,8 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
         model.check_state(b"")
     with pytest.raises(RefusedError, match="belongs to another model"):
         model.check_state(b"\x00" + blob[1:])
-    with pytest.raises(RefusedError, match="must be of version 28, got 29"):
-        model.check_state(blob[:8] + struct.pack("<Q", 29) + blob[16:])
+    with pytest.raises(RefusedError, match="must be of version 29, got 30"):
+        model.check_state(blob[:8] + struct.pack("<Q", 30) + blob[16:])
     with pytest.raises(RefusedError, match="saved with other parameters"):
         model.check_state(blob[:24] + struct.pack("<Q", 2) + blob[32:])
     if name != "feed_drive":  # its state has no numbers that must fit together

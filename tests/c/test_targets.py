@@ -64,12 +64,11 @@ def test_outputs_are_the_same_to_the_bit(target: str, kind: str, tmp_path: Path)
     np.testing.assert_array_equal(there.outputs, here.outputs)
     assert (there.block, there.began) == (here.block, 0)
     assert there.counts.min() > 0
-    dearer = there.counts.max() / np.median(there.counts)
-    if kind == "predictor":  # its work is even, but for a window's end, which was counted
-        assert there.counts.argmax() % case.Np == case.Np - 1
-        assert dearer > 3.0
+    median = np.median(there.counts)
+    if kind == "predictor":  # its work is even, but a window's last sample has more of it, which was counted
+        assert there.counts[case.Np - 1 :: case.Np].max() > 1.2 * median
     else:
-        assert dearer > 5.0
+        assert there.counts.max() > 2.0 * median
 
 
 @pytest.mark.parametrize("target", ["m7", "m7-picolibc", "m4f"])

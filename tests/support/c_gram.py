@@ -14,8 +14,12 @@ Array = NDArray[np.float64]
 ABREAST = 4
 """HSEP_SOLUTION_ABREAST."""
 
-OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "work")
-"""Of hsep_solution, behind seven other words."""
+TOGETHER = 4
+"""HSEP_GRAM_TOGETHER."""
+
+WORDS = ("n_head", "n_tail", "room", "begun", "factored", "waiting", "finished", "completed", "square", "last_square")
+OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "last", "work", "abreast")
+"""Of hsep_solution, the offsets behind the other words."""
 
 
 def pointer(array: Array) -> Any:
@@ -85,6 +89,10 @@ class CSolution:
         Rows ``[φ | target]`` that come once the solution has begun.
     amounts : list of float
         Multiply-adds that are spent before each of them; what is left is done in the end.
+    completed : bool
+        Whether the factor is completed before the last of them.
+    apart : bool
+        Whether the last of them stays behind the factor.
     """
 
     def __init__(
@@ -95,44 +103,54 @@ class CSolution:
         weight: float = 1.0,
         later: Array | None = None,
         amounts: list[float] | None = None,
+        completed: bool = False,
+        apart: bool = True,
     ) -> None:
         self.library, m = gram.library, len(penalties)
         n_head = m - m // 2 if m == gram.n else 0
         later = np.empty((0, m + 1)) if later is None else np.ascontiguousarray(later)
-        sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later))]
+        sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later) + TOGETHER)]
         self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
         self.library.hsep_solution_left.restype = ctypes.c_double
         self.block = np.full(int(self.library.hsep_solution_size(*sizes)) // 8, np.nan)
         self.library.hsep_solution_init(self._block, *sizes)
         self.n_head, self.m = n_head, m
         self._part("penalties", m)[:] = penalties
-        gram.settle()
         if other is not None:
             other.settle()
         added = None if other is None else other._block
         self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
-        self.lefts = [self.left]
+        self.lefts = [self.left(len(later))]
         for i, row in enumerate(later):
+            if completed and i + 1 == len(later):
+                self.complete()
             self.add(row[None])
             if amounts is not None:
                 self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
-                self.lefts.append(self.left)
-        self.finish()
+                self.lefts.append(self.left(len(later) - 1 - i))
+        self.finish(apart=apart)
 
     def add(self, rows: Array) -> None:
         """Take rows ``[φ | target]``."""
         for row in np.ascontiguousarray(rows):
             self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
 
-    def finish(self, penalties: Array | None = None) -> None:
+    def finish(self, penalties: Array | None = None, apart: bool = True) -> None:
         """Solve for the weights, with other penalties of the tail if there are."""
         if penalties is not None:
             self._part("penalties", len(penalties))[:] = penalties
-        self.residual_sum = self.library.hsep_solution_finish(self._block)
+        self.residual_sum = self.library.hsep_solution_finish(self._block, ctypes.c_int(apart))
+
+    def left(self, to_come: int = 0) -> float:
+        return float(self.library.hsep_solution_left(self._block, ctypes.c_uint64(to_come), ctypes.c_int(0)))
 
     @property
-    def left(self) -> float:
-        return float(self.library.hsep_solution_left(self._block))
+    def waiting(self) -> int:
+        return int(self.block.view(np.uint64)[WORDS.index("waiting")])
+
+    def complete(self) -> None:
+        """Complete the factor, before the last row."""
+        self.library.hsep_solution_complete(self._block)
 
     @property
     def valid(self) -> bool:
@@ -144,7 +162,7 @@ class CSolution:
         return pointer(self.block)
 
     def _part(self, name: str, count: int) -> Array:
-        place = int(self.block.view(np.uint64)[7 + OFFSETS.index(name)])
+        place = int(self.block.view(np.uint64)[len(WORDS) + OFFSETS.index(name)])
         return self.block[place : place + count]
 
     @property
@@ -155,8 +173,8 @@ class CSolution:
         found, in_order = [], np.hstack((rows[:, self.m - self.n_head :][:, ::-1], rows[:, : self.m - self.n_head]))
         for first in range(0, len(rows), ABREAST):
             some = in_order[first : first + ABREAST]
-            side_by_side = np.vstack((some, np.zeros((ABREAST - len(some), self.m)))).T
-            self._part("work", ABREAST * self.m)[:] = side_by_side.ravel()
+            places = self._part("work", ABREAST * (self.m + 1)).reshape(ABREAST, self.m + 1)
+            places[: len(some), : self.m] = some
             leverages = np.full(ABREAST, np.nan)
             count = ctypes.c_uint64(len(some))
             self.library.hsep_solution_leverages(self._block, count, pointer(leverages))

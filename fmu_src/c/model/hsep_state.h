@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 28 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 29 /* changes whenever the layout of any state does */
 
 typedef struct {
     uint64_t kind;       /* one number for each model */

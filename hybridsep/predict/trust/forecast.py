@@ -55,7 +55,8 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     path : (m,) array, m, optional
         Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
     """
-    static, learned, T_s = state.fixed.static, state.learned, state.fixed.settings.T_s
+    static, learned, settings = state.fixed.static, state.learned, state.fixed.settings
+    T_s = settings.T_s
     before = learned.velocity_scale
     peak = static.peak_velocity(state.run.static, window.x_d)
     outgrown = peak > max(CONSTANTS.outgrown * before, LEAST_VELOCITY)
@@ -66,19 +67,27 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     velocity = peak if outgrown else before
     rows, _ = static.rows(state.run.static, window, window.x_pb, velocity)
     largest = np.zeros(static.n) if outgrown else learned.largest
-    return FeatureScales(velocity, np.maximum(largest, np.abs(rows).max(axis=0)), step)
+    command_step, command_square = step, learned.scales[OF_COMMAND].largest_square
+    if path is None and settings.Np > 1 and state.command_square > 0.0:
+        # A controller solves for the command's expert one sample before the window, as far as its commands are known.
+        known = window.x_d[: settings.measurement_delay + settings.Np - 1]
+        early = max(learned.largest_step, static.peak_velocity(state.run.static, known) * T_s)
+        if early > 0.0 or step == 0.0:
+            command_step, command_square = early, state.command_square
+    largest = np.maximum(largest, np.abs(rows).max(axis=0))
+    return FeatureScales(velocity, largest, step, command_step, command_square)
 
 
 def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
     """Return an expert with the weights that follow from rows."""
     settings, kind = state.fixed.settings, state.kind_of(expert)
-    square = state.learned.scales[kind].largest_square
-    effect = settings.effect or math.sqrt(square)
     if kind == OF_COMMAND:
-        command = state.fixed.command
-        p, shares, largest = command.p, command.shares, command.largest(scales.step)
+        command, square = state.fixed.command, scales.command_square
+        p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
     else:
+        square = state.learned.scales[kind].largest_square
         p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
+    effect = settings.effect or math.sqrt(square)
     priors = effect * shares / np.maximum(largest, _LEAST)
     return solve(rows, state.noise_of(expert), priors, p)
 

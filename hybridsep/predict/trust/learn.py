@@ -46,7 +46,7 @@ def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel
 
 def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
     """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
-    learned, (velocity, largest, step) = state.learned, forecast.scales
+    learned, (velocity, largest, step, _, _) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
     if velocity != learned.velocity_scale:
@@ -64,7 +64,8 @@ def _folded(
 ) -> TrustedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
-    Variances of the noise for the next window are taken before the last rows.
+    Variances of the noise for the next window are taken before the last rows, the size of the command's residual
+    before the last one.
     """
     settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
     accepted = ~bridged[-n:]
@@ -89,7 +90,11 @@ def _folded(
 
     state = replace(state, evidence=learned((one.discount(kept) for one in state.evidence), slice(early)))
     state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
-    return replace(state, evidence=learned(state.evidence, slice(early, n)))
+    of_command, last = state.learned.scales[OF_COMMAND], settings.Np - 1
+    if accepted[:last].any():
+        of_command = of_command.follow(e[OF_COMMAND][:last][accepted[:last]])
+    evidence = learned(state.evidence, slice(early, n))
+    return replace(state, evidence=evidence, command_square=of_command.largest_square)
 
 
 def _judged_experts(

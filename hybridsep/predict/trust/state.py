@@ -164,6 +164,8 @@ class TrustedModel:
         Rows of the residuals of the physics model, and of the command.
     noise : tuple of float, m²
         Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
+    command_square : float, m²
+        Largest mean square of the command's residual, before the last sample of the last window; 0: none yet.
     leading : int
         Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
     run : RunState
@@ -175,6 +177,7 @@ class TrustedModel:
     learned: Learned
     evidence: tuple[Evidence, Evidence]
     noise: tuple[float, ...] = field(metadata=within())
+    command_square: float = field(metadata=within())
     leading: int
     run: RunState
 
@@ -252,7 +255,7 @@ def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Distur
     static = StaticFeatures(discrete, settings.q, settings.period, own)
     fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
     evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
-    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, LAGGED, RunState.init(fixed))
+    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, 0.0, LAGGED, RunState.init(fixed))
 
 
 def restart(state: TrustedModel) -> TrustedModel:
@@ -265,7 +268,7 @@ def restart(state: TrustedModel) -> TrustedModel:
         stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
     learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
     evidence = of_physics, of_command
-    begun = TrustedModel(fixed, learned, evidence, state.noise, leading, RunState.init(fixed))
+    begun = TrustedModel(fixed, learned, evidence, state.noise, 0.0, leading, RunState.init(fixed))
     return begun.with_noise(learned)
 
 

@@ -186,8 +186,9 @@ static void linearised_of_increments(
     const hsep_real *weights = hsep_expert_weights(expert), *lag_weights = weights + expert->n_static;
     hsep_real *run = hsep_at(self, self->run);
     for (hsep_word u = 0; u < self->preview; u++) {
+        const hsep_word end = dead_time + change->n; /* the command changes in samples dead_time ... end */
         hsep_real drive = 0.0;
-        for (hsep_word i = 1; i < expert->n_static && i <= u + 1; i++) {
+        for (hsep_word i = u + 1 > end ? u + 1 - end : 1; i < expert->n_static && i + dead_time <= u + 1; i++) {
             const hsep_word at = u + 1 - i;
             const hsep_real before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
             drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
@@ -391,38 +392,47 @@ static void linearised_begin_column(
     }
 }
 
-HSEP_API void hsep_linearised_columns(
-    hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_word spacing, hsep_word count,
+/* Add what an expert, by its place in linearised_experts, makes of the change. */
+static void linearised_add(
+    hsep_linearised *self, hsep_trusted *model, hsep_word i, hsep_word first, hsep_word spacing, hsep_word count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
+    const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
     const hsep_word padded = linearised_padded(self->preview - first);
     hsep_real *run = hsep_at(self, self->run);
+    for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
+        const hsep_word begin = c < count ? first + c * spacing : self->preview;
+        linearised_disturbance(self, i, begin, c);
+        for (hsep_word u = self->preview - begin; u < padded; u++) {
+            hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
+        }
+    }
+    linearised_filter(self, padded);
+    linearised_take_lags(self, expert);
+    linearised_run(
+        hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),
+        hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1), run, padded);
     for (hsep_word c = 0; c < count; c++) {
+        const hsep_word length = self->preview - first - c * spacing;
+        const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
+        for (hsep_word u = 0; u < length; u++) {
+            columns[c][u] += shrink[u] * run[HSEP_PHYSICS_ABREAST * u + c];
+        }
+    }
+}
+
+HSEP_API int hsep_linearised_columns(
+    hsep_linearised *self, hsep_trusted *model, hsep_word part, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_real *const columns[HSEP_PHYSICS_ABREAST])
+{
+    hsep_word before = 0;
+    for (hsep_word c = 0; part == 0 && c < count; c++) {
         linearised_begin_column(self, model, first + c * spacing, columns[c]);
     }
     for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-        if (!hsep_linearised_counts(model, linearised_experts[i])) {
-            continue;
-        }
-        for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
-            const hsep_word begin = c < count ? first + c * spacing : self->preview;
-            linearised_disturbance(self, i, begin, c);
-            for (hsep_word u = self->preview - begin; u < padded; u++) {
-                hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
-            }
-        }
-        linearised_filter(self, padded);
-        linearised_take_lags(self, expert);
-        linearised_run(
-            hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),
-            hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1), run, padded);
-        for (hsep_word c = 0; c < count; c++) {
-            const hsep_word length = self->preview - first - c * spacing;
-            const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
-            for (hsep_word u = 0; u < length; u++) {
-                columns[c][u] += shrink[u] * run[HSEP_PHYSICS_ABREAST * u + c];
-            }
+        if (hsep_linearised_counts(model, linearised_experts[i]) && before++ == part) {
+            linearised_add(self, model, i, first, spacing, count, columns);
         }
     }
+    return part + 1 < before;
 }

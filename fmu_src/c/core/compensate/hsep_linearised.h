@@ -75,11 +75,11 @@ HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_trusted *model);
 HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert);
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,).
- * Cost: for each expert of hsep_linearised_counts HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a
- * sample. */
-HSEP_API void hsep_linearised_columns(
-    hsep_linearised *self, hsep_trusted *model, hsep_word first, hsep_word spacing, hsep_word count,
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). They are computed in parts, one for
+ * each expert of hsep_linearised_counts, which begin with part 0; return whether there are more.
+ * Cost of a part: HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a sample. */
+HSEP_API int hsep_linearised_columns(
+    hsep_linearised *self, hsep_trusted *model, hsep_word part, hsep_word first, hsep_word spacing, hsep_word count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST]);
 
 #endif

@@ -143,7 +143,6 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
         trusted_planner_copy(self, c, rest);
         hsep_planner_let_turn(task->planner);
         hsep_planner_decide_pinned(task->planner);
-        trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n); /* it was predicted last */
     }
 }
 
@@ -157,7 +156,13 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
         target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
     }
     hsep_planner_open(task->planner, task->x_d);
-    hsep_planner_aim(task->planner, task->spline, target);
+    self->stage = HSEP_TRUSTED_AIM;
+}
+
+/* Make its programme. */
+static void trusted_planner_aim(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    hsep_planner_aim(task->planner, task->spline, hsep_at(self, self->target));
     hsep_planner_pin(task->planner);
     self->stage = HSEP_TRUSTED_AIMED;
 }
@@ -165,8 +170,7 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
 /* Solve it; without one the remainder of the last plan goes on. */
 static void trusted_planner_solve_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_word steps = self->follows ? trusted_planner_solved[0] : HSEP_TRUSTED_ALONE;
-    const hsep_tolerance tolerance = trusted_planner_tolerance(steps);
+    const hsep_tolerance tolerance = trusted_planner_tolerance(trusted_planner_solved[0]);
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
     if (status == HSEP_PLAN_DONE) {
         trusted_planner_continue(self, task);
@@ -234,6 +238,9 @@ static void trusted_planner_change(hsep_trusted_planner *self, const hsep_truste
 /* Begin a Newton step: slopes at the best plan, which was predicted last. */
 static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
+    if (self->steps == 0) { /* the rest of the last plan was predicted before the physics model's plan */
+        trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED + self->n);
+    }
     hsep_linearised_slopes(
         (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command),
         hsep_at(self, self->x_pb), trusted_planner_reaches[self->steps]);
@@ -252,7 +259,7 @@ static void trusted_planner_linearise(hsep_trusted_planner *self, const hsep_tru
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
     }
     self->columns = self->rows = self->n_pinned;
-    self->tries = 0;
+    self->part = self->tries = 0;
     self->stage = HSEP_TRUSTED_COLUMN;
 }
 
@@ -263,7 +270,7 @@ static hsep_real *trusted_planner_column_of(hsep_trusted_planner *self, hsep_wor
     return hsep_at(self, self->W) + (i * (self->preview - spacing * first) - spacing * (i * (i - 1) / 2));
 }
 
-/* Changes of x_h by the next splines, as many as are computed side by side. */
+/* A part of the changes of x_h by the next splines, as many as are computed side by side. */
 static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_word spacing = hsep_planner_splines(task->planner)->spacing, first = self->columns;
@@ -273,8 +280,13 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
     for (hsep_word c = 0; c < count; c++) {
         columns[c] = trusted_planner_column_of(self, first + c, spacing);
     }
-    hsep_linearised_columns(
-        (hsep_linearised *)hsep_at(self, self->linearised), task->model, first * spacing, spacing, count, columns);
+    if (hsep_linearised_columns(
+            (hsep_linearised *)hsep_at(self, self->linearised), task->model, self->part, first * spacing, spacing,
+            count, columns)) {
+        self->part++;
+        return;
+    }
+    self->part = 0;
     for (hsep_word j = first; j < first + count; j++) {
         hsep_axpy(target + j * spacing, at[j], columns[j - first], self->preview - j * spacing);
     }
@@ -423,6 +435,9 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         break;
     case HSEP_TRUSTED_BEGIN:
         trusted_planner_physics(self, task);
+        break;
+    case HSEP_TRUSTED_AIM:
+        trusted_planner_aim(self, task);
         break;
     case HSEP_TRUSTED_AIMED:
         if (hsep_planner_factor(task->planner, 1)) {

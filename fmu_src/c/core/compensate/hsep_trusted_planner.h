@@ -29,15 +29,15 @@
 #define HSEP_TRUSTED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 /* Solver steps at most, of the physics model's plan and of the programme of each Newton step: from the second one on a
- * bounded one begins where the last one ended. Where the physics model alone plans there is time for more. */
+ * bounded one begins where the last one ended. */
 #define HSEP_TRUSTED_SOLVED {5, 5, 3, 3}
-#define HSEP_TRUSTED_ALONE 10
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
     HSEP_TRUSTED_VARY,     /* the remainder of the last plan is to be predicted, with variances */
     HSEP_TRUSTED_CHANGE,   /* what its linearisations have in common is to be computed */
     HSEP_TRUSTED_BEGIN,    /* the physics model's plan begins, */
+    HSEP_TRUSTED_AIM,      /* its programme is to be made, */
     HSEP_TRUSTED_AIMED,    /* it is to be factored, */
     HSEP_TRUSTED_FACTORED, /* it is to be solved, */
     HSEP_TRUSTED_PHYSICS,  /* it is bounded and being solved */
@@ -63,6 +63,7 @@ typedef struct {
     hsep_word varied;      /* samples that are predicted under the remainder of the last plan, with their variances */
     hsep_word predicted;   /* samples of the plan at hand that are predicted; 0: none is at hand */
     hsep_word columns;     /* splines that are pinned, or whose change of x_h is computed, */
+    hsep_word part;        /* parts of the next ones that are, */
     hsep_word rows;        /* or whose row of the programme is */
     hsep_word tries;       /* lengths of this step that were tried */
     hsep_word planned;     /* model of the plan: 0 none, 1 physics, 2 trusted */
@@ -85,7 +86,7 @@ typedef struct {
     hsep_word trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 30);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 31);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

@@ -68,8 +68,8 @@ HSEP_API int hsep_trusted_planner_valid(
     return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
            got.varied <= got.preview + got.late && got.predicted <= got.preview + got.late &&
            got.steps <= HSEP_TRUSTED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
-           got.rows >= got.n_pinned && got.rows <= got.n && got.tries <= HSEP_TRUSTED_TRIES && got.planned <= 2 &&
-           got.bounded <= 1 && got.ended <= 1 &&
+           got.part < HSEP_LINEARISED_EXPERTS && got.rows >= got.n_pinned && got.rows <= got.n &&
+           got.tries <= HSEP_TRUSTED_TRIES && got.planned <= 2 && got.bounded <= 1 && got.ended <= 1 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);

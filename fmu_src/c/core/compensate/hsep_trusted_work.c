@@ -7,15 +7,17 @@
 
 /* Multiply-adds that these count for, on the whole: python -m benchmarks.instructions counts what they stand for. Of
  * a prediction: a tanh; a sample's command besides; its part of the cost; its part of an expert; its lags without a
- * row of its own. Of a linearisation: a sample's slopes besides tanh; what it has in common with others; the rest; a
- * lag of a column. Of the programmes: what completes one, a sample; a product of columns, to begin; of the physics
- * model's, a sample and a pair of splines; the bounds of a sample, and whether they allow the free minimum. Of a
- * solver step, which has 4 rows and 2 sides a sample: residuals, directions, and their matrix, for a spline. */
+ * row of its own. Of a linearisation: a sample's slopes besides one tanh; what it has in common with others; the
+ * rest; of a column a sample, its beginning and a lag. Of the programmes: what completes one, a sample; pivots of
+ * its factor; a product of columns, to begin; commands and bounds of a plan, a sample; of the physics model's, a
+ * pair of splines; the bounds of a sample, and whether they allow the free minimum. Of a solver step, which has 4
+ * rows and 2 sides a sample: residuals, directions, and their matrix, for a spline. */
 static const hsep_real work_tanh = 40.0, work_command = 135.0, work_cost = 185.0, work_of_expert = 60.0,
                        work_held = 600.0;
-static const hsep_real work_slope = 30.0, work_change = 400.0, work_sample = 130.0, work_lag = 0.85;
-static const hsep_real work_completed = 50.0, work_product = 9.0, work_target = 250.0, work_shifted = 16.0,
-                       work_bounds = 280.0, work_allowed = 90.0;
+static const hsep_real work_slope = 205.0, work_change = 50.0, work_sample = 155.0, work_column = 8.0,
+                       work_group = 400.0, work_lag = 0.85;
+static const hsep_real work_completed = 50.0, work_pivots = 1.5, work_product = 9.0, work_target = 130.0,
+                       work_shifted = 20.0, work_bounds = 280.0, work_allowed = 90.0;
 static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 200.0;
 
 static const hsep_word work_solved[1 + HSEP_TRUSTED_STEPS] = HSEP_TRUSTED_SOLVED;
@@ -109,13 +111,11 @@ static hsep_real work_factored(const work_sizes *sizes)
     return work_bound(sizes) + work_allowed * sizes->preview + 2.0 * sizes->free * sizes->free;
 }
 
-static hsep_real work_solve(const work_sizes *sizes) { return work_factor(sizes, 0.0) + work_factored(sizes); }
+static hsep_real work_solve(const work_sizes *sizes) { return work_factor(sizes, work_pivots) + work_factored(sizes); }
 
-/* The programme of the physics model. */
-static hsep_real work_aim(const work_sizes *sizes)
-{
-    return work_shifted * sizes->free * sizes->free + work_target * sizes->preview;
-}
+/* Commands and bounds of a plan, and the physics model's programme. */
+static hsep_real work_open(const work_sizes *sizes) { return work_target * sizes->preview; }
+static hsep_real work_aim(const work_sizes *sizes) { return work_shifted * sizes->free * sizes->free; }
 
 /* Commands of a plan with their disturbances, and count samples that the experts predict. */
 static hsep_real work_commands(const work_sizes *sizes)
@@ -145,37 +145,41 @@ static hsep_real work_next(const hsep_trusted_planner *self, const work_sizes *s
 /* Count samples and their variances: leverages of rows, one for every apart, carried through the recursion. */
 static hsep_real work_samples(const work_sizes *sizes, hsep_real count, hsep_real apart)
 {
-    const hsep_real leverages = (0.6 * sizes->experts.squares + 2.2 * sizes->experts.features) / apart;
+    const hsep_real leverages = (0.6 * sizes->experts.squares + 6.0 * sizes->experts.features) / apart;
     return work_run(sizes, count) + count * (leverages + 2.0 * sizes->all + (apart > 1.0 ? work_held : 0.0));
 }
 
 static hsep_real work_slopes(const work_sizes *sizes)
 {
-    return sizes->all * (2.0 * HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_slope);
+    return sizes->all * (HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_slope);
 }
 
 static hsep_real work_linearise(const work_sizes *sizes) { return sizes->all * work_sample; }
 
 static hsep_real work_begin(const work_sizes *sizes) { return sizes->all * (sizes->experts.lags + work_change); }
 
-/* Columns that begin with spline j, side by side. */
-static hsep_real work_columns(const work_sizes *sizes, hsep_real j)
+/* A part of the columns that begin with spline j, side by side. */
+static hsep_real work_columns(const work_sizes *sizes, hsep_real j, hsep_word part)
 {
     const hsep_real length = sizes->preview - sizes->spacing * j;
-    hsep_real sum = 0.0;
-    for (hsep_word i = 0; i < sizes->n_columns; i++) {
-        const hsep_real p = sizes->columns[i];
+    hsep_real sum = work_group + (part == 0 ? length : 0.0);
+    if (part < sizes->n_columns) {
+        const hsep_real p = sizes->columns[part];
         const hsep_real lags = length > p ? p * (length - 0.5 * p) : 0.5 * length * length;
-        sum += HSEP_PHYSICS_ABREAST * (work_lag * lags + length * (work_of_mode * sizes->modes + 8.0));
+        sum += work_lag * lags + length * (work_of_mode * sizes->modes + work_column);
     }
-    return sum + HSEP_PHYSICS_ABREAST * length;
+    return HSEP_PHYSICS_ABREAST * sum;
 }
 
-static hsep_real work_columns_left(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word j)
+/* Those from spline j on, but the first parts of the next ones. */
+static hsep_real work_columns_left(
+    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word j, hsep_word first)
 {
     hsep_real sum = 0.0;
-    for (; j < self->n; j += HSEP_PHYSICS_ABREAST) {
-        sum += work_columns(sizes, (hsep_real)j);
+    for (; j < self->n; j += HSEP_PHYSICS_ABREAST, first = 0) {
+        for (hsep_word part = first; part == 0 || part < sizes->n_columns; part++) {
+            sum += work_columns(sizes, (hsep_real)j, part);
+        }
     }
     return sum;
 }
@@ -201,11 +205,13 @@ HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, c
     case HSEP_TRUSTED_CHANGE:
         return work_begin(&sizes);
     case HSEP_TRUSTED_BEGIN:
+        return work_open(&sizes);
+    case HSEP_TRUSTED_AIM:
         return work_aim(&sizes);
     case HSEP_TRUSTED_AIMED:
-        return work_factor(&sizes, 0.0);
+        return work_factor(&sizes, work_pivots);
     case HSEP_TRUSTED_FACTOR:
-        return self->bounded ? work_completed * sizes.preview : work_factor(&sizes, 0.0);
+        return self->bounded ? work_completed * sizes.preview : work_factor(&sizes, work_pivots);
     case HSEP_TRUSTED_FACTORED:
         return work_factored(&sizes);
     case HSEP_TRUSTED_SOLVE:
@@ -214,11 +220,11 @@ HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, c
     case HSEP_TRUSTED_BOUNDED:
         return work_interior_part(&sizes, hsep_planner_part(task->planner));
     case HSEP_TRUSTED_STEP:
-        return work_slopes(&sizes);
+        return (self->steps == 0 ? work_open(&sizes) : 0.0) + work_slopes(&sizes);
     case HSEP_TRUSTED_AT:
         return work_linearise(&sizes);
     case HSEP_TRUSTED_COLUMN:
-        return work_columns(&sizes, (hsep_real)self->columns);
+        return work_columns(&sizes, (hsep_real)self->columns, self->part);
     case HSEP_TRUSTED_PRODUCT:
         return work_products(self, &sizes, self->rows) -
                work_products(self, &sizes, self->rows + HSEP_TRUSTED_PRODUCTS);
@@ -232,10 +238,9 @@ HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, c
 }
 
 /* Solver steps of a programme at most, after those that are done. */
-static hsep_real work_steps(
-    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word programme, hsep_word done)
+static hsep_real work_steps(const work_sizes *sizes, hsep_word programme, hsep_word done)
 {
-    const hsep_word most = programme > 0 || self->follows ? work_solved[programme] : HSEP_TRUSTED_ALONE;
+    const hsep_word most = work_solved[programme];
     return done < most ? (hsep_real)(most - done) * work_interior(sizes) : 0.0;
 }
 
@@ -249,16 +254,16 @@ static hsep_real work_judge(const hsep_trusted_planner *self, const work_sizes *
 static hsep_real work_programme(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word step)
 {
     const hsep_real begin = self->bounded || step > self->steps + 1 ? work_bound(sizes) : work_solve(sizes);
-    return begin + work_steps(self, sizes, step, 0) + HSEP_TRUSTED_TRIES * work_predict(sizes);
+    return begin + work_steps(sizes, step, 0) + HSEP_TRUSTED_TRIES * work_predict(sizes);
 }
 
 /* Newton steps that have not begun. */
 static hsep_real work_newton(const hsep_trusted_planner *self, const work_sizes *sizes)
 {
     const hsep_real linearise = work_slopes(sizes) + work_linearise(sizes) +
-                                work_columns_left(self, sizes, self->n_pinned) +
+                                work_columns_left(self, sizes, self->n_pinned, 0) +
                                 work_products(self, sizes, self->n_pinned);
-    hsep_real sum = 0.0;
+    hsep_real sum = self->steps == 0 ? work_open(sizes) : 0.0;
     for (hsep_word step = self->steps + 1; step <= HSEP_TRUSTED_STEPS; step++) {
         sum += linearise + work_programme(self, sizes, step);
     }
@@ -274,36 +279,39 @@ HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, c
     const hsep_real after_step = work_newton(self, &sizes) + predict + last;
     const hsep_real after_physics = self->follows ? after_step : last;
     const hsep_word programme = self->stage == HSEP_TRUSTED_BOUNDED ? self->steps : 0;
-    hsep_real bounded = work_steps(self, &sizes, programme, hsep_planner_steps(task->planner));
+    hsep_real bounded = work_steps(&sizes, programme, hsep_planner_steps(task->planner));
     for (hsep_word part = hsep_planner_part(task->planner); part > 0 && part < HSEP_INTERIOR_PARTS; part++) {
         bounded += work_interior_part(&sizes, part);
     }
     const hsep_real varied = (hsep_real)self->varied, within = varied < window ? window - varied : 0.0;
     const hsep_real behind = sizes.all - hsep_fmax(varied, window);
-    const hsep_real solve = work_solve(&sizes) + work_steps(self, &sizes, 0, 0) + after_physics;
+    const hsep_real solve = work_solve(&sizes) + work_steps(&sizes, 0, 0) + after_physics;
+    const hsep_real begin = work_open(&sizes) + work_aim(&sizes) + solve;
     hsep_real left = 0.0;
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         return 0.0;
     case HSEP_TRUSTED_VARY:
         left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_TRUSTED_APART);
-        return left + work_begin(&sizes) + work_aim(&sizes) + solve;
+        return left + work_begin(&sizes) + begin;
     case HSEP_TRUSTED_CHANGE:
-        return work_begin(&sizes) + work_aim(&sizes) + solve;
+        return work_begin(&sizes) + begin;
     case HSEP_TRUSTED_BEGIN:
+        return begin;
+    case HSEP_TRUSTED_AIM:
         return work_aim(&sizes) + solve;
     case HSEP_TRUSTED_AIMED:
         return solve;
     case HSEP_TRUSTED_FACTORED:
-        return solve - work_factor(&sizes, 0.0);
+        return solve - work_factor(&sizes, work_pivots);
     case HSEP_TRUSTED_PHYSICS:
         return bounded + after_physics;
     case HSEP_TRUSTED_AT:
-        left = work_linearise(&sizes) + work_columns_left(self, &sizes, self->n_pinned) +
+        left = work_linearise(&sizes) + work_columns_left(self, &sizes, self->n_pinned, 0) +
                work_products(self, &sizes, self->n_pinned) + work_programme(self, &sizes, self->steps);
         break;
     case HSEP_TRUSTED_COLUMN:
-        left = work_columns_left(self, &sizes, self->columns) + work_products(self, &sizes, self->rows) +
+        left = work_columns_left(self, &sizes, self->columns, self->part) + work_products(self, &sizes, self->rows) +
                work_programme(self, &sizes, self->steps);
         break;
     case HSEP_TRUSTED_PRODUCT:
@@ -313,7 +321,7 @@ HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, c
         left = work_programme(self, &sizes, self->steps);
         break;
     case HSEP_TRUSTED_SOLVE:
-        left = work_programme(self, &sizes, self->steps) - (self->bounded ? 0.0 : work_factor(&sizes, 0.0));
+        left = work_programme(self, &sizes, self->steps) - (self->bounded ? 0.0 : work_factor(&sizes, work_pivots));
         break;
     case HSEP_TRUSTED_BOUNDED:
         left = bounded + work_judge(self, &sizes);

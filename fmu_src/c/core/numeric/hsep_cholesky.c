@@ -28,15 +28,18 @@ static int cholesky_panel(
     hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
 {
     for (hsep_word r = 0; r < count; r++) {
-        hsep_word above = 0;
-        if (r >= 4) {
-            const hsep_real a[4] = {rows[0][r], rows[1][r - 1], rows[2][r - 2], rows[3][r - 3]};
-            const hsep_real *const x[4] = {rows[0] + r, rows[1] + r - 1, rows[2] + r - 2, rows[3] + r - 3};
-            hsep_take_four(rows[r], a, x, length - r);
-            above = 4;
+        hsep_real a[HSEP_CHOLESKY_PANEL];
+        const hsep_real *x[HSEP_CHOLESKY_PANEL];
+        for (hsep_word above = 0; above < r; above++) {
+            x[above] = rows[above] + (r - above);
+            a[above] = *x[above];
         }
-        for (; above < r; above++) {
-            hsep_axpy(rows[r], -rows[above][r - above], rows[above] + (r - above), length - r);
+        if (r >= 4) {
+            hsep_take_four(rows[r], a, x, length - r);
+        }
+        if (r % 4 > 0) {
+            const hsep_word few = r - r % 4;
+            hsep_take_few(rows[r], a + few, x + few, r % 4, length - r);
         }
         if (!cholesky_pivot(rows[r], length - r, least != NULL ? least + r : NULL)) {
             return 0;
@@ -71,7 +74,7 @@ HSEP_API int hsep_cholesky_rows(
     for (hsep_word k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
         const hsep_word length = n - k, left = last - k;
         const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        hsep_real *rows[HSEP_CHOLESKY_PANEL] = {NULL};
+        hsep_real *rows[HSEP_CHOLESKY_PANEL];
         for (hsep_word r = 0; r < count; r++) {
             rows[r] = row;
             row += length - r;
@@ -178,27 +181,78 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_wo
     }
 }
 
-HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[])
+/* Solve with count rows from the diagonal on for as many entries y, one after the other. */
+static inline void cholesky_forward_rows(const hsep_real *const rows[], hsep_word count, hsep_real y[])
+{
+    if (count == 4) { /* of known length: registers */
+        const hsep_real *r0 = rows[0], *r1 = rows[1], *r2 = rows[2];
+        const hsep_real y0 = y[0] / r0[0], y1 = (y[1] - y0 * r0[1]) / r1[0];
+        const hsep_real y2 = ((y[2] - y0 * r0[2]) - y1 * r1[1]) / r2[0];
+        y[3] = (((y[3] - y0 * r0[3]) - y1 * r1[2]) - y2 * r2[1]) / rows[3][0];
+        y[0] = y0, y[1] = y1, y[2] = y2;
+        return;
+    }
+    for (hsep_word r = 0; r < count; r++) {
+        y[r] /= rows[r][0];
+        for (hsep_word j = 1; r + j < count; j++) {
+            y[r + j] -= y[r] * rows[r][j];
+        }
+    }
+}
+
+HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[])
 {
     const hsep_real *row = triangle;
-    for (hsep_word first = 0; first < n; first += HSEP_CHOLESKY_PANEL) { /* R' y = b */
-        const hsep_word left = n - first, count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        const hsep_real *x[HSEP_CHOLESKY_PANEL] = {NULL};
+    for (hsep_word first = 0; first < count; first += HSEP_CHOLESKY_PANEL) {
+        const hsep_word left = count - first, height = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+        const hsep_word upper = height < 4 ? height : 4, behind = n - first - height;
+        const hsep_real *rows[HSEP_CHOLESKY_PANEL], *x[HSEP_CHOLESKY_PANEL];
         hsep_real *y = b + first;
-        for (hsep_word r = 0; r < count; r++) {
-            y[r] /= row[0];
-            for (hsep_word j = 1; r + j < count; j++) {
-                y[r + j] -= y[r] * row[j];
-            }
-            x[r] = row + (HSEP_CHOLESKY_PANEL - r);
-            row += left - r;
+        for (hsep_word r = 0; r < height; r++) {
+            rows[r] = row;
+            x[r] = row + (height - r); /* behind the panel */
+            row += n - first - r;
         }
-        if (left > HSEP_CHOLESKY_PANEL) {
-            hsep_take_eight(y + HSEP_CHOLESKY_PANEL, y, x, left - HSEP_CHOLESKY_PANEL);
+        cholesky_forward_rows(rows, upper, y);
+        if (height > 4) {
+            const hsep_real *const of_lower[4] = {rows[0] + 4, rows[1] + 3, rows[2] + 2, rows[3] + 1};
+            hsep_take_four(y + 4, y, of_lower, height - 4);
+            cholesky_forward_rows(rows + 4, height - 4, y + 4);
+        }
+        if (height == HSEP_CHOLESKY_PANEL) {
+            hsep_take_eight(y + height, y, x, behind);
+            continue;
+        }
+        for (hsep_word r = 0; r < height; r++) {
+            hsep_axpy(y + height, -y[r], x[r], behind);
         }
     }
-    for (hsep_word i = n; i-- > 0;) { /* R x = y */
-        row -= n - i;
-        b[i] = (b[i] - hsep_dot(row + 1, b + i + 1, n - i - 1)) / row[0];
+}
+
+HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[])
+{
+    const hsep_real *row = triangle + (hsep_word)(hsep_triangle(n) - hsep_triangle(n - count));
+    hsep_word last = count;
+    for (; last >= 4; last -= 4) { /* four rows share what is behind them */
+        const hsep_word beyond = n - last;
+        const hsep_real *r3 = row - (beyond + 1), *r2 = r3 - (beyond + 2), *r1 = r2 - (beyond + 3);
+        const hsep_real *r0 = r1 - (beyond + 4), *const x[4] = {r0 + 4, r1 + 3, r2 + 2, r3 + 1};
+        hsep_real sums[4], *y = b + (last - 4);
+        hsep_dot_four(b + last, x, count - last, sums);
+        y[3] = (y[3] - sums[3]) / r3[0];
+        y[2] = ((y[2] - sums[2]) - r2[1] * y[3]) / r2[0];
+        y[1] = (((y[1] - sums[1]) - r1[1] * y[2]) - r1[2] * y[3]) / r1[0];
+        y[0] = ((((y[0] - sums[0]) - r0[1] * y[1]) - r0[2] * y[2]) - r0[3] * y[3]) / r0[0];
+        row = r0;
     }
+    for (; last > 0; last--) {
+        row -= n - last + 1;
+        b[last - 1] = (b[last - 1] - hsep_dot(row + 1, b + last, count - last)) / row[0];
+    }
+}
+
+HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[])
+{
+    hsep_cholesky_forward(triangle, n, n, b);
+    hsep_cholesky_backward(triangle, n, n, b);
 }

@@ -30,6 +30,14 @@ HSEP_API int hsep_cholesky_rows(
 HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[]);
 HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[]);
 
+/* Turn the first count of b, (n,), into the solution y of R' y = b by the first count rows, and subtract from those
+ * behind them what these rows leave of them. Cost: count (n - count / 2) multiply-adds. */
+HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[]);
+
+/* Turn b, (count,), into the solution x of R x = b by the first count rows and columns. Cost: count^2 / 2
+ * multiply-adds. */
+HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[]);
+
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
 HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[]);
 

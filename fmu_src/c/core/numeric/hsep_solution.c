@@ -21,7 +21,9 @@ static hsep_real solution_lay_out(hsep_solution *self, hsep_word n_head, hsep_wo
     self->left = hsep_take(&end, hsep_triangle(n_tail + 1));
     self->least = hsep_take(&end, n + 1.0);
     self->rows = hsep_take(&end, (hsep_real)room * (n + 1.0));
+    self->last = hsep_take(&end, n + 1.0);
     self->work = hsep_take(&end, HSEP_SOLUTION_ABREAST * (n + 1.0));
+    self->abreast = hsep_take(&end, HSEP_SOLUTION_ABREAST * (n + 1.0));
     return end * sizeof(hsep_real);
 }
 
@@ -40,7 +42,7 @@ HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word 
 {
     hsep_solution got;
     return HSEP_LAID_OUT(got, block, solution_lay_out(&got, n_head, n_tail, room)) && got.factored <= got.n_head &&
-           got.waiting <= got.room && got.finished <= 1;
+           got.waiting <= got.room && got.begun <= 1 && got.finished <= 1 && got.completed <= 1;
 }
 
 /* The rows of the factor behind the head. */
@@ -50,7 +52,7 @@ static hsep_real *solution_tail(hsep_solution *self)
     return hsep_at(self, self->factor) + (hsep_word)before;
 }
 
-/* Add a Gram matrix to the factor's triangle, in its order. */
+/* Add the rows of a Gram matrix that do not wait to the factor's triangle, in its order. */
 static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real weight)
 {
     const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = gram->n;
@@ -79,8 +81,14 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
         *to += weight * row[n - n_tail - i];
         row += n - n_tail + 1 - i;
     }
-    *tail += weight * hsep_gram_square(gram);
-    self->square += weight * hsep_gram_square(gram);
+    const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_word)hsep_triangle(n + 1) - 1];
+    *tail += weight * square;
+    self->square += weight * square;
+}
+
+HSEP_API void hsep_solution_reset(hsep_solution *self)
+{
+    self->begun = self->factored = self->waiting = self->finished = self->completed = 0;
 }
 
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight)
@@ -88,7 +96,8 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
     const hsep_word n_head = self->n_head, n = n_head + self->n_tail;
     const hsep_real *penalties = hsep_at(self, self->penalties) + self->n_tail;
     hsep_real *diagonal = hsep_at(self, self->factor), *least = hsep_at(self, self->least);
-    self->factored = self->waiting = self->finished = 0;
+    hsep_solution_reset(self);
+    self->begun = 1;
     self->square = 0.0;
     memset(diagonal, 0, (size_t)hsep_triangle(n + 1) * sizeof(hsep_real));
     solution_add(self, gram, 1.0);
@@ -100,6 +109,10 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
         *diagonal += penalty;
         diagonal += n + 1 - i;
         least[i] = penalty > HSEP_SOLUTION_LEAST ? penalty : HSEP_SOLUTION_LEAST;
+    }
+    for (hsep_word b = 0; b < gram->waiting; b++) {
+        const hsep_real *row = hsep_at_const(gram, gram->rows) + b * (gram->n + 1);
+        hsep_solution_row(self, row, row[gram->n]);
     }
 }
 
@@ -119,77 +132,128 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     self->waiting++;
 }
 
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self)
+/* Multiply-adds of a row that is taken in where so many rows of the head are factored. */
+static hsep_real solution_of_row(const hsep_solution *self, hsep_word factored)
 {
-    const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
-    const hsep_real tail = (hsep_real)self->n_tail + 1.0;
-    return (all * all * all - tail * tail * tail) / 6.0;
+    const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1), left = all - (hsep_real)factored;
+    return all * all - 0.5 * left * left;
 }
 
-/* Take in the last rows that wait: four, with rows of 0 in their place if there are fewer, or one. */
-static void solution_take_in(hsep_solution *self)
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word to_come, int tail)
+{
+    const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
+    const hsep_real behind = tail ? 0.0 : (hsep_real)self->n_tail + 1.0;
+    const hsep_real rows = (hsep_real)(self->waiting + to_come);
+    return (all * all * all - behind * behind * behind) / 6.0 + rows * solution_of_row(self, self->n_head);
+}
+
+/* Take in the last count rows that wait: up to four, with rows of 0 in their place if there are fewer, or one. */
+static void solution_take_in(hsep_solution *self, hsep_word count)
 {
     const hsep_word width = self->n_head + self->n_tail + 1;
-    const hsep_word count = self->waiting < HSEP_SOLUTION_ABREAST ? self->waiting : HSEP_SOLUTION_ABREAST;
     hsep_real *work = hsep_at(self, self->work);
     self->waiting -= count;
     memcpy(work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
     if (count > 1) {
         memset(work + width * count, 0, (size_t)(width * (HSEP_SOLUTION_ABREAST - count)) * sizeof(hsep_real));
-        hsep_cholesky_take_four(hsep_at(self, self->factor), width, self->n_head, work);
+        hsep_cholesky_take_four(hsep_at(self, self->factor), width, self->factored, work);
     } else if (count == 1) {
-        hsep_cholesky_take_one(hsep_at(self, self->factor), width, self->n_head, work);
+        hsep_cholesky_take_one(hsep_at(self, self->factor), width, self->factored, work);
     }
 }
 
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)
 {
     const hsep_word width = self->n_head + self->n_tail + 1;
-    while (self->factored < self->n_head && amount > 0.0) {
-        const hsep_real height = (hsep_real)(width - self->factored);
-        const hsep_word left = self->n_head - self->factored;
-        const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        (void)hsep_cholesky_rows( /* no pivot is 0 */
-            hsep_at(self, self->factor), width, self->factored, self->factored + count, hsep_at(self, self->least));
-        self->factored += count;
-        amount -= 0.5 * (hsep_real)HSEP_CHOLESKY_PANEL * height * height;
-        all = 0;
-    }
-    if (self->factored == self->n_head && (all || self->waiting >= HSEP_SOLUTION_ABREAST)) {
-        solution_take_in(self);
+    while (all || amount > 0.0) {
+        const hsep_word left = self->n_head - self->factored, waiting = self->waiting;
+        if (waiting >= HSEP_SOLUTION_ABREAST || (all && left == 0 && waiting > 0)) {
+            const hsep_word count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
+            amount -= (hsep_real)count * solution_of_row(self, self->factored);
+            solution_take_in(self, count);
+        } else if (left > 0) {
+            const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+            const hsep_word last = self->factored + count;
+            const hsep_real height = (hsep_real)(width - self->factored);
+            (void)hsep_cholesky_rows( /* no pivot is 0 */
+                hsep_at(self, self->factor), width, self->factored, last, hsep_at(self, self->least));
+            self->factored = last;
+            amount -= 0.5 * (hsep_real)count * height * height;
+        } else {
+            break;
+        }
     }
     return amount;
 }
 
-HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
+HSEP_API void hsep_solution_complete(hsep_solution *self)
 {
-    const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
+    const hsep_word n_head = self->n_head, n_tail = self->n_tail;
+    const size_t size = (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real);
     const hsep_real *penalties = hsep_at(self, self->penalties);
-    hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *w = hsep_at(self, self->weights);
-    hsep_real *least = hsep_at(self, self->least), *diagonal = tail, *row = hsep_at(self, self->factor);
+    hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *diagonal = tail;
+    hsep_real *least = hsep_at(self, self->least) + n_head;
     if (!self->finished) {
-        (void)hsep_solution_advance(self, INFINITY, 0);
-        while (self->waiting > 0) {
-            solution_take_in(self);
-        }
-        memcpy(left, tail, (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real));
-        self->finished = 1;
+        (void)hsep_solution_advance(self, 0.0, 1);
+        memcpy(left, tail, size);
     } else {
-        memcpy(tail, left, (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real));
+        memcpy(tail, left, size);
     }
     for (hsep_word i = 0; i < n_tail; i++) {
         *diagonal += penalties[i];
         diagonal += n_tail + 1 - i;
-        least[n_head + i] = penalties[i] > HSEP_SOLUTION_LEAST ? penalties[i] : HSEP_SOLUTION_LEAST;
+        least[i] = penalties[i] > HSEP_SOLUTION_LEAST ? penalties[i] : HSEP_SOLUTION_LEAST;
     }
-    least[n] = hsep_fmax(HSEP_SOLUTION_OF_TARGET * self->square, HSEP_SOLUTION_LEAST);
-    (void)hsep_cholesky_rows(tail, n_tail + 1, 0, n_tail + 1, least + n_head);
-    hsep_real *x = hsep_at(self, self->work), sum = *diagonal * *diagonal;
-    row += (hsep_word)hsep_triangle(n + 1) - 1;
-    for (hsep_word i = n; i-- > 0;) { /* R x = z */
-        row -= n + 1 - i;
-        x[i] = (row[n - i] - hsep_dot(row + 1, x + i + 1, n - i - 1)) / row[0];
+    least[n_tail] = hsep_fmax(HSEP_SOLUTION_OF_TARGET * self->square, HSEP_SOLUTION_LEAST);
+    (void)hsep_cholesky_rows(tail, n_tail + 1, 0, n_tail + 1, least);
+    self->finished = self->completed = 1;
+}
+
+/* Complete the factor without the last row that waits, which becomes the only one. */
+static void solution_complete_but_last(hsep_solution *self)
+{
+    const hsep_word width = self->n_head + self->n_tail + 1;
+    hsep_real *rows = hsep_at(self, self->rows);
+    self->waiting--;
+    const hsep_word last = self->waiting;
+    hsep_solution_complete(self);
+    memmove(rows, rows + width * last, (size_t)width * sizeof(hsep_real));
+    self->waiting = 1;
+}
+
+/* u of the last row, if there is one, and what the weights without it leave of its target. */
+static void solution_last(hsep_solution *self)
+{
+    const hsep_word n = self->n_head + self->n_tail;
+    hsep_real *u = hsep_at(self, self->last);
+    self->last_square = 0.0;
+    if (self->waiting > 0) {
+        memcpy(u, hsep_at(self, self->rows), (size_t)(n + 1) * sizeof(hsep_real));
+        hsep_cholesky_forward(hsep_at(self, self->factor), n + 1, n, u);
+        self->last_square = hsep_dot(u, u, n);
     }
+}
+
+HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
+{
+    const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
+    const hsep_real *penalties = hsep_at(self, self->penalties), *u = hsep_at(self, self->last);
+    hsep_real *w = hsep_at(self, self->weights), *x = hsep_at(self, self->work);
+    if (!self->completed && apart && !self->finished && self->waiting > 0) {
+        solution_complete_but_last(self);
+    } else if (!self->completed) {
+        hsep_solution_complete(self);
+    }
+    solution_last(self);
+    const int is_one = self->waiting > 0; /* R x = z + u (target - u' z) / (1 + u' u) */
+    const hsep_real innovation = is_one ? u[n] : 0.0, gain = innovation / (1.0 + self->last_square);
+    const hsep_real *row = hsep_at(self, self->factor);
+    for (hsep_word i = 0; i < n; i++) {
+        x[i] = row[n - i] + (is_one ? gain * u[i] : 0.0);
+        row += n + 1 - i;
+    }
+    hsep_real sum = *row * *row + gain * innovation;
+    hsep_cholesky_backward(hsep_at(self, self->factor), n + 1, n, x);
     memcpy(w, x + n_head, (size_t)n_tail * sizeof(hsep_real));
     for (hsep_word i = 0; i < n_head; i++) {
         w[n_tail + i] = x[n_head - 1 - i];
@@ -197,66 +261,131 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     for (hsep_word i = 0; i < n; i++) { /* sum of the squares, and of the penalties */
         sum -= penalties[i] * w[i] * w[i];
     }
+    self->completed = 0;
     return hsep_fmax(sum, 0.0);
 }
 
-/* x_j -= y_0 r_0j + y_1 r_1j + y_2 r_2j + y_3 r_3j for the entries j behind four, of HSEP_SOLUTION_ABREAST rows side by
- * side, the first vectors of them. r: four rows of R. */
-static inline void solution_take(
-    hsep_real *restrict x, const hsep_lanes at[4 * HSEP_OF_FOUR], const hsep_real *const r[4], hsep_word n, int vectors)
-{
-    const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-    for (hsep_word j = 0; j < n; j++, x += HSEP_SOLUTION_ABREAST) {
-        hsep_lanes *to = hsep_lanes_at(x);
-        for (int l = 0; l < vectors; l++) {
-            to[l] -= (r0[j] * at[l] + r1[j] * at[HSEP_OF_FOUR + l]) +
-                     (r2[j] * at[2 * HSEP_OF_FOUR + l] + r3[j] * at[3 * HSEP_OF_FOUR + l]);
-        }
-    }
-}
-
-/* The leverages of the first vectors of the rows. */
-static inline void solution_leverages(hsep_solution *self, hsep_lanes sums[HSEP_OF_FOUR], int vectors)
+#if HSEP_LANES == 2
+/* R'^-1 of four rows side by side, which are changed in place; to the bit as hsep_cholesky_forward has each. */
+static void solution_forward_abreast(hsep_solution *self)
 {
     const hsep_word m = self->n_head + self->n_tail;
     const hsep_real *row = hsep_at(self, self->factor);
-    hsep_real *rows = hsep_at(self, self->work);
-    /* R' y = phi from the first feature to the last, which takes each of them from the entries behind it. */
+    hsep_lanes *x = hsep_lanes_at(hsep_at(self, self->abreast));
     for (hsep_word first = 0; first < m; first += 4) {
         const hsep_word left = m - first, height = left < 4 ? left : 4;
-        hsep_real *x = rows + HSEP_SOLUTION_ABREAST * first;
         const hsep_real *r[4] = {NULL};
+        hsep_lanes *y = x + HSEP_OF_FOUR * first;
         for (hsep_word i = 0; i < height; i++) {
-            hsep_lanes *y = hsep_lanes_at(x) + HSEP_OF_FOUR * i;
-            const hsep_real inverse = 1.0 / row[0];
-            for (int l = 0; l < vectors; l++) {
-                y[l] *= inverse;
-                sums[l] += y[l] * y[l];
+            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+                y[HSEP_OF_FOUR * i + l] /= row[0];
             }
             for (hsep_word j = 1; i + j < height; j++) {
-                for (int l = 0; l < vectors; l++) {
-                    y[HSEP_OF_FOUR * j + (hsep_word)l] -= row[j] * y[l];
+                for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+                    y[HSEP_OF_FOUR * (i + j) + l] -= row[j] * y[HSEP_OF_FOUR * i + l];
                 }
             }
             r[i] = row + (height - i);
             row += m + 1 - (first + i);
         }
         if (left > 4) {
-            hsep_lanes at[4 * HSEP_OF_FOUR];
-            memcpy(at, x, sizeof at);
-            solution_take(x + 4 * HSEP_SOLUTION_ABREAST, at, r, left - 4, vectors);
+            const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
+            hsep_lanes at[4 * HSEP_OF_FOUR], *to = y + 4 * HSEP_OF_FOUR;
+            memcpy(at, y, sizeof at);
+            for (hsep_word j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
+                for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+                    to[l] =
+                        (((to[l] - r0[j] * at[l]) - r1[j] * at[HSEP_OF_FOUR + l]) - r2[j] * at[2 * HSEP_OF_FOUR + l]) -
+                        r3[j] * at[3 * HSEP_OF_FOUR + l];
+                }
+            }
         }
     }
 }
 
-HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+/* Sums of u_i x_i, or of x_i x_i without u, over four rows side by side; to the bit as hsep_dot has each. */
+static void solution_dot_abreast(const hsep_real *u, const hsep_lanes x[], hsep_word m, hsep_lanes sums[HSEP_OF_FOUR])
 {
-    hsep_lanes sums[HSEP_OF_FOUR];
-    memset(sums, 0, sizeof sums);
-    if (count > 1) {
-        solution_leverages(self, sums, HSEP_OF_FOUR);
-    } else {
-        solution_leverages(self, sums, 1);
+    hsep_lanes of[4][HSEP_OF_FOUR];
+    hsep_word i = 0;
+    memset(of, 0, sizeof of);
+    for (; i + 4 <= m; i += 4) {
+        for (hsep_word r = 0; r < 4; r++, x += HSEP_OF_FOUR) {
+            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+                of[r][l] += (u != NULL ? u[i + r] * x[l] : x[l] * x[l]);
+            }
+        }
+    }
+    for (; i < m; i++, x += HSEP_OF_FOUR) {
+        for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+            of[0][l] += (u != NULL ? u[i] * x[l] : x[l] * x[l]);
+        }
+    }
+    for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        sums[l] = (of[0][l] + of[1][l]) + (of[2][l] + of[3][l]);
+    }
+}
+
+/* The leverages of four rows side by side. */
+static void solution_leverages_abreast(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+{
+    const hsep_word m = self->n_head + self->n_tail;
+    const hsep_real *u = hsep_at(self, self->last), square = self->last_square, *rows = hsep_at(self, self->work);
+    hsep_real *to = hsep_at(self, self->abreast);
+    hsep_lanes along[HSEP_OF_FOUR], sums[HSEP_OF_FOUR], *x = hsep_lanes_at(to);
+    for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
+        const hsep_real *row = rows + (m + 1) * (c < count ? c : count - 1);
+        for (hsep_word i = 0; i < m; i++) {
+            to[HSEP_SOLUTION_ABREAST * i + c] = row[i];
+        }
+    }
+    solution_forward_abreast(self);
+    if (square > 0.0) {
+        solution_dot_abreast(u, x, m, along);
+        for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+            along[l] /= square;
+        }
+        for (hsep_word i = 0; i < m; i++) {
+            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+                x[HSEP_OF_FOUR * i + l] -= along[l] * u[i];
+            }
+        }
+    }
+    solution_dot_abreast(NULL, x, m, sums);
+    const hsep_real left = square / (1.0 + square);
+    for (hsep_word l = 0; square > 0.0 && l < HSEP_OF_FOUR; l++) {
+        sums[l] += along[l] * along[l] * left;
     }
     memcpy(leverages, sums, sizeof sums);
+}
+#endif
+
+/* The leverage of a row y, (m + 1,), which is used up: along u, and the rest. */
+static hsep_real solution_leverage(hsep_solution *self, hsep_real y[])
+{
+    const hsep_word m = self->n_head + self->n_tail;
+    const hsep_real *u = hsep_at(self, self->last), square = self->last_square;
+    y[m] = 0.0;
+    hsep_cholesky_forward(hsep_at(self, self->factor), m + 1, m, y);
+    if (!(square > 0.0)) {
+        return hsep_dot(y, y, m);
+    }
+    const hsep_real along = hsep_dot(u, y, m) / square;
+    hsep_axpy(y, -along, u, m);
+    const hsep_real left = square / (1.0 + square);
+    return hsep_dot(y, y, m) + along * along * left;
+}
+
+HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+{
+    const hsep_word width = self->n_head + self->n_tail + 1;
+#if HSEP_LANES == 2
+    if (count > 1) {
+        solution_leverages_abreast(self, count, leverages);
+        return;
+    }
+#endif
+    for (hsep_word c = 0; c < count; c++) {
+        leverages[c] = solution_leverage(self, hsep_at(self, self->work) + width * c);
+    }
 }

@@ -5,9 +5,10 @@
  * The Gram matrix squares the condition of the rows, but the penalties bound it: no pivot of its Cholesky factor is
  * less than its penalty. Penalties of the head of the features are known before the last rows are, penalties of the
  * tail are not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
- * hsep_solution_row takes rows that come meanwhile, which go into the factor by reflections. What is left for
- * hsep_solution_finish are the last rows, mostly one, and the tail. The solution is the same to rounding as with all
- * rows at once.
+ * hsep_solution_row takes rows that come meanwhile, which go into what is factored by reflections, and are added to
+ * the rest. What is left for hsep_solution_finish are the tail and the last row phi, which does not enter the factor:
+ * with u = R'^-1 phi the triangle of all rows is that of R' (1 + u u') R, and its inverse follows from Sherman and
+ * Morrison's formula (1950). The solution is the same to rounding as with all rows at once.
  *
  * Rows of a Gram matrix have the tail first. The head is factored from its last feature to its first: where these are
  * lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
@@ -34,11 +35,14 @@
 
 typedef struct {
     hsep_word n_head, n_tail; /* features */
-    hsep_word room;           /* rows that may come once it has begun */
+    hsep_word room;           /* rows that may wait */
+    hsep_word begun;          /* whether it has */
     hsep_word factored;       /* rows of the head that are */
     hsep_word waiting;        /* rows that have come since, and are not in the factor yet */
-    hsep_word finished;       /* whether left is valid */
+    hsep_word finished;       /* whether left is valid, */
+    hsep_word completed;      /* and the tail is factored with its penalties */
     hsep_real square;         /* sum of the squares of the targets */
+    hsep_real last_square;    /* u' u of the last row */
     /* Offsets in words from the beginning of the struct */
     hsep_word penalties; /* (n_tail + n_head,) */
     hsep_word weights;   /* (n_tail + n_head,) */
@@ -46,38 +50,51 @@ typedef struct {
     hsep_word left;      /* triangle of tail and target: what the head leaves of them, without penalties */
     hsep_word least;     /* (n_head + n_tail + 1,) bounds on the pivots */
     hsep_word rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
-    hsep_word work;      /* (n_head + n_tail + 1, HSEP_SOLUTION_ABREAST) */
+    hsep_word last;      /* (n_head + n_tail + 1,) u, and what the weights without the last row leave of its target */
+    hsep_word work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
+    hsep_word abreast;   /* the same side by side, where there are vectors */
 } hsep_solution;
 
-HSEP_ASSERT_WORDS(hsep_solution, 14);
+HSEP_ASSERT_WORDS(hsep_solution, 19);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
 HSEP_API hsep_real hsep_solution_size(hsep_word n_head, hsep_word n_tail, hsep_word room);
 HSEP_API void hsep_solution_init(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room);
 HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word n_tail, hsep_word room);
 
-/* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, or NULL; both are settled. Its
- * first n_tail + n_head features count. Penalties of the head, >= 0, are in the block, behind those of the tail. */
+/* Give up the rows and the factor so far; the next solution has not begun. */
+HSEP_API void hsep_solution_reset(hsep_solution *self);
+
+/* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, which is settled, or NULL. Its
+ * first n_tail + n_head features count. Penalties of the head, >= 0, are in the block, behind those of the tail. Rows
+ * that wait in the Gram matrix wait here, too. */
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight);
 
 /* Take another row of features, as the Gram matrix has them, and its target; the rows behind room are not taken. */
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
 
-/* Multiply-adds that are left to factor the head. */
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self);
+/* Multiply-adds that it takes at most until the head is factored and has taken in the rows that wait, and as many as
+ * are to come; with tail until it is completed. */
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word to_come, int tail);
 
-/* Factor the head, by panels of about 4 n^2 multiply-adds until an amount is spent, and return what is left of it. Once
- * the head is factored, take in four rows that wait, or with all fewer, for 8 n_head n multiply-adds. */
+/* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return
+ * what is left of it; the last part may exceed it by up to 4 (n + 1)^2. With all everything is done, whatever the
+ * amount. */
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
 
-/* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the rows
- * about them, of which rounding leaves 1e-14 of the square of the targets. Cost: what was left to be advanced,
- * n_tail^3 / 6 + n^2 / 2 multiply-adds. May be called again with other penalties of the tail. */
-HSEP_API hsep_real hsep_solution_finish(hsep_solution *self);
+/* Factor the tail, too, with all rows that have come: its penalties are known, and one row more comes at most. Cost:
+ * what was left to be advanced, and n_tail^3 / 6 multiply-adds. */
+HSEP_API void hsep_solution_complete(hsep_solution *self);
 
-/* phi' (R' R)^-1 phi of the first count of HSEP_SOLUTION_ABREAST rows phi, which are the block's work, entry after
- * entry side by side, in that order, and are used up: the variances of w' phi relative to the variance of the noise.
- * Cost: n^2 / 2 multiply-adds for each; two cost as much as all. */
+/* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the
+ * rows about them, of which rounding leaves 1e-14 of the square of the targets. Cost: n^2 multiply-adds, and what
+ * was left of hsep_solution_complete, apart for a last row that waits, if that is to stay behind the factor: it
+ * costs less so, and each leverage more. May be called again with other penalties of the tail. */
+HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart);
+
+/* phi' (R' R)^-1 phi, with all rows in R, of the first count of HSEP_SOLUTION_ABREAST rows phi, which are the block's
+ * work, in that order, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2
+ * multiply-adds for each; where there are vectors two cost as much as four. */
 HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST]);
 
 #endif

@@ -1,4 +1,4 @@
-/* Vectors of two numbers where the compiler has them, one number elsewhere or with HSEP_NO_VECTORS; sums and products
+/* Vectors of two numbers where the processor has them, one number elsewhere or with HSEP_NO_VECTORS; sums and products
  * of arrays, four entries at a time. Lanes do not meet: results are the same to the last bit whatever a vector holds,
  * and no addition waits for the one before. Reentrant; allocate nothing. */
 #ifndef HSEP_VECTOR_H
@@ -8,7 +8,8 @@
 
 #include <string.h>
 
-#if (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
+#if (defined(__SSE2__) || defined(__aarch64__) || defined(__VSX__) || defined(__wasm_simd128__)) && \
+    (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
 #define HSEP_LANES 2
 typedef hsep_real hsep_lanes __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
 typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
@@ -34,16 +35,6 @@ static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
     return (hsep_lanes)((larger & (hsep_bits)a) | (~larger & (hsep_bits)b));
 #else
     return a > b ? a : b;
-#endif
-}
-
-/* Sum of the entries of a vector. */
-static inline hsep_real hsep_lanes_sum(hsep_lanes a)
-{
-#if HSEP_LANES == 2
-    return a[0] + a[1];
-#else
-    return a;
 #endif
 }
 
@@ -83,17 +74,27 @@ static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_
 static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4], hsep_word n, hsep_real sums[4])
 {
     const hsep_real *b0 = b[0], *b1 = b[1], *b2 = b[2], *b3 = b[3];
-    hsep_lanes s0 = {0.0}, s1 = {0.0}, s2 = {0.0}, s3 = {0.0};
     hsep_word i = 0;
-    for (; i + HSEP_LANES <= n; i += HSEP_LANES) {
+#if HSEP_LANES == 2
+    hsep_lanes s0 = {0.0}, s1 = {0.0}, s2 = {0.0}, s3 = {0.0};
+    for (; i + 2 <= n; i += 2) {
         const hsep_lanes x = *hsep_lanes_const(a + i);
         s0 += x * *hsep_lanes_const(b0 + i);
         s1 += x * *hsep_lanes_const(b1 + i);
         s2 += x * *hsep_lanes_const(b2 + i);
         s3 += x * *hsep_lanes_const(b3 + i);
     }
-    sums[0] = hsep_lanes_sum(s0), sums[1] = hsep_lanes_sum(s1);
-    sums[2] = hsep_lanes_sum(s2), sums[3] = hsep_lanes_sum(s3);
+    sums[0] = s0[0] + s0[1], sums[1] = s1[0] + s1[1], sums[2] = s2[0] + s2[1], sums[3] = s3[0] + s3[1];
+#else
+    hsep_real s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0, t0 = 0.0, t1 = 0.0, t2 = 0.0, t3 = 0.0;
+    for (; i + 2 <= n; i += 2) {
+        s0 += a[i] * b0[i], t0 += a[i + 1] * b0[i + 1];
+        s1 += a[i] * b1[i], t1 += a[i + 1] * b1[i + 1];
+        s2 += a[i] * b2[i], t2 += a[i + 1] * b2[i + 1];
+        s3 += a[i] * b3[i], t3 += a[i + 1] * b3[i + 1];
+    }
+    sums[0] = s0 + t0, sums[1] = s1 + t1, sums[2] = s2 + t2, sums[3] = s3 + t3;
+#endif
     for (; i < n; i++) {
         sums[0] += a[i] * b0[i], sums[1] += a[i] * b1[i];
         sums[2] += a[i] * b2[i], sums[3] += a[i] * b3[i];
@@ -144,6 +145,32 @@ static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], c
     }
     for (; j < n; j++) {
         y[j] = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
+    }
+}
+
+/* The same over one, two or three arrays. */
+static inline void hsep_take_few(
+    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_word count, hsep_word n)
+{
+    const hsep_real a0 = a[0], *x0 = x[0];
+    hsep_word j = 0;
+    if (count == 1) {
+        for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+            *hsep_lanes_at(y + j) -= a0 * *hsep_lanes_const(x0 + j);
+        }
+        for (; j < n; j++) {
+            y[j] -= a0 * x0[j];
+        }
+        return;
+    }
+    const hsep_real a1 = a[1], a2 = count > 2 ? a[2] : 0.0, *x1 = x[1], *x2 = count > 2 ? x[2] : x1;
+    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
+        *hsep_lanes_at(y + j) =
+            ((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
+            a2 * *hsep_lanes_const(x2 + j);
+    }
+    for (; j < n; j++) {
+        y[j] = ((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j];
     }
 }
 

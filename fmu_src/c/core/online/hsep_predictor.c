@@ -200,6 +200,18 @@ static void predictor_go_on(hsep_predictor *self)
     hsep_predictor_predict_std(self, first, late + last);
 }
 
+/* Solve ahead of the next window, all of whose commands but the last are known. */
+static void predictor_settle(hsep_predictor *self)
+{
+    const hsep_real *ahead = hsep_at(self, self->ahead);
+    hsep_real before = hsep_at(self, self->x_d)[self->Np - 1], peak = 0.0;
+    for (hsep_word i = 0; i + 1 < self->Np; i++) {
+        peak = hsep_fmax(peak, hsep_fabs(ahead[i] - before));
+        before = ahead[i];
+    }
+    hsep_residual_settle(hsep_predictor_model(self), peak);
+}
+
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     const hsep_word Np = self->Np;
@@ -209,6 +221,9 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         if (self->n_published < Np) {
             predictor_go_on(self);
+        }
+        if (self->k % Np == Np - 1) {
+            predictor_settle(self);
         }
         return 0;
     }

@@ -36,7 +36,7 @@ static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shap
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
-    self->solution = hsep_take_block(&end, hsep_solution_size(shape->p, shape->n_static, shape->ahead));
+    self->solution = hsep_take_block(&end, hsep_solution_size(shape->p, shape->n_static, shape->room));
     return end * sizeof(hsep_real);
 }
 
@@ -46,7 +46,7 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
 {
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
-    hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->ahead);
+    hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->room);
     for (hsep_word i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
             hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
@@ -57,7 +57,7 @@ HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape
 {
     hsep_expert got;
     return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape)) &&
-           hsep_solution_valid(hsep_at_bytes(block, got.solution), shape->p, shape->n_static, shape->ahead);
+           hsep_solution_valid(hsep_at_bytes(block, got.solution), shape->p, shape->n_static, shape->room);
 }
 
 /* Least sum of squares that counts, of targets whose squares have a sum. */
@@ -66,7 +66,7 @@ static hsep_real expert_resolved(hsep_real square)
     return hsep_fmax(HSEP_EXPERT_RESOLUTION, HSEP_SOLUTION_RESOLUTION) * square;
 }
 
-HSEP_API void hsep_expert_begin_solution(
+HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least)
 {
@@ -81,17 +81,37 @@ HSEP_API void hsep_expert_begin_solution(
     for (hsep_word i = 0; i < self->p; i++) {
         penalties[i] = self->variance / (scales[i] * scales[i]);
     }
-    hsep_solution_begin(solution, of_run, earlier->n_rows > 0.0 ? earlier : NULL, weight);
+    hsep_solution_reset(solution);
 }
 
-HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[])
+HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_evidence *evidence, hsep_real weight)
+{
+    const hsep_gram *earlier = hsep_evidence_earlier(evidence);
+    hsep_solution_begin(
+        hsep_expert_solution(self), hsep_evidence_of_run(evidence), earlier->n_rows > 0.0 ? earlier : NULL, weight);
+}
+
+static void expert_penalise(hsep_expert *self, const hsep_real scales[])
 {
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *penalties = hsep_at(solution, solution->penalties);
     for (hsep_word i = 0; i < self->n_static; i++) {
         penalties[i] = self->variance / (scales[i] * scales[i]);
     }
-    self->rows_variance = hsep_fmax(hsep_solution_finish(solution), expert_resolved(solution->square)) / n_rows;
+}
+
+HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[])
+{
+    expert_penalise(self, scales);
+    hsep_solution_complete(hsep_expert_solution(self));
+}
+
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[], int apart)
+{
+    hsep_solution *solution = hsep_expert_solution(self);
+    expert_penalise(self, scales);
+    const hsep_real square = hsep_solution_finish(solution, apart);
+    self->rows_variance = hsep_fmax(square, expert_resolved(solution->square)) / n_rows;
 }
 
 /* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
@@ -134,15 +154,13 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_wor
     const hsep_word count = left < HSEP_SOLUTION_ABREAST ? left : HSEP_SOLUTION_ABREAST;
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
-    for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
-        const hsep_word sample = k + apart * (c < count ? c : count - 1); /* what is beyond is a copy */
-        const hsep_real *row = rows + sample * n_static, *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
+    for (hsep_word c = 0; c < count; c++, to += p + n_static + 1) {
+        const hsep_word sample = k + apart * c;
+        const hsep_real *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
         for (hsep_word i = 0; i < p; i++) {
-            to[HSEP_SOLUTION_ABREAST * (p - 1 - i) + c] = lags[i];
+            to[p - 1 - i] = lags[i];
         }
-        for (hsep_word i = 0; i < n_static; i++) {
-            to[HSEP_SOLUTION_ABREAST * (p + i) + c] = row[i];
-        }
+        memcpy(to + p, rows + sample * n_static, (size_t)n_static * sizeof(hsep_real));
     }
     hsep_solution_leverages(solution, count, leverages);
     for (hsep_word c = 0; c < apart * count && k + c < last; c++) {

@@ -28,7 +28,7 @@ typedef struct {
 typedef struct {
     hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
     hsep_word n_static, p; /* features without lags, lags */
-    hsep_word ahead;       /* samples of a window that come once its solution is begun */
+    hsep_word room;        /* rows that may wait in its solution */
 } hsep_expert_shape;
 
 typedef struct {
@@ -74,15 +74,22 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
     return hsep_at_const(solution, solution->weights);
 }
 
-/* Begin to solve for the weights from the rows so far, both parts of them settled, rows of earlier runs weighed by
- * weight. first, least: m2, variance of the noise while it is not known, and the least one. */
-HSEP_API void hsep_expert_begin_solution(
+/* Take the penalties that the next weights are solved for with from the rows so far, rows of earlier runs weighed by
+ * weight; they begin to be solved for by hsep_expert_begin_solution. first, least: m2, variance of the noise while
+ * it is not known, and the least one. */
+HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least);
 
+/* Begin to solve for them from the rows so far, those of earlier runs settled. Cost: n^2 multiply-adds. */
+HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_evidence *evidence, hsep_real weight);
+
+/* Complete the factor with the penalties of the features without lags, before the last row comes; scales: as below. */
+HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[]);
+
 /* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
- * without lags. Costs a hsep_solution_finish. */
-HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[]);
+ * without lags; apart: as hsep_solution_finish has it, which it costs. */
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[], int apart);
 
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);

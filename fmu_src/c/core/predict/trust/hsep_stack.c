@@ -42,7 +42,7 @@ static hsep_real stack_try(
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], const int support[], int n,
     hsep_real pi[HSEP_N_EXPERTS])
 {
-    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS] = {{0.0}}, found[HSEP_N_EXPERTS] = {0.0}, ones[HSEP_N_EXPERTS] = {0.0};
+    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], found[HSEP_N_EXPERTS], ones[HSEP_N_EXPERTS];
     hsep_real sum = 0.0, of_ones = 0.0, cost = 0.0;
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
@@ -56,20 +56,24 @@ static hsep_real stack_try(
         sum += found[i];
         of_ones += ones[i];
     }
-    memset(pi, 0, HSEP_N_EXPERTS * sizeof *pi);
     for (int i = 0; i < n; i++) {
         found[i] -= sum > 1.0 ? (sum - 1.0) / of_ones * ones[i] : 0.0; /* then sum pi = 1 is active */
         if (!(found[i] >= 0.0)) {
             return INFINITY;
         }
-        pi[support[i]] = found[i];
     }
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        pi[i] = 0.0;
+    }
+    for (int i = 0; i < n; i++) {
+        pi[support[i]] = found[i];
+    }
+    for (int i = 0; i < n; i++) {
         hsep_real row = 0.0;
-        for (int j = 0; j < HSEP_N_EXPERTS; j++) {
-            row += H[i][j] * pi[j];
+        for (int j = 0; j < n; j++) {
+            row += H[support[i]][support[j]] * found[j];
         }
-        cost += (0.5 * row - l[i]) * pi[i];
+        cost += (0.5 * row - l[support[i]]) * found[i];
     }
     return cost;
 }

@@ -21,8 +21,15 @@
  * was predicted. */
 #define HSEP_TRUSTED_PACE 2
 
-/* The last samples of a window have no factoring, one for so many rows that come while there is some. */
-#define HSEP_TRUSTED_ROWS 8
+/* Multiply-adds as which an entry of a Gram matrix counts where four rows are added to it, and where a solution begins
+ * with it. */
+#define HSEP_TRUSTED_OF_GRAM 5.0
+#define HSEP_TRUSTED_OF_BEGINNING 4.0
+
+/* Features without lags of an expert, at most. */
+#define HSEP_TRUSTED_OF_COMMAND (HSEP_TRUST_LAGS_OF_COMMAND + 2)
+#define HSEP_TRUSTED_MOST \
+    (HSEP_TRUSTED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? HSEP_TRUSTED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
@@ -38,7 +45,7 @@ typedef struct {
 typedef struct {
     hsep_word Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
     hsep_word late;               /* samples by which the measurement is late */
-    hsep_word early;              /* samples of a window after which the next one's solutions begin */
+    hsep_word early;              /* samples of a window after which the next one's solutions may begin */
     hsep_real T_s;                /* s */
     hsep_real least_variance;     /* m2, of the noise */
     hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
@@ -50,14 +57,17 @@ typedef struct {
     hsep_word n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
     hsep_real forecast_scale;            /* m/s, velocity scale with it, */
-    hsep_real forecast_step;             /* m, and largest change of the command */
+    hsep_real forecast_step;             /* m, and largest change of the command, */
+    hsep_word settled;                   /* whether a predictor has taken early_step, */
+    hsep_real early_step;                /* m, the same before the last command of the window came */
     hsep_real bound;                     /* m, on what is predicted, */
     hsep_real growth;                    /* how much larger the command's bound may be, as its largest step is */
     hsep_word predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     /* Of the window that is measured */
-    hsep_word followed;   /* samples that were judged and, as far as they are believed, learned */
-    hsep_word known;      /* samples up to the last one that is believed */
-    hsep_real n_accepted; /* samples that are */
+    hsep_word followed;     /* samples that were judged and, as far as they are believed, learned */
+    hsep_word known;        /* samples up to the last one that is believed */
+    hsep_real n_accepted;   /* samples that are */
+    hsep_real early_square; /* m2, largest mean square of the command's residual, before the last sample; 0: none yet */
     /* Offsets in words from the beginning of the struct */
     hsep_word forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
     hsep_word x;                /* (n,) m, position */
@@ -78,7 +88,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    32 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    35 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
@@ -112,9 +122,15 @@ HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
 /* The solution of an expert; NULL where no rows train it. */
 HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert);
 
-/* Begin the solutions from the rows so far, with variances of the noise as they are known then. scales:
- * (HSEP_N_RESIDUALS,) of the residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_LAGGED on. */
-HSEP_API void hsep_trusted_begin_solutions(
+/* The same, which begins now if it has not yet. */
+HSEP_API hsep_solution *hsep_trusted_begun(hsep_trusted *self, hsep_word expert);
+
+/* Prior standard deviations of the weights of an expert's features without lags, at most HSEP_TRUSTED_MOST. */
+HSEP_API void hsep_trusted_priors(hsep_trusted *self, hsep_word expert, hsep_real scales[]);
+
+/* Prepare the solutions, with variances of the noise as they are known now. scales: (HSEP_N_RESIDUALS,) of the
+ * residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_LAGGED on. */
+HSEP_API void hsep_trusted_prepare_solutions(
     hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
@@ -132,6 +148,10 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
     hsep_real e[], hsep_word last);
+
+/* Complete the solutions of the command's expert, one sample before a window that a predictor begins: peak is the
+ * largest change of its commands, m, as far as they are known. */
+HSEP_API void hsep_trusted_settle(hsep_trusted *self, hsep_real peak);
 
 /* Predict samples first ... last - 1, too, where the last call ended; apart: as hsep_expert_predict's. */
 HSEP_API void hsep_trusted_go_on(

@@ -4,11 +4,7 @@
 #include "hsep_math.h"
 #include "hsep_range.h"
 
-#include <stddef.h>
-
-/* Features without lags of an expert, at most. */
-#define TRUSTED_OF_COMMAND (HSEP_TRUST_LAGS_OF_COMMAND + 2)
-#define TRUSTED_MOST (TRUSTED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? TRUSTED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
+#include <string.h>
 
 /* Take the scales of velocity and command; return whether the commanded velocity outgrows what was learned. A
  * compensator begins to move before the path, with a creep: its first scale is the path's. */
@@ -52,25 +48,40 @@ static int trusted_scale(
     return outgrown;
 }
 
-/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
-static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
+/* Whether the scales of the command's expert are those of one sample before the window: not where nothing has moved
+ * before its last command. */
+static int trusted_is_early(const hsep_trusted *self)
 {
-    const hsep_word kind = hsep_trusted_kind_of(self, place);
-    hsep_evidence *evidence = hsep_trusted_evidence(self, kind);
-    const hsep_real n_rows = hsep_evidence_of_run(evidence)->n_rows + weight * hsep_evidence_earlier(evidence)->n_rows;
-    const hsep_real square = self->learned.scales[kind].largest_square;
+    return self->settled && self->early_square > 0.0 && (self->early_step > 0.0 || self->forecast_step == 0.0);
+}
+
+HSEP_API void hsep_trusted_priors(hsep_trusted *self, hsep_word expert, hsep_real scales[])
+{
+    const hsep_word kind = hsep_trusted_kind_of(self, expert);
+    const int of_command = kind == HSEP_OF_COMMAND, is_early = of_command && trusted_is_early(self);
+    const hsep_real square = is_early ? self->early_square : self->learned.scales[kind].largest_square;
+    const hsep_real step = is_early ? self->early_step : self->forecast_step;
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
-    hsep_expert *expert = hsep_trusted_expert(self, place);
-    hsep_real scales[TRUSTED_MOST];
-    for (hsep_word i = 0; i < expert->n_static; i++) {
-        const int of_command = kind == HSEP_OF_COMMAND;
+    for (hsep_word i = 0; i < hsep_trusted_expert(self, expert)->n_static; i++) {
         const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];
-        const hsep_real largest = !of_command ? of_motion : i > 0 ? self->forecast_step : 1.0;
+        const hsep_real largest = !of_command ? of_motion : i > 0 ? step : 1.0;
         const hsep_real share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
                                            : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / hsep_fmax(largest, HSEP_TRUSTED_LEAST);
     }
-    hsep_expert_solve(expert, n_rows, scales);
+}
+
+/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
+static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
+{
+    hsep_evidence *evidence = hsep_trusted_evidence(self, hsep_trusted_kind_of(self, place));
+    const hsep_real n_rows = hsep_evidence_of_run(evidence)->n_rows + weight * hsep_evidence_earlier(evidence)->n_rows;
+    hsep_real scales[HSEP_TRUSTED_MOST];
+    hsep_trusted_priors(self, place, scales);
+    hsep_solution *solution = hsep_trusted_begun(self, place);
+    solution->completed = solution->completed && trusted_is_early(self);
+    /* apart in a predictor: a compensator has more variances to compute */
+    hsep_expert_solve(hsep_trusted_expert(self, place), n_rows, scales, self->settled != 0);
 }
 
 /* Solve for the weights of the experts that know something. */
@@ -200,8 +211,11 @@ HSEP_API void hsep_trusted_forecast(
     self->growth = trusted_growth(self);
     const hsep_real hold = hsep_clip(e[self->n], self->bound);
     trusted_solved(self, outgrown);
-    for (hsep_word i = 0; i < HSEP_N_EXPERTS * self->n; i++) { /* hold, and what knows nothing */
-        hsep_at(self, self->stacked)[i] = i / self->n == HSEP_HOLD ? hold : 0.0;
+    self->settled = 0;
+    hsep_real *stacked = hsep_at(self, self->stacked); /* hold, and what knows nothing */
+    memset(stacked, 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
+    for (hsep_word j = 0; j < self->n; j++) {
+        stacked[HSEP_HOLD * self->n + j] = hold;
     }
     trusted_begin(self, x_d, e + self->n);
     hsep_trusted_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */

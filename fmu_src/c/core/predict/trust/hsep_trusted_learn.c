@@ -1,6 +1,7 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_cholesky.h"
 #include "hsep_math.h"
 
 #include <string.h>
@@ -95,9 +96,9 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
-    for (hsep_word i = HSEP_LAGGED; k >= self->early && i < HSEP_N_EXPERTS; i++) { /* their solutions have begun */
+    for (hsep_word i = HSEP_LAGGED; k >= self->early && i < HSEP_N_EXPERTS; i++) { /* their solutions may have begun */
         hsep_solution *solution = hsep_trusted_solution(self, i);
-        if (hsep_trusted_kind_of(self, i) == kind && solution != NULL) {
+        if (hsep_trusted_kind_of(self, i) == kind && solution != NULL && solution->begun) {
             hsep_solution_row(solution, to, lags[-1]);
         }
     }
@@ -123,8 +124,8 @@ static void trusted_judge_experts(
     }
 }
 
-/* Begin the solutions for the next window with what is known of this one, whose residuals are e, so far. */
-static void trusted_begin_next(hsep_trusted *self, const hsep_real e[])
+/* Prepare the solutions for the next window with what is known of this one, whose residuals are e, so far. */
+static void trusted_prepare_next(hsep_trusted *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_JUDGED];
@@ -133,23 +134,69 @@ static void trusted_begin_next(hsep_trusted *self, const hsep_real e[])
     if (self->n_accepted > 0.0) {
         trusted_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
     }
-    hsep_trusted_begin_solutions(self, scales, errors);
+    hsep_trusted_prepare_solutions(self, scales, errors);
 }
 
-/* Go on with them after sample last - 1: their heads are factored before the last rows come. */
-static void trusted_advance(hsep_trusted *self, hsep_word last)
+/* Take the size of the command's residual before the last sample. */
+static void trusted_size(hsep_trusted *self)
 {
-    const hsep_word left = self->Np - last, of_rows = (self->Np - self->early) / HSEP_TRUSTED_ROWS + 1;
-    hsep_real amount = 0.0;
+    hsep_residual_scale scale = self->learned.scales[HSEP_OF_COMMAND];
+    const hsep_word first = self->Np - self->known; /* those behind are not bridged yet */
+    if (self->n_accepted > 0.0) {
+        const hsep_real *accepted = hsep_at(self, self->accepted) + first, *e_0 = hsep_at(self, self->e_0) + first;
+        hsep_residual_scale_follow(&scale, e_0, accepted, self->known, self->n_accepted);
+    }
+    self->early_square = scale.largest_square;
+}
+
+/* Multiply-adds as which four rows count that are added to the Gram matrices. */
+static hsep_real trusted_of_rows(hsep_trusted *self)
+{
+    hsep_real sum = 0.0;
+    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+        const hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, i));
+        sum += HSEP_TRUSTED_OF_GRAM * hsep_triangle(gram->n + 1);
+    }
+    return sum;
+}
+
+/* Multiply-adds as which the beginning of a solution counts. */
+static hsep_real trusted_of_beginning(const hsep_solution *solution)
+{
+    const hsep_word n = solution->n_head + solution->n_tail;
+    return solution->begun ? 0.0 : HSEP_TRUSTED_OF_BEGINNING * hsep_triangle(n + 1);
+}
+
+/* Multiply-adds that the solutions take after this sample, with as many rows to come. */
+static hsep_real trusted_left(hsep_trusted *self, hsep_word to_come)
+{
+    hsep_real sum = 0.0;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_solution *solution = hsep_trusted_solution(self, i);
-        amount += solution != NULL ? hsep_solution_left(solution) : 0.0;
+        if (solution != NULL) {
+            const hsep_word kind = hsep_trusted_kind_of(self, i);
+            const hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
+            const hsep_word rows = to_come + (solution->begun ? 0 : gram->waiting);
+            sum += trusted_of_beginning(solution) + hsep_solution_left(solution, rows, kind == HSEP_OF_COMMAND);
+        }
     }
-    amount /= left > of_rows + 1 ? (hsep_real)(left - of_rows) : 1.0;
+    return sum;
+}
+
+/* Go on with them after sample last - 1, in equal shares: before the last row comes all others are in their heads. */
+static void trusted_advance(hsep_trusted *self, hsep_word last)
+{
+    const hsep_word left = self->Np - last, to_come = left - 1;
+    const hsep_word waiting = hsep_evidence_of_run(hsep_trusted_evidence(self, HSEP_OF_COMMAND))->waiting;
+    const hsep_word adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
+    const hsep_real of_rows = trusted_of_rows(self), added = waiting == 1 ? of_rows : 0.0; /* in this sample */
+    const hsep_real all = added + of_rows * (hsep_real)adds + trusted_left(self, to_come);
+    hsep_real amount = all / (hsep_real)left - added;
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         hsep_solution *solution = hsep_trusted_solution(self, i);
-        if (solution != NULL) {
-            amount = hsep_solution_advance(solution, amount, left == 1);
+        if (solution != NULL && (amount > 0.0 || left == 1)) {
+            amount -= trusted_of_beginning(solution);
+            amount = hsep_solution_advance(hsep_trusted_begun(self, i), amount, left == 1);
         }
     }
 }
@@ -189,7 +236,10 @@ static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hs
         trusted_believe(self, k, x_pb, e, measured, fold);
     }
     if (fold && self->followed == self->early) {
-        trusted_begin_next(self, e);
+        trusted_prepare_next(self, e);
+    }
+    if (fold && self->followed + 1 == self->Np) {
+        trusted_size(self);
     }
 }
 
@@ -205,6 +255,26 @@ HSEP_API void hsep_trusted_follow(
     }
     if (begun && last < self->Np) {
         trusted_advance(self, last);
+    }
+}
+
+HSEP_API void hsep_trusted_settle(hsep_trusted *self, hsep_real peak)
+{
+    const hsep_real step = peak / self->T_s * self->T_s; /* as that of the window is computed */
+    self->early_step = hsep_fmax(hsep_fmax(self->learned.largest_step, self->forecast_step), step);
+    self->settled = 1;
+    if (self->followed + 1 != self->Np || !(self->early_square > 0.0)) {
+        return;
+    }
+    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        hsep_solution *solution = hsep_trusted_solution(self, i);
+        hsep_real scales[HSEP_TRUSTED_MOST];
+        if (solution != NULL && hsep_trusted_kind_of(self, i) == HSEP_OF_COMMAND &&
+            hsep_trusted_expert(self, i)->variance > 0.0) {
+            (void)hsep_trusted_begun(self, i);
+            hsep_trusted_priors(self, i, scales);
+            hsep_expert_complete(hsep_trusted_expert(self, i), scales);
+        }
     }
 }
 
@@ -256,7 +326,7 @@ static void trusted_judge(hsep_trusted *self, const hsep_real e[])
         errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
         errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
         hsep_stack_init(&learned->stack);
-        hsep_trusted_begin_solutions(self, learned->scales, errors);
+        hsep_trusted_prepare_solutions(self, learned->scales, errors);
     }
 }
 

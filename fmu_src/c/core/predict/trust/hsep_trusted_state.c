@@ -23,12 +23,12 @@ HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expe
 
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, hsep_word expert)
 {
+    const hsep_word room = self->Np - self->early + HSEP_GRAM_TOGETHER;
     if (hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND) {
-        return (hsep_expert_shape){
-            self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, self->Np - self->early};
+        return (hsep_expert_shape){self->Np, self->n, HSEP_TRUST_LAGS_OF_COMMAND + 2, HSEP_TRUST_LAGS_OF_COMMAND, room};
     }
     const hsep_word p = expert == HSEP_STATIC ? 0 : self->p;
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, self->Np - self->early};
+    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, room};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
@@ -109,7 +109,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
     hsep_trusted got;
     int sound = HSEP_LAID_OUT(got, block, trusted_lay_out(&got, parameters)) &&
                 (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 &&
+                got.known <= got.followed && got.reach.known <= 1 && got.settled <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -134,19 +134,29 @@ HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expe
     return trained ? hsep_expert_solution(hsep_trusted_expert(self, expert)) : NULL;
 }
 
-HSEP_API void hsep_trusted_begin_solutions(
+/* Weight of the rows of earlier runs for an expert. */
+static hsep_real trusted_weight(hsep_word expert) { return expert == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0; }
+
+HSEP_API hsep_solution *hsep_trusted_begun(hsep_trusted *self, hsep_word expert)
+{
+    hsep_solution *solution = hsep_trusted_solution(self, expert);
+    if (solution != NULL && !solution->begun) {
+        hsep_evidence *evidence = hsep_trusted_evidence(self, hsep_trusted_kind_of(self, expert));
+        hsep_expert_begin_solution(hsep_trusted_expert(self, expert), evidence, trusted_weight(expert));
+    }
+    return solution;
+}
+
+HSEP_API void hsep_trusted_prepare_solutions(
     hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[])
 {
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-        hsep_gram_settle(hsep_evidence_of_run(hsep_trusted_evidence(self, i)));
-    }
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_word kind = hsep_trusted_kind_of(self, i);
-        const hsep_real square = scales[kind].largest_square, weight = i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0;
+        const hsep_real square = scales[kind].largest_square, weight = trusted_weight(i);
         const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square;
         const hsep_real least = hsep_fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square);
         if (hsep_trusted_solution(self, i) != NULL) {
-            hsep_expert_begin_solution(
+            hsep_expert_prepare(
                 hsep_trusted_expert(self, i), hsep_trusted_evidence(self, kind), weight, &errors[i - HSEP_LAGGED],
                 first, least);
         }
@@ -182,14 +192,16 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
     self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
+    self->settled = 0;
+    self->early_square = 0.0;
     hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         *doubting = learned->errors[self->leading - HSEP_LAGGED];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);
     }
-    hsep_trusted_begin_solutions(self, learned->scales, learned->errors);
+    hsep_trusted_prepare_solutions(self, learned->scales, learned->errors);
     for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        hsep_solution *solution = hsep_trusted_solution(self, i);
+        hsep_solution *solution = hsep_trusted_begun(self, i);
         if (solution != NULL) {
             (void)hsep_solution_advance(solution, INFINITY, 0);
         }
