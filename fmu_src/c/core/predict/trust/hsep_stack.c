@@ -82,7 +82,7 @@ static hsep_real stack_try(
 static void stack_minimise(
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], hsep_real weights[HSEP_N_EXPERTS])
 {
-    hsep_real least = 0.0, tried[HSEP_N_EXPERTS];
+    hsep_real least = 0.0, tried[HSEP_N_EXPERTS] = {0.0};
     memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
     for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
         int support[HSEP_N_EXPERTS], n = 0;
