@@ -66,9 +66,9 @@ def test_outputs_are_the_same_to_the_bit(target: str, kind: str, tmp_path: Path)
     assert there.counts.min() > 0
     median = np.median(there.counts)
     if kind == "predictor":  # its work is even, but a window's last sample has more of it, which was counted
-        assert there.counts[case.Np - 1 :: case.Np].max() > 1.2 * median
+        assert there.counts[case.Np - 1 :: case.Np].max() > 1.5 * median
     else:
-        assert there.counts.max() > 2.0 * median
+        assert there.counts.max() > 2.5 * median
 
 
 @pytest.mark.parametrize("target", ["m7", "m7-picolibc", "m4f"])

@@ -203,13 +203,17 @@ static void predictor_go_on(hsep_predictor *self)
 /* Solve ahead of the next window, all of whose commands but the last are known. */
 static void predictor_settle(hsep_predictor *self)
 {
+    hsep_trusted *trusted = hsep_residual_trusted(hsep_predictor_model(self));
     const hsep_real *ahead = hsep_at(self, self->ahead);
     hsep_real before = hsep_at(self, self->x_d)[self->Np - 1], peak = 0.0;
+    if (trusted == NULL) {
+        return;
+    }
     for (hsep_word i = 0; i + 1 < self->Np; i++) {
         peak = hsep_fmax(peak, hsep_fabs(ahead[i] - before));
         before = ahead[i];
     }
-    hsep_residual_settle(hsep_predictor_model(self), peak);
+    hsep_trusted_settle(trusted, peak);
 }
 
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)

@@ -167,13 +167,6 @@ HSEP_API void hsep_residual_take_in(
     }
 }
 
-HSEP_API void hsep_residual_settle(hsep_residual_model *self, hsep_real peak)
-{
-    if (self->trusted) {
-        hsep_trusted_settle(hsep_residual_trusted(self), peak);
-    }
-}
-
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window)
 {
     const hsep_word late = self->late;

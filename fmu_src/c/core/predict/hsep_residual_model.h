@@ -69,10 +69,6 @@ HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self);
 HSEP_API void hsep_residual_take_in(
     hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample);
 
-/* Complete what can be solved one sample before a window that a predictor begins: peak is the largest change of its
- * commands, m, as far as they are known. */
-HSEP_API void hsep_residual_settle(hsep_residual_model *self, hsep_real peak);
-
 /* Finish a window: learn what was not learned sample by sample; window->e becomes its residuals as they are to be
  * continued from. Return whether it was learned. A first fill that was predicted is not, but is what comes before. */
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window);

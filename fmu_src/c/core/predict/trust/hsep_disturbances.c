@@ -157,7 +157,7 @@ static void disturbances_friction(
     hsep_disturbances *self, const hsep_real v_d[], hsep_word n, hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
-    memset(u, 0, HSEP_PHYSICS_ABREAST * n * sizeof *u); /* what is beyond them is computed, too */
+    memset(u, 0, HSEP_PHYSICS_ABREAST * n * sizeof *u); /* places without a disturbance are filtered, too */
     for (hsep_word first = 0; first < HSEP_DISTURBANCES_N_FRICTION; first += HSEP_PHYSICS_ABREAST) {
         const hsep_word left = HSEP_DISTURBANCES_N_FRICTION - first;
         const hsep_word count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
@@ -220,7 +220,7 @@ HSEP_API void hsep_disturbances_motion(
     const hsep_real s = hsep_sin(hsep_disturbances_angle(self, 0.0)), c = hsep_cos(hsep_disturbances_angle(self, 0.0));
     hsep_real disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     const hsep_word most = last - first < DISTURBANCES_TOGETHER ? last - first : DISTURBANCES_TOGETHER;
-    memset(disturbances, 0, HSEP_PHYSICS_ABREAST * most * sizeof *disturbances); /* as above */
+    memset(disturbances, 0, HSEP_PHYSICS_ABREAST * most * sizeof *disturbances); /* as with friction */
     if (first == 0) {
         disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
     }
