@@ -1,12 +1,15 @@
-"""Deferral of Ctrl-C to the end of an FMI call, at most one step.
+"""Deferral of Ctrl-C to the end of an FMI call, at most one step, or of the import of a library.
 
 Inside a pythonfmu FMU an exception becomes ``fmi2Fatal``, inside a callback it is lost, and fmpy would leave the
-working directory changed. A second Ctrl-C does not wait.
+working directory changed; a second Ctrl-C does not wait. While a library is imported, one Ctrl-C in a hundred is
+lost, becomes another exception or ends Python: importlib has callbacks, and extension modules raise their own.
 """
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -52,7 +55,7 @@ def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
 
 @contextmanager
 def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> Iterator[None]:
-    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function.
+    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function or of an import.
 
     Does nothing outside the main thread, or where Ctrl-C is handled in another way already.
     """
@@ -60,18 +63,46 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
+    imports_outside = _imports(sys._getframe())
+    raised = False
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if _calls.depth == 0 or _calls.pending is not None:
-            _calls.pending = None
+        nonlocal raised
+        if _calls.depth == 0 and _imports(frame) > imports_outside:
+            threading.Timer(0.01, _send).start()
+        elif _calls.depth == 0 or _calls.pending is not None:
+            _calls.pending, raised = None, True
             raise stop
-        _calls.pending = stop
+        else:
+            _calls.pending = stop
 
     signal.signal(signal.SIGINT, interrupt)
     try:
         yield
+    except Exception as error:
+        if raised:  # an extension module has made another exception of it
+            raise stop from error
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _imports(frame: FrameType | None) -> int:
+    """Return how many frames of the import system a frame is called from, itself included."""
+    n = 0
+    while frame is not None:
+        n += frame.f_code.co_filename == "<frozen importlib._bootstrap>"
+        frame = frame.f_back
+    return n
+
+
+def _send() -> None:
+    """Send Ctrl-C to the main thread, also if it waits for something."""
+    main_thread = threading.main_thread().ident
+    if sys.platform == "win32" or main_thread is None:
+        _thread.interrupt_main()
+    else:
+        signal.pthread_kill(main_thread, signal.SIGINT)
 
 
 @contextmanager

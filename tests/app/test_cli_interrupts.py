@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -228,3 +229,50 @@ def test_a_call_ends_before_ctrl_c_is_raised() -> None:
     with interrupts_between_calls():
         uninterrupted(steps.clear)()
     assert steps == []
+
+
+@POSIX
+def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before 3.12 Python makes a RuntimeError of an exception in __set_name__, as matplotlib has it."""
+    (tmp_path / "imported.py").write_text(
+        "import signal\n"
+        "class Name:\n"
+        "    def __set_name__(self, *_):\n"
+        "        signal.raise_signal(signal.SIGINT)\n"
+        "class Named:\n"
+        "    name = Name()\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    imported, begun = [], time.monotonic()
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
+        imported.append(import_module("imported").Named)
+        time.sleep(60.0)
+    assert imported
+    assert time.monotonic() < begun + 50.0
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@POSIX
+def test_ctrl_c_of_which_a_library_makes_another_exception() -> None:
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise TypeError("incompatible function arguments") from None
+    with pytest.raises(TypeError), interrupts_between_calls():
+        raise TypeError("incompatible function arguments")
+
+
+@POSIX
+def test_ctrl_c_does_not_wait_for_an_import_that_began_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A script that is imported runs the co-simulation."""
+    (tmp_path / "script.py").write_text(
+        "import signal\n"
+        "from hybridsep.base.interrupt import interrupts_between_calls\n"
+        "with interrupts_between_calls():\n"
+        "    signal.raise_signal(signal.SIGINT)\n"
+        "    raise AssertionError('not reached')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        import_module("script")
