@@ -21,6 +21,15 @@ from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.records import leaves
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
+from hybridsep.compensate import (
+    constraints,
+    interior,
+    linearised,
+    paper_planning,
+    splines,
+    trusted_plan,
+    trusted_planning,
+)
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict import uncertainty
@@ -30,9 +39,12 @@ from hybridsep.predict.trust.constants import CONSTANTS
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_settings.h"
 CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_predict_constants.h"
+PLAN_CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "compensate" / "hsep_plan_constants.h"
 RANGES_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_ranges.h"
 
-DECLARED = {
+Declared = Mapping[str, list[ModuleType]]
+
+PREDICTIONS: Declared = {
     "uncertainty": [uncertainty],
     "start": [start],
     "stack": [stack],
@@ -41,6 +53,17 @@ DECLARED = {
     "trusted": [state, forecast, learn],
 }
 """Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
+
+PLANS: Declared = {
+    "splines": [splines],
+    "constraints": [constraints],
+    "interior": [interior],
+    "linearised": [linearised],
+    "paper_planning": [paper_planning],
+    "trusted_planning": [trusted_planning],
+    "trusted_plan": [trusted_plan],
+}
+"""The same of plans."""
 
 PLACES = (
     "HOLD",
@@ -53,10 +76,11 @@ PLACES = (
     "OF_PHYSICS",
     "OF_COMMAND",
     "N_RESIDUALS",
+    "N_DECIDED",
 )
 """Constants without a prefix in C."""
 
-OF_LIBRARY = ("_OWN_MAX", "_LEAST_SHARE", "_MOST_SHARE")
+OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE")
 """Constants of these modules that C has not."""
 
 
@@ -66,6 +90,7 @@ def generated() -> dict[Path, str]:
         SETTINGS_HEADER: settings_header(),
         RANGES_HEADER: ranges_header(),
         CONSTANTS_HEADER: constants_header(),
+        PLAN_CONSTANTS_HEADER: plan_constants_header(),
     }
     return headers | pages()
 
@@ -127,8 +152,41 @@ def ranges_header() -> str:
 
 def constants_header() -> str:
     """Return the C header of the constants of predictions, which the library declares with their reasons."""
+    defines = _defines(PREDICTIONS)
+    trust = [f"#define HSEP_TRUST_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
+    defines.append("\n".join(["/* hybridsep/predict/trust/constants.py */", *trust]))
+    settings = PredictorSettings(period=1.0)
+    trusted = state.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
+    records = {"LEARNED": trusted.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
+    ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
+    defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
+    return _constants("HSEP_PREDICT_CONSTANTS_H", "predictions and their errors", defines)
+
+
+def plan_constants_header() -> str:
+    """Return the C header of the constants of plans, which the library declares with their reasons."""
+    return _constants("HSEP_PLAN_CONSTANTS_H", "plans", _defines(PLANS))
+
+
+def _constants(guard: str, what: str, defines: list[str]) -> str:
+    """Return a C header of constants."""
+    body = "\n\n".join(defines)
+    return f"""/* Constants of {what}, generated: what each means, and why, is in its file. */
+#ifndef {guard}
+#define {guard}
+
+/* clang-format off */
+{body}
+/* clang-format on */
+
+#endif
+"""
+
+
+def _defines(declared: Declared) -> list[str]:
+    """Return the macros of each prefix's modules."""
     defines = []
-    for prefix, modules in DECLARED.items():
+    for prefix, modules in declared.items():
         files = ", ".join(f"{module.__name__.replace('.', '/')}.py" for module in modules)
         rows = [
             f"#define HSEP_{'' if name in PLACES else f'{prefix.upper()}_'}{name.lstrip('_')} "
@@ -137,24 +195,7 @@ def constants_header() -> str:
             for name in _declared(module)
         ]
         defines.append("\n".join([f"/* {files} */", *rows]))
-    trust = [f"#define HSEP_TRUST_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
-    defines.append("\n".join(["/* hybridsep/predict/trust/constants.py */", *trust]))
-    settings = PredictorSettings(period=1.0)
-    trusted = state.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
-    records = {"LEARNED": trusted.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
-    ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
-    defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
-    body = "\n\n".join(defines)
-    return f"""/* Constants of predictions and their errors, generated: what each means, and why, is in its file. */
-#ifndef HSEP_PREDICT_CONSTANTS_H
-#define HSEP_PREDICT_CONSTANTS_H
-
-/* clang-format off */
-{body}
-/* clang-format on */
-
-#endif
-"""
+    return defines
 
 
 def _declared(module: ModuleType) -> list[str]:

@@ -14,13 +14,14 @@ from .planning import ChosenPlan, Planning, Preview, PublishedPosition
 
 __all__ = ["PaperPlanning", "has_stable_poles"]
 
+_PINNED = 8
+"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
+
 
 class PaperPlanning(Planning):
     """Plans with the paper's model."""
 
-    PINNED: ClassVar[int] = 8
-    """Real-time solvers take 3 steps in each."""
-
+    PINNED: ClassVar[int] = _PINNED
     ALWAYS: ClassVar[bool] = False
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:

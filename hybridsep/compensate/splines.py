@@ -27,6 +27,9 @@ N_DECIDED = 3
 _END = 3
 """Samples without change at the end of a plan, so that the third difference is zero after it."""
 
+_RIDGE = 1e-12
+"""Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""
+
 
 @dataclass(frozen=True)
 class PlanCost:
@@ -42,17 +45,15 @@ class PlanCost:
     v: Array
 
     @classmethod
-    def regular(cls, P: Array, v: Array, ridge: float = 1e-12) -> PlanCost:
-        """Return the cost with ``P``, which is changed, made positive definite by ``ridge``.
+    def regular(cls, P: Array, v: Array) -> PlanCost:
+        """Return the cost with ``P``, which is changed, made positive definite.
 
         Parameters
         ----------
         P : (n, n) array
         v : (n,) array, m
-        ridge : float
-            Added to the diagonal, relative to its largest entry.
         """
-        P[np.diag_indices_from(P)] += ridge * np.max(np.diag(P))
+        P[np.diag_indices_from(P)] += _RIDGE * np.max(np.diag(P))
         return cls(P, v)
 
     def without(self, pinned: Array) -> PlanCost:

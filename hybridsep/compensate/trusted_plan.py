@@ -23,14 +23,18 @@ from .splines import N_DECIDED, PlanCost, SplineBasis
 
 __all__ = ["TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
 
-TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
+_SOLVED = (5, 5, 3, 3)
+"""Solver steps at most, of the physics model's plan and of the programme of each Newton step: from the second one on a
+bounded one begins where the last one ended."""
+
+TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, _SOLVED[0])
 """Of the solver: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
 small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
 within the bounds."""
 
-_STEPS = ((0.1, 5), (0.01, 3), (0.0, 3))
-"""Of each Newton step the reach of friction's slope, relative to the model's velocity scale, and the solver's steps. A
-tangent is blind to a sign that changes nearby. A bounded programme that follows one begins where that ended."""
+_REACHES = (0.1, 0.01, 0.0)
+"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+that changes nearby."""
 
 _LENGTHS = (1.0, 0.3)
 """Lengths of a step that are tried, relative to the way to the minimum."""
@@ -120,7 +124,7 @@ class TrustedPlanner:
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         here, last = self._point(rest, self._model.of_rest), None
-        for reach, steps in _STEPS:
+        for reach, steps in zip(_REACHES, _SOLVED[1:], strict=True):
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
             P = W.T @ W + self._jerk_weight * (third.T @ third)

@@ -21,13 +21,15 @@ from .trusted_plan import TOLERANCE, TrustedPlanner, is_better, runs_away
 
 __all__ = ["TrustedPlanning"]
 
+_PINNED = 24
+"""Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
+model."""
+
 
 class TrustedPlanning(Planning):
     """Plans with the trusted model, which watches itself."""
 
-    PINNED: ClassVar[int] = 24
-    """Every plan follows the last plan in these samples, as it takes more work than a plan on the paper's model."""
-
+    PINNED: ClassVar[int] = _PINNED
     ALWAYS: ClassVar[bool] = True
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:

@@ -136,7 +136,7 @@ void prove_constraints(void)
         .jerk_weight = 1.0,
         .limit = {1e-3, 1e-4, 1e-5, 1e-5},
         .no_reversal = 1,
-        .pinned = HSEP_PINNED};
+        .pinned = HSEP_PAPER_PLANNING_PINNED};
     static double x_d[PREVIEW - SHORT], from[HSEP_ORDERS * PREVIEW], way[HSEP_ORDERS * PREVIEW];
     double least, most;
     hsep_planner *planner = (hsep_planner *)plan;

@@ -6,9 +6,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* A plan starts from the last one: what is far from the minimum would let differences of rounding grow. */
-static const hsep_tolerance compensator_tolerance = {
-    .mu = 1e-15, .dual_residual = 1e-9, .margin = 1e-11, .steps = HSEP_INTERIOR_STEPS};
+static const hsep_tolerance compensator_exact = {HSEP_INTERIOR_EXACT};
 
 static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
@@ -190,7 +188,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
     const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self), 0)
-                                        ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance)
+                                        ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_exact)
                                         : HSEP_PLAN_FAILED;
     self->state = (hsep_word)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;

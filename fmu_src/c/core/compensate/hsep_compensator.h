@@ -4,8 +4,9 @@
  * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs belong to k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
- * while the command follows the last plan. With trust every plan is solved so, over HSEP_PINNED_WITH_TRUST samples:
- * each of these does an equal share of the work that may be left, counted in multiply-adds (hsep_trusted_planner_left).
+ * while the command follows the last plan. With trust every plan is solved so, over HSEP_TRUSTED_PLANNING_PINNED
+ * samples: each of these does an equal share of the work that may be left, counted in multiply-adds
+ * (hsep_trusted_planner_left).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
  * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms

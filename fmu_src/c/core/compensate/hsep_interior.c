@@ -8,8 +8,6 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
-
 /* The arrays behind the struct. */
 typedef struct {
     hsep_word n;         /* entries of x */
@@ -102,8 +100,8 @@ static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
 
-/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, rounding in
- * it would outgrow P. */
+/* The proximal term that bounds A' W A by P / HSEP_INTERIOR_REGULARISATION: where active bounds hardly differ, rounding
+ * in it would outgrow P. */
 static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_word n)
 {
     hsep_real largest = 0.0;
@@ -111,7 +109,7 @@ static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real 
         largest = hsep_fmax(largest, P[0]);
         P += n - i;
     }
-    return interior_regularisation * hsep_splines_energy(splines) / largest;
+    return HSEP_INTERIOR_REGULARISATION * hsep_splines_energy(splines) / largest;
 }
 
 /* Start at x, with or without the multipliers that are there. */

@@ -20,8 +20,7 @@ typedef struct {
     hsep_word steps;         /* at most */
 } hsep_tolerance;
 
-#define HSEP_INTERIOR_STEPS 24 /* the most of any tolerance */
-#define HSEP_INTERIOR_PARTS 4  /* of a step */
+#define HSEP_INTERIOR_PARTS 4 /* of a step */
 
 typedef struct {
     hsep_tolerance tolerance;

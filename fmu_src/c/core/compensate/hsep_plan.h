@@ -34,7 +34,7 @@ static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_word k)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_DECIDED + splines->n, k);
+    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_N_DECIDED + splines->n, k);
 }
 
 #endif

@@ -7,8 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
-
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
 HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
@@ -27,7 +25,7 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
-    self->c = hsep_take(&end, HSEP_DECIDED + (hsep_real)n);
+    self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
     self->moves = hsep_take(&end, preview);
     self->third = hsep_take(&end, preview);
@@ -76,7 +74,7 @@ HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self)
 
 HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k)
 {
-    return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
+    return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_N_DECIDED, k);
 }
 
 /* The third differences of the first count splines of delta. */
@@ -108,7 +106,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
-    planner_third(self, HSEP_DECIDED);
+    planner_third(self, HSEP_N_DECIDED);
     hsep_constraints_total(self, x_d);
 }
 
@@ -117,7 +115,7 @@ HSEP_API void hsep_planner_let_turn(hsep_planner *self)
     memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_planner_decide_pinned(hsep_planner *self) { planner_third(self, HSEP_DECIDED + self->n_pinned); }
+HSEP_API void hsep_planner_decide_pinned(hsep_planner *self) { planner_third(self, HSEP_N_DECIDED + self->n_pinned); }
 
 HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first)
 {
@@ -131,7 +129,7 @@ HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first)
     }
     place = 0;
     for (hsep_word i = 0; i < n; i++) {
-        P[place] += planner_ridge * largest;
+        P[place] += HSEP_SPLINES_RIDGE * largest;
         place += n - i;
     }
 }
@@ -150,7 +148,7 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
 HSEP_API void hsep_planner_pin(hsep_planner *self)
 {
     const hsep_word n = hsep_planner_splines(self)->n, first = self->n_pinned;
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_at(self, self->P);
     hsep_real *v = hsep_planner_linear(self);
     /* v := v_2 - P_21 pinned */
     for (hsep_word i = 0; i < first; i++) {
@@ -170,7 +168,7 @@ static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_word first = self->n_pinned, preview = splines->preview;
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED, *total = hsep_at(self, self->total);
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *total = hsep_at(self, self->total);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
@@ -181,7 +179,7 @@ static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real
         low[r] = least - other + margin;
         high[r] = most - other - margin;
     }
-    memcpy(problem.x, start + HSEP_DECIDED + first, (size_t)(splines->n - first) * sizeof(hsep_real));
+    memcpy(problem.x, start + HSEP_N_DECIDED + first, (size_t)(splines->n - first) * sizeof(hsep_real));
 }
 
 HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
@@ -196,7 +194,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_word first = pinned ? self->n_pinned : 0, n = splines->n - first;
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + first;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + first;
     const hsep_real *row = hsep_planner_quadratic(self, first), *factor = hsep_at(self, self->factor);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
@@ -260,7 +258,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     }
     const hsep_problem problem = hsep_interior_problem(interior, splines);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high;
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + self->n_pinned;
     const hsep_real *inner = problem.inner != NULL ? problem.inner : rest;
     const hsep_word n = splines->n - self->n_pinned;
     hsep_real finite = 0.0;
@@ -292,7 +290,7 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
         self->delta_before[2] = hsep_planner_delta(self, k);
         self->x_d_before[2] = x_d[k];
     }
-    const hsep_word kept = self->Np / splines->spacing, n = HSEP_DECIDED + splines->n;
+    const hsep_word kept = self->Np / splines->spacing, n = HSEP_N_DECIDED + splines->n;
     for (hsep_word i = 0; i < n; i++) {
         c[i] = i + kept < n ? c[i + kept] : 0.0;
     }

@@ -17,11 +17,6 @@
 #include "hsep_real.h"
 #include "hsep_splines.h"
 
-/* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
- * takes more work. */
-#define HSEP_PINNED 8
-#define HSEP_PINNED_WITH_TRUST 24
-
 typedef struct {
     hsep_word Np;                 /* samples of a window */
     hsep_word preview;            /* samples of a plan, at least Np + 4 spacing + 3 */
@@ -29,7 +24,7 @@ typedef struct {
     hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
-    hsep_word pinned;             /* samples that follow the last plan: HSEP_PINNED or _WITH_TRUST, or Np / 2 if less */
+    hsep_word pinned;             /* samples that follow the last plan, or Np / 2 if less */
 } hsep_planner_parameters;
 
 typedef enum {

@@ -16,7 +16,7 @@ static hsep_word splines_length(const hsep_splines *self, unsigned order) { retu
 
 HSEP_API hsep_word hsep_splines_count(hsep_word preview, hsep_word spacing)
 {
-    return (preview - 4 * spacing - HSEP_DECIDED) / spacing + 1;
+    return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -91,8 +91,8 @@ HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[
     const hsep_real *b = hsep_splines_shape(self);
     const hsep_word place = k / self->spacing, within = k % self->spacing;
     hsep_real sum = 0.0;
-    for (hsep_word i = 0; i <= HSEP_DECIDED && place + i < count; i++) {
-        sum += c[place + i] * b[within + (HSEP_DECIDED - i) * self->spacing];
+    for (hsep_word i = 0; i <= HSEP_N_DECIDED && place + i < count; i++) {
+        sum += c[place + i] * b[within + (HSEP_N_DECIDED - i) * self->spacing];
     }
     return sum;
 }
@@ -106,7 +106,7 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_w
     memset(delta, 0, (size_t)k * sizeof(hsep_real));
     for (hsep_word place = 0; k < self->preview; place++) { /* between two knots */
         const hsep_word end = k + spacing < self->preview ? k + spacing : self->preview;
-        if (place >= HSEP_DECIDED && place < count) {
+        if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
             for (const hsep_real *at = b; k < end; k++, at++) {
                 delta[k] = ((c0 * at[0] + c1 * at[spacing]) + c2 * at[2 * spacing]) + c3 * at[3 * spacing];
@@ -114,7 +114,7 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_w
         }
         for (hsep_word within = 0; k < end; k++, within++) { /* not all four are there */
             delta[k] = 0.0;
-            for (hsep_word i = 0; i <= HSEP_DECIDED && i <= place; i++) {
+            for (hsep_word i = 0; i <= HSEP_N_DECIDED && i <= place; i++) {
                 if (place - i < count) {
                     delta[k] += c[place - i] * b[within + i * spacing];
                 }

@@ -12,10 +12,10 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
+#include "hsep_plan_constants.h"
 #include "hsep_real.h"
 
-#define HSEP_ORDERS 4  /* orders of difference: 0, the change itself, to 3, its jerk */
-#define HSEP_DECIDED 3 /* splines that began before a plan and still act in it */
+#define HSEP_ORDERS 4 /* orders of difference: 0, the change itself, to 3, its jerk */
 
 typedef struct {
     hsep_word preview, spacing;

@@ -7,50 +7,30 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
- * that changes nearby. */
-static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.01, 0.0};
+static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {HSEP_TRUSTED_PLAN_REACHES};
+static const hsep_real trusted_planner_lengths[HSEP_TRUSTED_TRIES] = {HSEP_TRUSTED_PLAN_LENGTHS};
+static const hsep_word trusted_planner_solved[1 + HSEP_TRUSTED_STEPS] = {HSEP_TRUSTED_PLAN_SOLVED};
 
-/* Length of a step after one that did not lower the cost. */
-static const hsep_real trusted_planner_shorter = 0.3;
-
-/* Where the solver ends: a plan is judged by the model itself. With a margin as small as rounding an end that exceeds a
- * bound by a millionth would be no plan; with a larger one there may be none within the bounds. In single precision
- * rounding leaves up to 2e-4 of a bound of third differences. */
-static const hsep_real trusted_planner_mu = 1e-4, trusted_planner_dual_residual = 1e-2;
-#ifdef HSEP_FLOAT32
-static const hsep_real trusted_planner_margin = 1e-4F;
-#else
-static const hsep_real trusted_planner_margin = 1e-5;
-#endif
-static const hsep_word trusted_planner_solved[1 + HSEP_TRUSTED_STEPS] = HSEP_TRUSTED_SOLVED;
-
-static hsep_tolerance trusted_planner_tolerance(hsep_word steps)
+/* Where the solver ends. In single precision rounding leaves up to 2e-4 of a bound of third differences. */
+static hsep_tolerance trusted_planner_tolerance(hsep_word programme)
 {
-    return (hsep_tolerance){
-        .mu = trusted_planner_mu,
-        .dual_residual = trusted_planner_dual_residual,
-        .margin = trusted_planner_margin,
-        .steps = steps};
+    hsep_tolerance tolerance = {HSEP_TRUSTED_PLAN_TOLERANCE};
+#ifdef HSEP_FLOAT32
+    tolerance.margin = 1e-4F;
+#endif
+    tolerance.steps = trusted_planner_solved[programme];
+    return tolerance;
 }
-
-/* Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
- * rounding tells apart are equal. */
-static const hsep_real trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
-
-/* A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
- * model's plan by this share of a window, and may leave this RMS error then, relative to the largest change. */
-static const hsep_real trusted_planner_at_bound = 0.97, trusted_planner_bound_share = 0.2, trusted_planner_left = 0.3;
 
 /* Whether a plan costs less than another; not if it is NaN. */
 static int trusted_planner_better(hsep_real cost, hsep_real other)
 {
-    return cost < (1.0 - trusted_planner_least_gain) * other;
+    return cost < (1.0 - HSEP_TRUSTED_PLAN_LEAST_GAIN) * other;
 }
 
 static void trusted_planner_copy(hsep_trusted_planner *self, hsep_real to[], const hsep_real from[])
 {
-    memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(hsep_real));
+    memcpy(to, from, (size_t)(HSEP_N_DECIDED + self->n) * sizeof(hsep_real));
 }
 
 /* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
@@ -76,7 +56,7 @@ static int trusted_planner_predicts(hsep_trusted_planner *self, const hsep_trust
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     if (self->predicted == 0) {
         self->predicted = all / HSEP_TRUSTED_AT_FIRST;
-        trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
+        trusted_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
         hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, self->predicted, 0);
         return 0;
     }
@@ -90,7 +70,7 @@ static hsep_real trusted_planner_cost(
     const hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_real c[])
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_word count = HSEP_DECIDED + self->n;
+    const hsep_word count = HSEP_N_DECIDED + self->n;
     const hsep_real *x_pb = hsep_at_const(self, self->x_pb), *e_h = hsep_at_const(self, self->e_h);
     const hsep_real *before = task->planner->delta_before;
     hsep_real d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
@@ -120,7 +100,7 @@ static void trusted_planner_window(hsep_trusted_planner *self, const hsep_truste
     const hsep_word last = first + (left < HSEP_TRUSTED_VARIED ? left : HSEP_TRUSTED_VARIED);
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     if (first == 0) {
-        trusted_planner_command(self, task, hsep_planner_coefficients(task->planner), HSEP_DECIDED + self->n);
+        trusted_planner_command(self, task, hsep_planner_coefficients(task->planner), HSEP_N_DECIDED + self->n);
         hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, 1);
     } else {
         hsep_trusted_go_on(task->model, x_pb, e_h, first, last, 1);
@@ -151,7 +131,7 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb);
     hsep_real *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
-    trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED);
+    trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED);
     for (hsep_word k = 0; k < self->preview; k++) {
         target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
     }
@@ -170,7 +150,7 @@ static void trusted_planner_aim(hsep_trusted_planner *self, const hsep_trusted_t
 /* Solve it; without one the remainder of the last plan goes on. */
 static void trusted_planner_solve_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_tolerance tolerance = trusted_planner_tolerance(trusted_planner_solved[0]);
+    const hsep_tolerance tolerance = trusted_planner_tolerance(0);
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
     if (status == HSEP_PLAN_DONE) {
         trusted_planner_continue(self, task);
@@ -196,7 +176,7 @@ HSEP_API void hsep_trusted_planner_begin(
     for (hsep_word k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
-    trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
+    trusted_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_word pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->varied = self->late + (pinned > 0 ? pinned : 1);
     hsep_trusted_forecast(
@@ -215,7 +195,7 @@ static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_
 {
     const hsep_word all = self->late + self->preview, window = self->late + self->Np;
     const int is_within = self->varied < window;
-    const hsep_word apart = is_within ? 1 : HSEP_TRUSTED_APART, left = (is_within ? window : all) - self->varied;
+    const hsep_word apart = is_within ? 1 : HSEP_LINEARISED_APART, left = (is_within ? window : all) - self->varied;
     const hsep_word most = apart * HSEP_TRUSTED_VARIED, last = self->varied + (left < most ? left : most);
     hsep_trusted_go_on(task->model, hsep_at(self, self->x_pb), hsep_at(self, self->e_h), self->varied, last, apart);
     self->varied = last;
@@ -239,7 +219,7 @@ static void trusted_planner_change(hsep_trusted_planner *self, const hsep_truste
 static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     if (self->steps == 0) { /* the rest of the last plan was predicted before the physics model's plan */
-        trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED + self->n);
+        trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n);
     }
     hsep_linearised_slopes(
         (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command),
@@ -275,7 +255,7 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
 {
     const hsep_word spacing = hsep_planner_splines(task->planner)->spacing, first = self->columns;
     const hsep_word left = self->n - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
-    const hsep_real *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    const hsep_real *at = hsep_at(self, self->best) + HSEP_N_DECIDED;
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
     for (hsep_word c = 0; c < count; c++) {
         columns[c] = trusted_planner_column_of(self, first + c, spacing);
@@ -347,7 +327,7 @@ static void trusted_planner_factor(hsep_trusted_planner *self, const hsep_truste
 /* Solve it. */
 static void trusted_planner_solve(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const hsep_tolerance tolerance = trusted_planner_tolerance(trusted_planner_solved[self->steps]);
+    const hsep_tolerance tolerance = trusted_planner_tolerance(self->steps);
     if (self->bounded) { /* so it is again */
         hsep_planner_solve_again(task->planner, hsep_at(self, self->best), &tolerance);
         self->stage = HSEP_TRUSTED_BOUNDED;
@@ -370,14 +350,15 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
     self->tries++;
     self->stage = HSEP_TRUSTED_COMPARE;
     if (trusted_planner_better(cost, self->cost)) {
-        const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
+        const int is_last = gain < HSEP_TRUSTED_PLAN_GAIN * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
         trusted_planner_copy(self, best, c);
         self->cost = cost;
         self->stage = is_last ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
         trusted_planner_copy(self, c, hsep_at(self, self->rest));
     } else if (self->tries < HSEP_TRUSTED_TRIES) {
-        for (hsep_word j = HSEP_DECIDED; j < HSEP_DECIDED + self->n; j++) {
-            c[j] = best[j] + trusted_planner_shorter * (c[j] - best[j]);
+        const hsep_real shorter = trusted_planner_lengths[self->tries] / trusted_planner_lengths[self->tries - 1];
+        for (hsep_word j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
+            c[j] = best[j] + shorter * (c[j] - best[j]);
         }
         self->stage = HSEP_TRUSTED_JUDGE;
     }
@@ -387,10 +368,10 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
 static hsep_real trusted_planner_bounded(
     const hsep_trusted_planner *self, const hsep_splines *splines, const hsep_real c[])
 {
-    const hsep_word count = HSEP_DECIDED + self->n;
+    const hsep_word count = HSEP_N_DECIDED + self->n;
     hsep_real bounded = 0.0;
     for (hsep_word k = 0; k < self->Np; k++) {
-        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > trusted_planner_at_bound;
+        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_TRUSTED_PLAN_AT_BOUND;
     }
     return bounded / (hsep_real)self->Np;
 }
@@ -404,7 +385,7 @@ static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hse
     const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * splines->share[0];
     const hsep_real longer = trusted_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
                              trusted_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
-    return error > trusted_planner_left && longer > trusted_planner_bound_share;
+    return error > HSEP_TRUSTED_PLAN_LEFT && longer > HSEP_TRUSTED_PLAN_BOUND_SHARE;
 }
 
 /* Take the plan whose cost is lower. */

@@ -23,14 +23,9 @@
 
 #define HSEP_TRUSTED_STEPS 3    /* Newton steps of a plan at most, */
 #define HSEP_TRUSTED_TRIES 2    /* lengths of a step that are tried, */
-#define HSEP_TRUSTED_APART 4    /* samples behind the window that share a variance */
 #define HSEP_TRUSTED_VARIED 4   /* variances that are computed in a part, */
 #define HSEP_TRUSTED_PRODUCTS 8 /* rows of a programme that are */
 #define HSEP_TRUSTED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
-
-/* Solver steps at most, of the physics model's plan and of the programme of each Newton step: from the second one on a
- * bounded one begins where the last one ended. */
-#define HSEP_TRUSTED_SOLVED {5, 5, 3, 3}
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,

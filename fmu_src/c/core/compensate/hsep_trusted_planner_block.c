@@ -12,7 +12,7 @@ static hsep_real trusted_planner_lay_out(
     const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const hsep_word n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_real columns = (hsep_real)(n - n_pinned), coefficients = HSEP_DECIDED + (hsep_real)n;
+    const hsep_real columns = (hsep_real)(n - n_pinned), coefficients = HSEP_N_DECIDED + (hsep_real)n;
     const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;

@@ -67,7 +67,7 @@ HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters)
     HSEP_COMPENSATOR_RANGES(ALLOWED)
 #undef ALLOWED
     return allowed && predictor->Np % settings->spacing == 0 &&
-           settings->preview >= predictor->Np + 4 * settings->spacing + 3 &&
+           settings->preview >= predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END &&
            (predictor->measurement_delay == 0 || parameters->trust.trust);
 }
 
@@ -118,7 +118,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
             {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
              settings->j_max * (T_s * T_s * T_s)},
         .no_reversal = settings->no_reversal != 0,
-        .pinned = parameters->trust.trust ? HSEP_PINNED_WITH_TRUST : HSEP_PINNED};
+        .pinned = parameters->trust.trust ? HSEP_TRUSTED_PLANNING_PINNED : HSEP_PAPER_PLANNING_PINNED};
     derived.compensate = (hsep_sep_state)settings->compensate;
     return derived;
 }
