@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
+from .estimates import warn_of_estimates
 from .failures import errors_console
 from .options import (
     FlavourOption,
@@ -104,6 +105,7 @@ def build(
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
+    warn_of_estimates({axis.name: axis for axis, _, model, _ in jobs if model == "SepCompensator"}.values())
     paths = []
     with progress_bar(as_json) as advance:
         if flavour == "native":

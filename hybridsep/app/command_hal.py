@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .estimates import warn_of_estimates
 from .options import ForceOption, WeightsOption
 
 __all__ = ["hal"]
@@ -63,6 +64,8 @@ def hal(
         make_folder(path.parent)
         with written_whole(path) as file:
             file.write(content)
+    if not predictor:
+        warn_of_estimates(axes)
     for path in stale:
         path.unlink()
         typer.echo(f"{path} removed: without --weights the axis starts cold")

@@ -34,10 +34,13 @@ MODULE_LICENSE("Dual BSD/GPL");
 /* The component is named as its module: loadrt waits for it */
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
 #define HSEP_COMPONENT "hsep"
+#define HSEP_WRITTEN_BY ""
 #else
 #define HSEP_COMPONENT "hsep_predictor"
+#define HSEP_WRITTEN_BY " --predictor"
 #endif
 
+#define HSEP_PATH_SIZE 4096 /* characters */
 #define HSEP_AXES 9         /* as many joints as LinuxCNC has */
 #define HSEP_FADE 500       /* periods within which the change of a command fades after a fault */
 #define HSEP_JUMP 1.5       /* a command that moves by more than so many times the largest step is another position */
@@ -113,6 +116,17 @@ static void axis_choose(axis_data *self)
     *axis_value(self, HSEP_VR_compensate) = *self->pins->enable ? (double)model : (double)HSEP_SEP_OFF;
 #else
     (void)self;
+#endif
+}
+
+/* The model that may plan until the parameter is set: the machine file's. */
+static hal_u32_t axis_first_model(axis_data *self)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    return *axis_value(self, HSEP_VR_compensate) >= (double)HSEP_SEP_HYBRID ? 2 : 1;
+#else
+    (void)self;
+    return 1;
 #endif
 }
 
@@ -256,6 +270,33 @@ static void *axis_read(const hsep_instance *instance, const char *name, size_t *
     return bytes;
 }
 
+/* Whether an axis may be opened: its folder is one that hybridsep hal has written, and its name is no other one's. */
+static int axis_allowed(const axis_data *self, const char *folder, const char *name)
+{
+    char path[HSEP_PATH_SIZE];
+    FILE *table = NULL;
+    if (rtapi_snprintf(path, sizeof path, "%s/variables.bin", folder) < (int)sizeof path) {
+        table = fopen(path, "rb");
+    }
+    if (table == NULL) {
+        rtapi_print_msg(
+            RTAPI_MSG_ERR,
+            HSEP_COMPONENT ": axes: there is no %s/variables.bin; an axis is a folder that hybridsep hal "
+                           "has written\n",
+            folder);
+        return 0;
+    }
+    fclose(table);
+    for (const axis_data *other = axis_all; other < self; other++) {
+        if (strcmp(other->instance.name, name) == 0) {
+            rtapi_print_msg(
+                RTAPI_MSG_ERR, HSEP_COMPONENT ": axes: each axis must have a name of its own, got %s twice\n", name);
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* Take the model of an axis from its folder, and try it once: everything that can be refused is refused here. */
 static int axis_open(axis_data *self, const char *folder)
 {
@@ -271,8 +312,14 @@ static int axis_open(axis_data *self, const char *folder)
             RTAPI_MSG_ERR, HSEP_COMPONENT ": axes must be folders without a slash at the end, got %s\n", folder);
         return 0;
     }
+    if (!axis_allowed(self, folder, name)) {
+        return 0;
+    }
     if (hsep_open(instance, name, folder, axis_message) == HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ": %s\n", axis_message);
+        rtapi_print_msg(
+            RTAPI_MSG_ERR,
+            HSEP_COMPONENT ": %s: %s; write it for this component: hybridsep hal MACHINE" HSEP_WRITTEN_BY "\n", folder,
+            axis_message);
         return 0;
     }
     size_t size = 0;
@@ -327,10 +374,10 @@ static int axis_export(axis_data *self)
     bad |= hal_export_funct(function, axis_step, self, 1, 0, id);
     if (bad == 0) {
         pins->scale = 1000.0; /* mm */
-        pins->model = 2;
+        pins->model = axis_first_model(self);
         pins->look_ahead = (hal_u32_t)self->n_ring;
         pins->rejected = 0;
-        *pins->enable = 1;
+        *pins->enable = 0;
     }
     return bad;
 }

@@ -6,12 +6,14 @@ an ordinary user that LinuxCNC runs as.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import pwd
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import contour
@@ -64,6 +66,17 @@ class TestWithoutLinuxCnc:
         assert hybridsep("hal", "emps", "--predictor", "--out", str(tmp_path))[0] == 0
         assert (tmp_path / "hsep_predictor.c").is_file()
 
+    def test_limits_that_are_estimates_are_said(self, hybridsep: Run, tmp_path: Path) -> None:
+        text = Path(AXES[0]).read_text(encoding="utf-8")
+        file = tmp_path / "x.toml"
+        file.write_text(text.replace("[drive_limits]\n", "[drive_limits]\nestimated = true\n"), encoding="utf-8")
+        for command in (("hal", str(file)), ("build", "SepCompensatorPy_x", "-m", str(file), "--flavour", "python")):
+            for given, said in ((file, True), (AXES[0], False)):
+                words = [str(given) if word == str(file) else word for word in command]
+                status, _, err = hybridsep(*words, "--out", str(tmp_path / "out"), "--force")
+                assert status == 0, err
+                assert ("warning: [drive_limits] of x: estimates" in err) == said, err
+
     def test_two_axes_of_one_name_are_refused(self, hybridsep: Run, tmp_path: Path) -> None:
         status, _, err = hybridsep("hal", AXES[0], AXES[0], "--out", str(tmp_path))
         assert (status, "each axis must have a name of its own" in err) == (2, True)
@@ -86,13 +99,29 @@ IN_LINUXCNC = pytest.mark.skipif("HYBRIDSEP_LINUXCNC" not in os.environ and bool
 """With HYBRIDSEP_LINUXCNC set, what is not there fails."""
 
 
+@contextmanager
+def alone() -> Iterator[None]:
+    """Wait for the tests of other processes: a machine runs one LinuxCNC."""
+    with (Path(tempfile.gettempdir()) / "hybridsep_linuxcnc.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 @pytest.fixture(scope="module")
-def installed() -> Iterator[Path]:
+def place() -> Iterator[Path]:
     """A folder that the ordinary user may read, with the component installed."""
-    with tempfile.TemporaryDirectory() as place:
-        Path(place).chmod(0o755)
-        contour.install(Path(place))
-        yield Path(place)
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        with alone():
+            contour.install(Path(folder))
+        yield Path(folder)
+
+
+@pytest.fixture
+def installed(place: Path) -> Iterator[Path]:
+    """The same, while no other test runs LinuxCNC."""
+    with alone():
+        yield place
 
 
 @pytest.mark.nightly
@@ -113,16 +142,42 @@ def test_both_components_load_side_by_side(installed: Path) -> None:
     contour.hybridsep("hal", "emps", "--predictor", "--out", str(installed / "hal"))
     source = str(installed / "hal" / "hsep_predictor.c")
     subprocess.run(["halcompile", "--install", source], check=True, capture_output=True)
-    loaded = installed / "both.hal"
-    loaded.write_text(
-        f"loadrt hsep axes={installed}/hal/x\nloadrt hsep_predictor axes={installed}/hal/emps\nshow pin\n"
+    done = halrun(
+        installed, f"loadrt hsep axes={installed}/hal/x", f"loadrt hsep_predictor axes={installed}/hal/emps", "show pin"
     )
-    home = installed / "home"
-    home.mkdir()
+    assert {"hsep.x.out", "hsep_predictor.emps.predicted"} <= set(done.stdout.split()), done.stderr
+    for given, said in {
+        f"hsep axes={installed}/hal/z": f"there is no {installed}/hal/z/variables.bin; an axis is a folder that",
+        f"hsep axes={installed}/hal/emps": "another kind of FMU",
+        f"hsep_predictor axes={installed}/hal/x": "hybridsep hal MACHINE --predictor",
+        f"hsep axes={installed}/hal/x,{installed}/hal/x": "a name of its own, got x twice",
+    }.items():
+        done = halrun(installed, f"loadrt {given}")
+        assert said in " ".join(done.stderr.split()), done.stderr
+        assert done.returncode != 0
+
+
+@pytest.mark.nightly
+@IN_LINUXCNC
+def test_an_axis_begins_without_compensation_and_with_the_machine_files_model(installed: Path) -> None:
+    file = installed / "careful.toml"
+    text = Path(AXES[0]).read_text(encoding="utf-8").replace('name = "x"', 'name = "careful"')
+    file.write_text(text.replace("[compensator]\n", '[compensator]\ncompensate = "physics"\n'), encoding="utf-8")
+    contour.hybridsep("hal", str(file), "--out", str(installed / "hal"))
+    for name, model in (("x", "2"), ("careful", "1")):
+        shown = [f"getp hsep.{name}.model", f"getp hsep.{name}.enable"]
+        done = halrun(installed, f"loadrt hsep axes={installed}/hal/{name}", *shown)
+        assert done.stdout.split()[-2:] == [model, "FALSE"], done.stdout
+
+
+def halrun(place: Path, *lines: str) -> subprocess.CompletedProcess[str]:
+    """Run lines of HAL as the ordinary user."""
+    loaded, home = place / "given.hal", place / "home"
+    loaded.write_text("".join(f"{line}\n" for line in lines))
+    home.mkdir(exist_ok=True)
     shutil.chown(home, USER)
     command = ["runuser", "-u", USER, "--", "env", f"HOME={home}", "halrun", "-f", str(loaded)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0)
-    assert {"hsep.x.out", "hsep_predictor.emps.predicted"} <= set(done.stdout.split()), done.stderr
+    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
 
 
 @pytest.mark.nightly
