@@ -12,7 +12,7 @@
  *
  *   function                 | bounded cost                                          | what may fail
  *   hsep_defaults            | constant                                              | nothing
- *   hsep_*_size              | constant                                              | returns 0: refused
+ *   hsep_*_size, _refused    | constant                                              | returns 0: refused
  *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
  *   hsep_*_valid             | constant; the predictor's, its windows                | returns 0: invalid
  *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
@@ -101,6 +101,9 @@ typedef struct {
  * fit into memory. */
 HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
 
+/* Name of the first parameter for which that is 0, "modes" if there are none; NULL: none, or the block is too large. */
+HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters);
+
 /* Begin with the drive at rest at start, m. weights: content of a file weights.bin in any alignment, so many bytes, as
  * `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing: the
  * block has begun cold. */
@@ -139,6 +142,9 @@ typedef struct {
 /* Bytes of the block; 0 as the predictor's, and if spacing does not divide Np, preview < Np + 4 spacing + 3, or a
  * measurement is late without trust. */
 HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters);
+
+/* As hsep_predictor_refused. */
+HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters);
 
 /* Begin, and plan the first window; as hsep_predictor_init. */
 HSEP_API hsep_began hsep_compensator_init(

@@ -130,6 +130,7 @@ def interface() -> ctypes.CDLL:
     loaded = core_library("compensator_2")
     for kind in ("predictor", "compensator"):
         getattr(loaded, f"hsep_{kind}_size").restype = ctypes.c_size_t
+        getattr(loaded, f"hsep_{kind}_refused").restype = ctypes.c_char_p
     return loaded
 
 
@@ -159,6 +160,12 @@ class Library:
     def size(self) -> int:
         """Return the bytes of the block; 0: refused."""
         return int(self._call("size", ctypes.byref(self.parameters)))
+
+    def refused(self) -> str:
+        """Return the name of the first parameter that is refused; empty if none is."""
+        name: bytes | None = self._call("refused", ctypes.byref(self.parameters))
+        assert (name is None) == (self.size() > 0)
+        return (name or b"").decode()
 
     def begin(self, start: float, weights: bytes | None = None) -> int:
         """Begin; return hsep_began."""

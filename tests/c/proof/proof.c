@@ -167,13 +167,13 @@ void prove_refusals(void)
     Frama_C_make_unknown((char *)modes, sizeof modes);
     parameters.n_modes = 2;
     parameters.modes = modes;
-    (void)hsep_predictor_allows(&parameters);
+    (void)hsep_predictor_refused(&parameters);
     if (parameters.compensator.spacing == 0) {
         parameters.compensator.spacing = 0;
-        (void)hsep_compensator_allows(&parameters);
+        (void)hsep_compensator_refused(&parameters);
     } else {
         parameters.compensator.spacing = (uint64_t)Frama_C_unsigned_long_interval(1, ULONG_MAX);
-        (void)hsep_compensator_allows(&parameters);
+        (void)hsep_compensator_refused(&parameters);
     }
 }
 

@@ -5,7 +5,7 @@
 
 HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters)
 {
-    if (!hsep_compensator_allows(parameters)) {
+    if (hsep_compensator_refused(parameters) != NULL) {
         return 0;
     }
     const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);

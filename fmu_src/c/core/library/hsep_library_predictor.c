@@ -5,7 +5,7 @@
 
 HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
 {
-    if (!hsep_predictor_allows(parameters)) {
+    if (hsep_predictor_refused(parameters) != NULL) {
         return 0;
     }
     const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);

@@ -29,46 +29,70 @@ static int parameters_within(hsep_real value, hsep_real least, hsep_real most, h
     return (value >= least && value <= most && !tiny) || value == automatic;
 }
 
-static int parameters_mode_allowed(const hsep_mode *mode)
+static const char *parameters_mode_refused(const hsep_mode *mode)
 {
-    int allowed = 1;
-#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within(mode->name, least, most, nonzero, automatic);
-    HSEP_MODE_RANGES(ALLOWED)
-#undef ALLOWED
-    return allowed;
+    const char *refused = NULL;
+#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
+    if (refused == NULL && !parameters_within(mode->name, least, most, nonzero, automatic)) { \
+        refused = #name; \
+    }
+    HSEP_MODE_RANGES(REFUSED)
+#undef REFUSED
+    return refused;
 }
 
-HSEP_API int hsep_predictor_allows(const hsep_parameters *parameters)
+HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters)
 {
     const hsep_predictor_settings *settings = &parameters->predictor;
-    int allowed = parameters->n_modes >= 1 && parameters->modes != NULL;
-#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((hsep_real)settings->name, least, most, nonzero, automatic);
-    HSEP_PREDICTOR_RANGES(ALLOWED)
-#undef ALLOWED
-#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((hsep_real)parameters->trust.name, least, most, nonzero, automatic);
-    HSEP_TRUST_RANGES(ALLOWED)
-#undef ALLOWED
-    for (hsep_word i = 0; allowed && i < parameters->n_modes; i++) {
-        allowed = parameters_mode_allowed(&parameters->modes[i]);
+    const char *refused = NULL;
+#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
+    if (refused == NULL && !parameters_within((hsep_real)settings->name, least, most, nonzero, automatic)) { \
+        refused = #name; \
     }
-    return allowed && settings->p <= settings->Np && settings->q < settings->Np;
+    HSEP_PREDICTOR_RANGES(REFUSED)
+#undef REFUSED
+#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
+    if (refused == NULL && !parameters_within((hsep_real)parameters->trust.name, least, most, nonzero, automatic)) { \
+        refused = #name; \
+    }
+    HSEP_TRUST_RANGES(REFUSED)
+#undef REFUSED
+    if (refused == NULL && (parameters->n_modes < 1 || parameters->modes == NULL)) {
+        refused = "modes";
+    }
+    for (hsep_word i = 0; refused == NULL && i < parameters->n_modes; i++) {
+        refused = parameters_mode_refused(&parameters->modes[i]);
+    }
+    if (refused == NULL && settings->p > settings->Np) {
+        refused = "p";
+    }
+    if (refused == NULL && settings->q >= settings->Np) {
+        refused = "q";
+    }
+    return refused;
 }
 
-HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters)
+HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
 {
     const hsep_compensator_settings *settings = &parameters->compensator;
     const hsep_predictor_settings *predictor = &parameters->predictor;
-    int allowed = hsep_predictor_allows(parameters);
-#define ALLOWED(type, name, usual, least, most, nonzero, automatic, learned) \
-    allowed &= parameters_within((hsep_real)settings->name, least, most, nonzero, automatic);
-    HSEP_COMPENSATOR_RANGES(ALLOWED)
-#undef ALLOWED
-    return allowed && predictor->Np % settings->spacing == 0 &&
-           settings->preview >= predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END &&
-           (predictor->measurement_delay == 0 || parameters->trust.trust);
+    const char *refused = hsep_predictor_refused(parameters);
+#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
+    if (refused == NULL && !parameters_within((hsep_real)settings->name, least, most, nonzero, automatic)) { \
+        refused = #name; \
+    }
+    HSEP_COMPENSATOR_RANGES(REFUSED)
+#undef REFUSED
+    if (refused == NULL && predictor->Np % settings->spacing != 0) {
+        refused = "spacing";
+    }
+    if (refused == NULL && settings->preview < predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END) {
+        refused = "preview";
+    }
+    if (refused == NULL && predictor->measurement_delay != 0 && !parameters->trust.trust) {
+        refused = "measurement_delay";
+    }
+    return refused;
 }
 
 /* Warm-up, s. */

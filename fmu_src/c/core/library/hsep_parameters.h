@@ -6,10 +6,6 @@
 #include "hsep_compensator.h"
 #include "hsep_predictor.h"
 
-/* Whether all of a predictor's, or a compensator's, are in their ranges, alone and together. */
-HSEP_API int hsep_predictor_allows(const hsep_parameters *parameters);
-HSEP_API int hsep_compensator_allows(const hsep_parameters *parameters);
-
 /* What the block is laid out by; the modes are not copied. */
 HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters);
 HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters);
