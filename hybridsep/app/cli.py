@@ -16,6 +16,7 @@ from .command_example_log import example_log
 from .command_fit import fit
 from .command_fleet import fleet
 from .command_hal import hal
+from .command_header import header
 from .command_identify import identify
 from .command_init import init
 from .command_live import live
@@ -47,6 +48,7 @@ for _command in (
     cosim,
     system,
     hal,
+    header,
     backtest,
     report,
     live,

@@ -20,6 +20,7 @@ from ..logs.example import EXAMPLE, HEAD
 from ..machines.seal import edited_since, is_as_written
 
 __all__ = [
+    "AXIS_HEADER",
     "BATCHES",
     "BATCH_COLUMNS",
     "BY_ENDING",
@@ -185,6 +186,7 @@ FIT_FILES = {".csv": COMMANDS_TO_TRY, ".toml": MACHINE, ".json": STAGES, ".html"
 TWINCAT = Kind(
     "configuration of hybridsep build", _begins_with(b"<?xml version='1.0' encoding='utf-8'?>\n<CustomConfigurations")
 )
+AXIS_HEADER = {".h": Kind("header of hybridsep header", _begins_with(b"/* Axis of hybridsep"))}
 HAL_FILES = {
     ".bin": Kind("file of hybridsep hal", _begins_with(b"HSEP")),
     ".c": Kind("HAL component of hybridsep", _begins_with(b"/* HAL component for LinuxCNC")),

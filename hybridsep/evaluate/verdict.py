@@ -226,7 +226,7 @@ class Tally:
         moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
         causes = []
         if moving < _LITTLE_MOTION:
-            causes.append(f"too little motion to learn from, {100 * moving:.2g} % of the samples")
+            causes.append(f"hardly any motion, in {100 * moving:.2g} % of these samples")
         peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
         if all(self._worse_early(peer) for peer in peers):
             causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")

@@ -9,6 +9,7 @@ import numpy as np
 from ..evaluate.canvas import HYBRID
 from ..evaluate.chart import Chart, Line
 from ..evaluate.report import Report
+from ..identify.operation import TOO_LITTLE
 from ..identify.shown import deviation_words, shown_estimates
 from ..intake.finding import Finding
 from ..intake.repair import changes
@@ -33,7 +34,13 @@ _SETTLING = (
 def judged_by(fit: Fit, shown: Shown) -> Judged:
     """Return the replay that judges a fit as it is reported, in the units of its logs."""
     period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
-    return Judged(fit.judged, fit.machine.T_s, shown, "the log's second half", share=1.0 - fit.share, period=period)
+    unidentified = any(one.startswith(TOO_LITTLE) for one in fit.identification["findings"])
+    return Judged(
+        *(fit.judged, fit.machine.T_s, shown, "the log's second half"),
+        share=1.0 - fit.share,
+        period=period,
+        unidentified="the first half" if unidentified else "",
+    )
 
 
 def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:

@@ -25,7 +25,7 @@ from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
-__all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "identify_operation", "unit_gain_model"]
+__all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "TOO_LITTLE", "identify_operation", "unit_gain_model"]
 
 SAMPLES_MIN = 100
 """Samples below which nothing is identified."""
@@ -38,6 +38,9 @@ OPPOSED = -0.7
 
 LITTLE_MOTION = 0.25
 """Share of samples in motion below which more of it is asked for."""
+
+TOO_LITTLE = "too little motion in"
+"""Beginning of the finding that a part of a log tells no dynamics."""
 
 GAIN_RANGE = (0.1, 10.0)
 """Static gains outside of which a unit is probably wrong."""
@@ -112,7 +115,7 @@ def identify_operation(
         fit = _at_rest(segments, T_s)
         spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
         findings.append(
-            f"too little motion in {part} to learn the dynamics from: the commanded position moves by {spread} "
+            f"{TOO_LITTLE} {part} to learn the dynamics from: the commanded position moves by {spread} "
             f"(standard deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is "
             "taken"
         )

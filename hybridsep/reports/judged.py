@@ -45,6 +45,8 @@ class Judged:
         Share of a log's samples that are test samples.
     period : str
         That the residual repeats with the position, and the option that says so, in words; empty where it does not.
+    unidentified : str
+        Part of a log with too little motion to identify the axis from, as its physics model was to be; empty without.
     """
 
     replay: Replay
@@ -53,6 +55,7 @@ class Judged:
     part: str
     share: float = 1.0
     period: str = ""
+    unidentified: str = ""
 
     @cached_property
     def unit(self) -> tuple[float, str]:
@@ -79,17 +82,22 @@ def recommendation(judged: Judged) -> str:
         return (
             f"Nothing could be judged: {judged.part} has {counted(n)} of {judged.replay.Np} samples; {_enough(judged)}."
         )
+    if np.ptp(judged.replay.commands()) == 0.0:
+        return f"Nothing was tested: the commanded position does not move in {judged.part}; record moves to its end."
     *others, hybrid = judged.replay.scored()
     best = judged.replay.best()
     if best.rms == 0.0:
         return f"There is no error to predict in {judged.part}: record the axis while it works."
     ratio, peer = hybrid.rms / best.rms, _IN_WORDS.get(best.name, best.name)
-    if n < WINDOWS_ENOUGH:
+    if n < WINDOWS_ENOUGH or judged.unidentified:
         how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
-        return (
-            f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, but judged by {counted(n)} only: "
-            f"{_enough(judged)}."
-        )
+        but = f"but judged by {counted(n)} only: {_enough(judged)}"
+        if judged.unidentified:
+            but = (
+                f"but {judged.unidentified} has too little motion to learn the axis from, for the physics model and "
+                "for the others: record moves in both halves"
+            )
+        return f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, {but}."
     by = f"judged by {counted(n)}"
     if ratio < 1.0 - ALIKE:
         return f"Use the hybrid: its error is {ratio:.2f} × the error of {peer}, the best of the others, {by}."

@@ -38,13 +38,26 @@ def judged(x_d: Array, hybrid: float, arx: float) -> Judged:
 def test_more_motion_is_advised_where_there_is_little(hybrid: float, arx: float, own: str) -> None:
     t = np.arange(N) * 1e-3
     moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
-    resting = np.where(t < 0.1, moving, moving[100])
+    resting = moving[np.minimum(np.arange(N) % (N // 2), N // 20)]
     advice = recommendation(judged(moving, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows.")
     advice = recommendation(judged(resting, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows; the axis moves in 10 % of the samples: record more motion.")
+
+
+def test_nothing_is_advised_where_the_axis_rests() -> None:
+    """In the half that is tested, or in the one that physics model and others learn from."""
+    t = np.arange(N) * 1e-3
+    moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
+    advice = recommendation(judged(np.where(t < 0.1, moving, moving[100]), 1e-6, 9e-6))
+    assert advice == "Nothing was tested: the commanded position does not move in the half; record moves to its end."
+    advice = recommendation(replace(judged(moving, 1e-6, 9e-6), unidentified="the first half"))
+    assert advice.startswith(
+        "So far the hybrid is better than the physics model alone, 0.33 × its error, but the first"
+    )
+    assert advice.endswith("record moves in both halves.")
 
 
 def test_what_would_help_is_said() -> None:

@@ -78,7 +78,7 @@ def test_alike_is_neither_better_nor_worse() -> None:
             1e-3,
             "Why: the prediction is unstable: it leaves the physics model by 5 × the largest residual.",
         ),
-        ((10, 10, 12), np.where(np.arange(NP) < 1, 1e-3, 0.0), "Why: too little motion to learn from, 3.2 % of the"),
+        ((10, 10, 12), np.where(np.arange(NP) < 1, 1e-3, 0.0), "Why: hardly any motion, in 3.2 % of these"),
         ((10, 3, 5), 1e-3, "Why: the residual changes so slowly that its last value predicts it better than"),
         ((10, 10, 15), 1e-3, "Why: the residual does not repeat with the motion."),
     ],

@@ -91,7 +91,8 @@ int main(int argc, char *argv[])
     const size_t size = hsep_compensator_size(&parameters);
     hsep_compensator *compensator = size > 0 ? malloc(size) : NULL;
     if (compensator == NULL) {
-        fprintf(stderr, "no compensator: %s\n", size > 0 ? "no memory" : "a parameter is out of its range");
+        const char *refused = hsep_compensator_refused(&parameters);
+        fprintf(stderr, "no compensator: %s %s\n", refused == NULL ? "memory" : refused, "is out of range");
         return 1;
     }
     (void)hsep_compensator_init(compensator, &parameters, 0.0, NULL, 0);

@@ -1,10 +1,12 @@
 /* Replay of a recorded axis: predict every window of a CSV before it is learned, print the errors.
  *
- *     replay LOG.csv NP F_N ZETA [WEIGHTS.bin]
+ *     replay LOG.csv NP F_N ZETA
+ *     replay LOG.csv                 compiled with -include my_axis.h -DAXIS=my_axis
  *
- * LOG.csv: a header with the columns x_d and x_meas (commanded and measured position, m, or [mm] or [um] as it says),
- * a row each 1 ms, as hybridsep example-log writes it. F_N, Hz, and ZETA: the drive's linear model, one mode with unit
- * gain. WEIGHTS.bin: what an earlier run has learned (hybridsep hal --weights).
+ * LOG.csv: a header with the columns x_d and x_meas, or x (commanded and measured position, m, or [mm] or [um] as it
+ * says), a row each sampling interval, as hybridsep example-log writes it. NP: samples of a window; F_N, Hz, and ZETA:
+ * the drive's linear model, one mode with unit gain. my_axis.h: an axis that hybridsep fit has identified, by hybridsep
+ * header --predictor, with what it has learned if it has --weights.
  */
 #include "hsep.h"
 
@@ -38,6 +40,7 @@ static int find_columns(char line[], column *x_d, column *x)
     for (char *name = strtok(line, ",\r\n"); name != NULL; name = strtok(NULL, ",\r\n"), place++) {
         take_column(x_d, name, "x_d", place);
         take_column(x, name, "x_meas", place);
+        take_column(x, name, "x", place);
     }
     return x_d->place >= 0 && x->place >= 0;
 }
@@ -77,11 +80,13 @@ static double *read_log(const char *path, size_t *n)
     size_t room = 0;
     FILE *file = fopen(path, "r");
     *n = 0;
-    if (file == NULL || !read_line(file, line) || !find_columns(line, &x_d, &x)) {
-        fprintf(stderr, "%s must be a CSV with the columns x_d and x_meas\n", path);
-        if (file != NULL) {
-            fclose(file);
-        }
+    if (file == NULL) {
+        perror(path);
+        return NULL;
+    }
+    if (!read_line(file, line) || !find_columns(line, &x_d, &x)) {
+        fprintf(stderr, "%s must be a CSV with the columns x_d and x_meas, or x\n", path);
+        fclose(file);
         return NULL;
     }
     while (read_line(file, line)) {
@@ -98,24 +103,6 @@ static double *read_log(const char *path, size_t *n)
     }
     fclose(file);
     return log;
-}
-
-/* Read a whole file; return its bytes, to be freed, or NULL. */
-static void *read_bytes(const char *path, size_t *size)
-{
-    FILE *file = fopen(path, "rb");
-    void *bytes = NULL;
-    *size = 0;
-    if (file != NULL && fseek(file, 0, SEEK_END) == 0) {
-        const long end = ftell(file);
-        if (end > 0 && fseek(file, 0, SEEK_SET) == 0 && (bytes = malloc((size_t)end)) != NULL) {
-            *size = fread(bytes, 1, (size_t)end, file);
-        }
-    }
-    if (file != NULL) {
-        fclose(file);
-    }
-    return bytes;
 }
 
 /* Predict the log: in each sample the command that comes Np samples later, and what is measured now. */
@@ -138,41 +125,87 @@ static int replay(hsep_predictor *predictor, size_t Np, const double *log, size_
     return 1;
 }
 
+#ifdef AXIS
+#define JOINED(name, part) name##part
+#define OF_AXIS(name, part) JOINED(name, part)
+
+/* Take the axis of the header. */
+static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *arguments[])
+{
+    (void)mode;
+    (void)arguments;
+    OF_AXIS(AXIS, _parameters)(parameters);
+    return 1;
+}
+
+enum { N_ARGUMENTS = 1 };
+static const char usage[] = "LOG.csv";
+
+#else
+static const void *const no_weights = NULL;
+static const size_t no_weights_size = 0;
+#define OF_AXIS(name, part) no##part
+
+/* Take NP, F_N and ZETA; return whether they are numbers. */
+static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *arguments[])
+{
+    double numbers[3];
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        numbers[i] = strtod(arguments[i], &end);
+        if (end == arguments[i] || *end != '\0' || !(numbers[i] >= 0.0 && numbers[i] <= 1e9)) {
+            fprintf(stderr, "NP, F_N and ZETA must be numbers, got %s\n", arguments[i]);
+            return 0;
+        }
+    }
+    const double omega = 2.0 * 3.14159265358979323846 * numbers[1];
+    *mode = (hsep_mode){.f_n = numbers[1], .zeta = numbers[2], .alpha = omega * omega};
+    hsep_defaults(parameters);
+    parameters->predictor.Np = (hsep_word)numbers[0];
+    parameters->predictor.p = parameters->predictor.Np < 50 ? parameters->predictor.Np : 50;
+    parameters->n_modes = 1;
+    parameters->modes = mode;
+    return 1;
+}
+
+enum { N_ARGUMENTS = 4 };
+static const char usage[] = "LOG.csv NP F_N ZETA";
+#endif
+
 int main(int argc, char *argv[])
 {
-    const double pi = 3.14159265358979323846;
-    size_t n = 0, weights_size = 0;
+    size_t n = 0;
+    hsep_mode mode;
     hsep_parameters parameters;
-    if (argc < 5) {
-        fprintf(stderr, "usage: %s LOG.csv NP F_N ZETA [WEIGHTS.bin]\n", argv[0]);
+    if (argc != 1 + N_ARGUMENTS) {
+        fprintf(stderr, "usage: %s %s\n", argv[0], usage);
         return 2;
     }
-    const double omega = 2.0 * pi * atof(argv[3]);
-    const hsep_mode mode = {.f_n = atof(argv[3]), .zeta = atof(argv[4]), .alpha = omega * omega};
-    hsep_defaults(&parameters);
-    parameters.predictor.Np = strtoul(argv[2], NULL, 10);
-    parameters.predictor.p = parameters.predictor.Np < 50 ? parameters.predictor.Np : 50;
-    parameters.n_modes = 1;
-    parameters.modes = &mode;
+    if (!take_parameters(&parameters, &mode, argv + 2)) {
+        return 2;
+    }
     const size_t size = hsep_predictor_size(&parameters);
     if (size == 0) {
-        fprintf(stderr, "NP, F_N or ZETA is out of its range (hsep_ranges.h)\n");
+        const char *refused = hsep_predictor_refused(&parameters);
+        fprintf(
+            stderr, "%s is out of its range (hsep_ranges.h)\n", refused == NULL ? "the size of the block" : refused);
         return 2;
     }
     double *log = read_log(argv[1], &n);
-    void *weights = argc > 5 ? read_bytes(argv[5], &weights_size) : NULL;
     hsep_predictor *predictor = malloc(size);
-    int done = log != NULL && n > 0 && predictor != NULL && (argc < 6 || weights != NULL);
+    int done = log != NULL && n > 0 && predictor != NULL;
     if (done) {
-        const hsep_began began = hsep_predictor_init(predictor, &parameters, log[0], weights, weights_size);
+        const hsep_began began =
+            hsep_predictor_init(predictor, &parameters, log[0], OF_AXIS(AXIS, _weights), OF_AXIS(AXIS, _weights_size));
         if (began != HSEP_BEGAN) {
             fprintf(
                 stderr, "cold: the weights are %s\n", began == HSEP_WEIGHTS_OTHER ? "of other settings" : "damaged");
         }
         done = replay(predictor, (size_t)parameters.predictor.Np, log, n);
+    } else if (log != NULL) {
+        fprintf(stderr, "%s\n", n == 0 ? "the log has no samples" : "no memory");
     }
     free(predictor);
-    free(weights);
     free(log);
     return done ? 0 : 1;
 }
