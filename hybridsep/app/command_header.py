@@ -15,7 +15,7 @@ __all__ = ["header"]
 
 def header(
     machine: Annotated[str, typer.Argument(help="Machine file (.toml) or name.")],
-    out: Annotated[Path | None, typer.Option(help="The header; NAME.h, by the machine's name, if left out.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The header; named after the machine if left out.")] = None,
     predictor: Annotated[
         bool, typer.Option("--predictor", help="Of the predictor alone; it needs no limits of the drive.")
     ] = False,

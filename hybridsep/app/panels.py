@@ -67,7 +67,7 @@ EXAMPLES = {
     "hal": ("hybridsep hal my_axis/machine.toml --out hal", "hybridsep hal x/machine.toml y/machine.toml --out hal"),
     "header": (
         "hybridsep header my_axis/machine.toml --predictor",
-        "hybridsep header my_axis/machine.toml --predictor --weights my_axis/trained.state --out my_axis.h",
+        "hybridsep header my_axis/machine.toml --predictor --weights my_axis/trained.state",
     ),
     "example-log": ("hybridsep example-log --out my_axis.csv", "hybridsep example-log --out my_axis.csv.gz"),
 }

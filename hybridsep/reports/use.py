@@ -55,7 +55,8 @@ _REPLAY = """\
 import numpy as np
 from fmpy import simulate_fmu
 
-# x_d, x_meas: commanded and measured positions of a log, one sample every {T_s!r} s
+# x_d, x_meas: commanded and measured positions of a log, m or rad, one sample every {T_s!r} s:
+# log = hybridsep.read_log("my_axis.csv"); x_d, x_meas = log.x_d, log.x_meas
 signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_meas", float)])
 signals["time"] = {T_s!r} * np.arange(len(signals))
 signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...
