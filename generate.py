@@ -63,7 +63,7 @@ PLANS: Declared = {
     "trusted_planning": [trusted_planning],
     "trusted_plan": [trusted_plan],
 }
-"""The same of plans."""
+"""Modules of plans, likewise."""
 
 PLACES = (
     "HOLD",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import NoReturn
 
 
-def _end(*_: object) -> NoReturn:
+def _end(*_: object) -> None:
     os.write(2, b"interrupted\n")
     os._exit(130)
 

@@ -129,7 +129,7 @@ TARGETS = {
         (f"{_AARCH64}-gcc", "-mcpu=cortex-a53", "-fno-pic", "-fno-pie", "-no-pie", _PICOLIBC.format(_AARCH64)),
         "board_virt.c",
         "virt.ld",
-        _qemu("qemu-system-aarch64", "virt", "-cpu", "cortex-a53", "-nic", "none"),  # its firmware is another package
+        _qemu("qemu-system-aarch64", "virt", "-cpu", "cortex-a53", "-nic", "none"),  # its boot ROM is another package
         unit=1,
         size_tool=f"{_AARCH64}-size",
         nm=f"{_AARCH64}-nm",

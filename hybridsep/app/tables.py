@@ -33,7 +33,18 @@ __all__ = [
     "print_written",
 ]
 
-console = Console(emoji=False, markup=False, highlight=False)
+
+class _WholeLines(Console):
+    """Console that breaks no line of text where it is no terminal: what reads it may look for one."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as rich does."""
+        if not self.is_terminal and all(isinstance(one, str) for one in objects):
+            options.setdefault("soft_wrap", True)
+        super().print(*objects, **options)
+
+
+console = _WholeLines(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 

@@ -22,6 +22,7 @@ from .parameters import Parameter, choice, flag, real, whole
 __all__ = [
     "DRIVE_LIMIT_ENTRIES",
     "PARAMETERS",
+    "PLAN_END",
     "CompensatorSettings",
     "Limits",
     "PredictorSettings",
@@ -29,6 +30,9 @@ __all__ = [
     "check",
     "samples_before",
 ]
+
+PLAN_END = 3
+"""Samples without change at the end of a compensator's plan, so that the third difference is zero after it."""
 
 _SettingsType = TypeVar("_SettingsType", bound="Settings")
 
@@ -362,9 +366,9 @@ class CompensatorSettings(Settings):
         problems = []
         if Np % spacing:
             problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
-        least = Np + 4 * spacing + 3
+        least = Np + 4 * spacing + PLAN_END
         if preview < least:
-            problems.append(f"preview must be ≥ Np + 4·spacing + 3 = {least}, got {preview}")
+            problems.append(f"preview must be ≥ Np + 4·spacing + {PLAN_END} = {least}, got {preview}")
         if problems:
             raise ParameterError("; ".join(problems))
         return replace(self, spacing=spacing, preview=preview)

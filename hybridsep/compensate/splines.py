@@ -17,6 +17,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
+from ..base.settings import PLAN_END
 from ..base.signals import Array
 
 __all__ = ["N_DECIDED", "PlanCost", "SplineBasis", "direct_samples"]
@@ -24,8 +25,8 @@ __all__ = ["N_DECIDED", "PlanCost", "SplineBasis", "direct_samples"]
 N_DECIDED = 3
 """Cubic splines that began before a plan and overlap it."""
 
-_END = 3
-"""Samples without change at the end of a plan, so that the third difference is zero after it."""
+_END = PLAN_END
+"""Samples without change at the end of a plan, which the settings leave room for."""
 
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,7 +21,7 @@ import scipy.signal
 from command_line import Run, write_log
 
 from hybridsep import cosimulate
-from hybridsep.base.interrupt import interrupts_between_calls, uninterrupted
+from hybridsep.base.interrupt import interrupts_between_calls, starting_processes, uninterrupted
 from hybridsep.cosim.run import PREDICTOR
 from hybridsep.fmi.processes import run_together
 
@@ -243,6 +245,7 @@ def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pyte
         "    name = Name()\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "imported", raising=False)
     imported, begun = [], time.monotonic()
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
         imported.append(import_module("imported").Named)
@@ -253,12 +256,75 @@ def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pyte
 
 
 @POSIX
-def test_ctrl_c_of_which_a_library_makes_another_exception() -> None:
+def test_a_second_ctrl_c_does_not_wait_for_an_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hanging.py").write_text(
+        "import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(0.5)\n"
+        "signal.raise_signal(signal.SIGINT)\ntime.sleep(60.0)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "hanging", raising=False)
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():
+        import_module("hanging")
+    assert begun + 0.5 <= time.monotonic() < begun + 50.0
+
+
+@POSIX
+def test_ctrl_c_during_an_import_is_not_lost_where_processes_are_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which ignore it for a while."""
+    (tmp_path / "engine.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "engine", raising=False)
+    steps, begun = [], time.monotonic()
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:
-            raise TypeError("incompatible function arguments") from None
+        import_module("engine")
+        with starting_processes():
+            time.sleep(0.2)
+            steps.append("started")
+        time.sleep(60.0)
+    assert steps == ["started"]
+    assert time.monotonic() < begun + 50.0
+
+
+@POSIX
+def test_ctrl_c_that_a_callback_loses_comes_again() -> None:
+    begun = time.monotonic()
+    callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+    hook = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
+        callback()
+        time.sleep(60.0)
+    assert time.monotonic() < begun + 50.0
+    assert sys.unraisablehook is hook
+
+
+@POSIX
+def test_ctrl_c_that_waits_is_raised_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "last.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "last", raising=False)
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():
+        import_module("last")
+    time.sleep(0.05)  # nothing comes behind it
+
+
+def test_ctrl_c_of_which_a_library_makes_another_exception(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(error: Exception, *, at: float = 0.0) -> None:
+        with interrupts_between_calls():
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            later = time.monotonic() + at
+            monkeypatch.setattr(time, "monotonic", lambda: later)
+            raise error
+
+    with pytest.raises(KeyboardInterrupt):
+        fail(TypeError("incompatible function arguments"))
+    with pytest.raises(BrokenPipeError):  # of what is closed after it
+        fail(BrokenPipeError())
+    with pytest.raises(TypeError):
+        fail(TypeError("another matter"), at=5.0)
     with pytest.raises(TypeError), interrupts_between_calls():
         raise TypeError("incompatible function arguments")
 

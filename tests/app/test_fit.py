@@ -161,7 +161,8 @@ def test_the_reports_script_replays_a_log(
 
 @pytest.mark.slow
 def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
-    log = write_rows(tmp_path / "my axis.csv", commanded()[:800], measured(0)[:800])
+    part = np.r_[:400, 999:1399]  # a move in each half, between them at rest
+    log = write_rows(tmp_path / "my axis.csv", commanded()[part], measured(0)[part])
     pages = tmp_path / "charts.pdf"
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json", "--figure", pages)
     assert status == 0, err
@@ -175,7 +176,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out
-    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 10 mm, as the file states no unit" in " ".join(
+    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 20 mm, as the file states no unit" in " ".join(
         out.split()
     )
     assert "report: " in out

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from bounded_oracle import clarabel_minimum
 from numpy.typing import NDArray
+from places import ROOT
 from random_loops import random_loop, run_library
 
 from hybridsep.compensate import constraints as _constraints
-from hybridsep.compensate.interior import EXACT, Minimum, minimise
+from hybridsep.compensate.interior import EXACT, Minimum, Tolerance, minimise
 
 Array = NDArray[np.float64]
 
@@ -77,3 +80,10 @@ def test_a_problem_without_active_bounds() -> None:
     P, v = np.diag([1.0, 4.0]), np.array([1.0, 2.0])
     x = minimise(P, v, np.eye(2), np.full(2, -9.0), np.full(2, 9.0), np.zeros(2), 2.0).x
     np.testing.assert_allclose(x, [1.0, 0.5], rtol=1e-9)
+
+
+def test_the_cores_tolerance_has_the_same_order() -> None:
+    """The generated header gives its numbers in a row."""
+    header = (ROOT / "fmu_src" / "c" / "core" / "compensate" / "hsep_interior.h").read_text(encoding="utf-8")
+    struct = header.partition("typedef struct {")[2].partition("} hsep_tolerance;")[0]
+    assert tuple(re.findall(r"hsep_\w+ (\w+);", struct)) == Tolerance._fields

@@ -7,11 +7,16 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {HSEP_TRUSTED_PLAN_REACHES};
-static const hsep_real trusted_planner_lengths[HSEP_TRUSTED_TRIES] = {HSEP_TRUSTED_PLAN_LENGTHS};
-static const hsep_word trusted_planner_solved[1 + HSEP_TRUSTED_STEPS] = {HSEP_TRUSTED_PLAN_SOLVED};
+static const hsep_real trusted_planner_reaches[] = {HSEP_TRUSTED_PLAN_REACHES};
+static const hsep_real trusted_planner_lengths[] = {HSEP_TRUSTED_PLAN_LENGTHS};
+static const hsep_word trusted_planner_solved[] = {HSEP_TRUSTED_PLAN_SOLVED};
 
-/* Where the solver ends. In single precision rounding leaves up to 2e-4 of a bound of third differences. */
+HSEP_ASSERT(reaches, sizeof trusted_planner_reaches == HSEP_TRUSTED_STEPS * sizeof(hsep_real));
+HSEP_ASSERT(lengths, sizeof trusted_planner_lengths == HSEP_TRUSTED_TRIES * sizeof(hsep_real));
+HSEP_ASSERT(solved, sizeof trusted_planner_solved == (1 + HSEP_TRUSTED_STEPS) * sizeof(hsep_word));
+
+/* Where the solver of a programme ends: of the physics model's plan, 0, or of a Newton step. In single precision
+ * rounding leaves up to 2e-4 of a bound of third differences, so that the margin is wider. */
 static hsep_tolerance trusted_planner_tolerance(hsep_word programme)
 {
     hsep_tolerance tolerance = {HSEP_TRUSTED_PLAN_TOLERANCE};
