@@ -64,6 +64,7 @@ def live(
     """
     from contextlib import ExitStack
 
+    from ..base.interrupt import taken
     from ..cosim.fmus import FmuController
     from ..cosim.pairing import check_predictor, values_to_build
     from ..fmi.builds import build_here
@@ -111,7 +112,8 @@ def live(
             if served is not None and not run.interrupted:
                 errors_console.print("the source has ended; Ctrl-C ends the page")
                 served.wait()
-        except (Interrupted, KeyboardInterrupt):  # before the first sample, or while the page is looked at
+        except (Interrupted, KeyboardInterrupt) as error:  # before the first sample, or while the page is looked at
+            taken(error)
             if not run.status:
                 _print_run({}, shown, as_json=as_json)
 

@@ -3,32 +3,33 @@
 Inside a pythonfmu FMU an exception becomes ``fmi2Fatal``, inside a callback it is lost, and fmpy would leave the
 working directory changed. While a library is imported, one Ctrl-C in a hundred is lost, becomes another exception or
 ends Python: importlib has callbacks, and extension modules raise their own. A second Ctrl-C does not wait.
+
+The exception may be lost elsewhere, too: Python handles signals while it makes the message of an error, which then
+takes the place of the exception and is handled by the library that has expected it. An exception that is gone while
+its context lasts, and that nobody has :func:`taken`, is raised again.
 """
 
 from __future__ import annotations
 
 import _thread
-import math
 import signal
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from types import FrameType
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["interrupts_between_calls", "starting_processes", "uninterrupted"]
+__all__ = ["interrupts_between_calls", "starting_processes", "taken", "uninterrupted"]
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
 
 _AGAIN = 0.01
 """Time between two signals while Ctrl-C waits for the end of an import, s."""
-
-_REPLACED = 1.0
-"""Time after Ctrl-C within which another exception has come of it, s."""
 
 
 class _Calls(threading.local):
@@ -39,9 +40,23 @@ class _Calls(threading.local):
 
     depth = 0
     pending: type[BaseException] | None = None
+    taken: BaseException | None = None
 
 
 _calls = _Calls()
+
+
+class _Pressed(KeyboardInterrupt):
+    """KeyboardInterrupt whose end can be watched."""
+
+
+_Pressed.__name__ = _Pressed.__qualname__ = "KeyboardInterrupt"
+_Pressed.__module__ = "builtins"
+
+
+def taken(error: BaseException) -> None:
+    """Say that Ctrl-C is dealt with, where its context goes on."""
+    _calls.taken = error
 
 
 def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
@@ -72,8 +87,9 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
         yield
         return
     imports_outside, hook, lock = _imports(sys._getframe()), sys.unraisablehook, _thread.allocate_lock()
-    waits = is_own = False  # Ctrl-C for the end of an import; the last signal was sent by repeat
-    raised = -math.inf
+    waits = is_own = False  # Ctrl-C is to be raised, or raised again; the last signal was sent by repeat
+    raised: list[weakref.ref[BaseException]] = []
+    kind = _Pressed if stop is KeyboardInterrupt else stop
 
     def repeat() -> None:
         nonlocal is_own
@@ -90,22 +106,26 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
             waits = True
             _thread.start_new_thread(repeat, ())  # threading's takes locks that what is interrupted may hold
 
+    def watched() -> BaseException:
+        error = kind()
+        raised[:] = [weakref.ref(error, lambda _: wait())]
+        return error
+
     def interrupt(number: int, frame: FrameType | None) -> None:
-        nonlocal waits, is_own, raised
+        nonlocal waits, is_own
         is_second, is_own = waits and not is_own, False
         if _calls.depth == 0 and _imports(frame) > imports_outside and not is_second:
             wait()
             return
         waits = False
-        if _calls.depth == 0 or _calls.pending is not None:
-            _calls.pending, raised = None, time.monotonic()
-            raise stop
-        _calls.pending = stop
+        if _calls.depth > 0 and _calls.pending is None:
+            _calls.pending = kind
+            return
+        _calls.pending = None
+        raise watched()  # no variable here may have it: the traceback has this frame
 
     def unraisable(what: Any) -> None:
-        if what.exc_type is stop:  # lost in a callback
-            wait()
-        else:
+        if what.exc_type is not kind:  # lost in a callback; it is raised again
             hook(what)
 
     signal.signal(signal.SIGINT, interrupt)
@@ -113,16 +133,27 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
     try:
         yield
     except Exception as error:
-        if time.monotonic() - raised < _REPLACED and not isinstance(error, OSError):
-            raise stop from error  # of which an extension module has made another one
+        if _has_come_of(error, kind):
+            raise kind from error
         raise
     finally:
+        raised.clear()
+        _calls.taken = None
         sys.unraisablehook = hook
         with lock:
             still_waits, waits = waits, False
         signal.signal(signal.SIGINT, signal.default_int_handler)
         if still_waits:
-            raise stop
+            raise kind
+
+
+def _has_come_of(error: BaseException | None, kind: type[BaseException]) -> bool:
+    """Return whether a library has made an exception of another kind's."""
+    while error is not None:
+        if isinstance(error, kind):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _imports(frame: FrameType | None) -> int:

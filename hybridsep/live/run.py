@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from ..base.interrupt import taken
 from ..cosim.fmus import FmuController
 from .core import LiveCore, Row
 from .first_seconds import FirstSeconds
@@ -90,7 +91,8 @@ def run_live(
                     run.take(sample, controller)
                 run.publish(idle=sample is None)
             run.finish()
-        except ends:
+        except ends as error:
+            taken(error)
             interrupted = True
         except BaseException as error:
             run.end(str(error) or type(error).__name__)

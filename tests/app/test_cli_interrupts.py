@@ -21,7 +21,7 @@ import scipy.signal
 from command_line import Run, write_log
 
 from hybridsep import cosimulate
-from hybridsep.base.interrupt import interrupts_between_calls, starting_processes, uninterrupted
+from hybridsep.base.interrupt import interrupts_between_calls, starting_processes, taken, uninterrupted
 from hybridsep.cosim.run import PREDICTOR
 from hybridsep.fmi.processes import run_together
 
@@ -312,23 +312,49 @@ def test_ctrl_c_that_waits_is_raised_at_the_end(tmp_path: Path, monkeypatch: pyt
     time.sleep(0.05)  # nothing comes behind it
 
 
-def test_ctrl_c_of_which_a_library_makes_another_exception(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(error: Exception, *, at: float = 0.0) -> None:
-        with interrupts_between_calls():
-            with suppress(KeyboardInterrupt):
-                signal.raise_signal(signal.SIGINT)
-            later = time.monotonic() + at
-            monkeypatch.setattr(time, "monotonic", lambda: later)
-            raise error
+def test_ctrl_c_of_which_a_library_makes_another_exception() -> None:
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("initialization failed") from error
+    with pytest.raises(ImportError), interrupts_between_calls():
+        raise ImportError("no module of this name")
 
-    with pytest.raises(KeyboardInterrupt):
-        fail(TypeError("incompatible function arguments"))
-    with pytest.raises(BrokenPipeError):  # of what is closed after it
-        fail(BrokenPipeError())
-    with pytest.raises(TypeError):
-        fail(TypeError("another matter"), at=5.0)
-    with pytest.raises(TypeError), interrupts_between_calls():
-        raise TypeError("incompatible function arguments")
+
+@POSIX
+def test_ctrl_c_in_whose_place_an_expected_error_came_is_raised_again() -> None:
+    """As in a search for fonts: Python handles signals while it makes the message of a ValueError."""
+
+    class Word(str):
+        def __repr__(self) -> str:
+            signal.raise_signal(signal.SIGINT)
+            return "a word"
+
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
+        with suppress(ValueError):
+            int(Word("normal"))
+        time.sleep(60.0)
+    assert time.monotonic() < begun + 50.0
+
+
+def test_ctrl_c_that_was_taken_is_not_raised_again() -> None:
+    steps = []
+    with interrupts_between_calls():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            taken(error)
+        time.sleep(0.1)
+        steps.append("went on")
+    assert steps == ["went on"]
+    with pytest.raises(BrokenPipeError), interrupts_between_calls():  # noqa: PT012
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            taken(error)
+        raise BrokenPipeError
 
 
 @POSIX
