@@ -29,7 +29,7 @@ P = ParamSpec("P")
 Result = TypeVar("Result")
 
 _AGAIN = 0.01
-"""Time between two signals while Ctrl-C waits for the end of an import, s."""
+"""Time between two signals while Ctrl-C is to be raised, s."""
 
 
 class _Calls(threading.local):

@@ -34,12 +34,11 @@ _SETTLING = (
 def judged_by(fit: Fit, shown: Shown) -> Judged:
     """Return the replay that judges a fit as it is reported, in the units of its logs."""
     period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
-    unidentified = any(one.startswith(TOO_LITTLE) for one in fit.identification["findings"])
     return Judged(
         *(fit.judged, fit.machine.T_s, shown, "the log's second half"),
         share=1.0 - fit.share,
         period=period,
-        unidentified="the first half" if unidentified else "",
+        unidentified=any(one.startswith(TOO_LITTLE) for one in fit.identification["findings"]),
     )
 
 

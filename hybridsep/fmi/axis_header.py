@@ -8,8 +8,8 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from ..base.errors import FmuError
 from ..base.version import __version__
+from ..machines.agree import check_drive_limits
 from ..machines.machine import Machine
 from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 
@@ -37,14 +37,11 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
         If a compensator is asked for a machine without limits of its drive.
     """
     compensates = model == "SepCompensator"
-    if compensates and machine.drive_limits is None:
-        raise FmuError(
-            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {machine.name}; "
-            "--predictor writes the header of a predictor"
-        )
+    if compensates:
+        check_drive_limits(machine, "--predictor writes the header of a predictor")
     numbers = machine.fmi_compensator_parameters() if compensates else machine.fmi_parameters()
     settings = [
-        f"    parameters->{part}.{name} = {numbers[name] + 0!r};"
+        f"    parameters->{part}.{name} = {numbers[name] + 0!r};"  # truth values are numbers there
         for part, names in _PARTS.items()
         for name in names
         if name in numbers

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..base.data_files import data_folder
-from ..base.errors import FmuError
+from ..machines.agree import check_drive_limits
 from ..machines.machine import Machine
 from .c_header import kind_header
 from .c_sources import c_sources
@@ -58,11 +58,8 @@ def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = N
     FmuError
         If a compensator is asked for a machine without limits of its drive.
     """
-    if model == "SepCompensator" and machine.drive_limits is None:
-        raise FmuError(
-            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {machine.name}; "
-            "--predictor writes the component that predicts alone"
-        )
+    if model == "SepCompensator":
+        check_drive_limits(machine, "--predictor writes the component that predicts alone")
     table = table_of(machine, model, machine.name, warm=trained is not None)
     files: dict[str, bytes] = {}
     if trained is not None:

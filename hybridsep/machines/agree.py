@@ -1,12 +1,20 @@
-"""Checks that a log or a trajectory is of a machine: sampling interval, unit."""
+"""Checks of a machine: that a log or a trajectory is its, in sampling interval and unit; that it may be compensated."""
 
 from __future__ import annotations
 
-from ..base.errors import ParameterError
+from ..base.errors import FmuError, ParameterError
 from ..logs.log import Log
 from .machine import Machine
 
-__all__ = ["check_interval", "check_unit"]
+__all__ = ["check_drive_limits", "check_interval", "check_unit"]
+
+
+def check_drive_limits(axis: Machine, instead: str) -> None:
+    """Raise FmuError if a machine has no limits of its drive, which a compensator needs; ``instead`` needs none."""
+    if axis.drive_limits is None:
+        raise FmuError(
+            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {axis.name}; {instead}"
+        )
 
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:

@@ -45,8 +45,8 @@ class Judged:
         Share of a log's samples that are test samples.
     period : str
         That the residual repeats with the position, and the option that says so, in words; empty where it does not.
-    unidentified : str
-        Part of a log with too little motion to identify the axis from, as its physics model was to be; empty without.
+    unidentified : bool
+        Whether the log's first half had too little motion to identify the axis from.
     """
 
     replay: Replay
@@ -55,7 +55,7 @@ class Judged:
     part: str
     share: float = 1.0
     period: str = ""
-    unidentified: str = ""
+    unidentified: bool = False
 
     @cached_property
     def unit(self) -> tuple[float, str]:
@@ -94,8 +94,8 @@ def recommendation(judged: Judged) -> str:
         but = f"but judged by {counted(n)} only: {_enough(judged)}"
         if judged.unidentified:
             but = (
-                f"but {judged.unidentified} has too little motion to learn the axis from, for the physics model and "
-                "for the others: record moves in both halves"
+                "but the first half has too little motion to learn the axis from, for the physics model and for the "
+                "others: record moves in both halves"
             )
         return f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, {but}."
     by = f"judged by {counted(n)}"

@@ -53,7 +53,7 @@ def test_nothing_is_advised_where_the_axis_rests() -> None:
     moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
     advice = recommendation(judged(np.where(t < 0.1, moving, moving[100]), 1e-6, 9e-6))
     assert advice == "Nothing was tested: the commanded position does not move in the half; record moves to its end."
-    advice = recommendation(replace(judged(moving, 1e-6, 9e-6), unidentified="the first half"))
+    advice = recommendation(replace(judged(moving, 1e-6, 9e-6), unidentified=True))
     assert advice.startswith(
         "So far the hybrid is better than the physics model alone, 0.33 × its error, but the first"
     )

@@ -13,6 +13,7 @@ from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -235,10 +236,23 @@ def test_a_call_ends_before_ctrl_c_is_raised() -> None:
     assert steps == []
 
 
+@pytest.fixture
+def importer_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Callable[[], ModuleType]]:
+    """Return what takes a module's text and returns what imports it."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "imported", raising=False)
+
+    def write(text: str) -> Callable[[], ModuleType]:
+        (tmp_path / "imported.py").write_text(text)
+        return lambda: import_module("imported")
+
+    return write
+
+
 @POSIX
-def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_waits_for_the_end_of_an_import(importer_of: Callable[[str], Callable[[], ModuleType]]) -> None:
     """Before 3.12 Python makes a RuntimeError of an exception in __set_name__, as matplotlib has it."""
-    (tmp_path / "imported.py").write_text(
+    load = importer_of(
         "import signal\n"
         "class Name:\n"
         "    def __set_name__(self, *_):\n"
@@ -246,11 +260,9 @@ def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pyte
         "class Named:\n"
         "    name = Name()\n"
     )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "imported", raising=False)
     imported, begun = [], time.monotonic()
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
-        imported.append(import_module("imported").Named)
+        imported.append(load().Named)
         time.sleep(60.0)
     assert imported
     assert time.monotonic() < begun + 50.0
@@ -258,30 +270,26 @@ def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, monkeypatch: pyte
 
 
 @POSIX
-def test_a_second_ctrl_c_does_not_wait_for_an_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "hanging.py").write_text(
+def test_a_second_ctrl_c_does_not_wait_for_an_import(importer_of: Callable[[str], Callable[[], ModuleType]]) -> None:
+    load = importer_of(
         "import signal, time\nsignal.raise_signal(signal.SIGINT)\ntime.sleep(0.5)\n"
         "signal.raise_signal(signal.SIGINT)\ntime.sleep(60.0)\n"
     )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "hanging", raising=False)
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():
-        import_module("hanging")
+        load()
     assert begun + 0.5 <= time.monotonic() < begun + 50.0
 
 
 @POSIX
 def test_ctrl_c_during_an_import_is_not_lost_where_processes_are_started(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    importer_of: Callable[[str], Callable[[], ModuleType]],
 ) -> None:
     """Which ignore it for a while."""
-    (tmp_path / "engine.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "engine", raising=False)
+    load = importer_of("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     steps, begun = [], time.monotonic()
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
-        import_module("engine")
+        load()
         with starting_processes():
             time.sleep(0.2)
             steps.append("started")
@@ -303,12 +311,10 @@ def test_ctrl_c_that_a_callback_loses_comes_again() -> None:
 
 
 @POSIX
-def test_ctrl_c_that_waits_is_raised_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "last.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "last", raising=False)
+def test_ctrl_c_that_waits_is_raised_at_the_end(importer_of: Callable[[str], Callable[[], ModuleType]]) -> None:
+    load = importer_of("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     with pytest.raises(KeyboardInterrupt), interrupts_between_calls():
-        import_module("last")
+        load()
     time.sleep(0.05)  # nothing comes behind it
 
 
@@ -358,15 +364,16 @@ def test_ctrl_c_that_was_taken_is_not_raised_again() -> None:
 
 
 @POSIX
-def test_ctrl_c_does_not_wait_for_an_import_that_began_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_does_not_wait_for_an_import_that_began_before(
+    importer_of: Callable[[str], Callable[[], ModuleType]],
+) -> None:
     """A script that is imported runs the co-simulation."""
-    (tmp_path / "script.py").write_text(
+    load = importer_of(
         "import signal\n"
         "from hybridsep.base.interrupt import interrupts_between_calls\n"
         "with interrupts_between_calls():\n"
         "    signal.raise_signal(signal.SIGINT)\n"
         "    raise AssertionError('not reached')\n"
     )
-    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(KeyboardInterrupt):
-        import_module("script")
+        load()

@@ -92,7 +92,7 @@ int main(int argc, char *argv[])
     hsep_compensator *compensator = size > 0 ? malloc(size) : NULL;
     if (compensator == NULL) {
         const char *refused = hsep_compensator_refused(&parameters);
-        fprintf(stderr, "no compensator: %s %s\n", refused == NULL ? "memory" : refused, "is out of range");
+        fprintf(stderr, "no compensator: %s\n", refused == NULL ? "no memory" : refused);
         return 1;
     }
     (void)hsep_compensator_init(compensator, &parameters, 0.0, NULL, 0);

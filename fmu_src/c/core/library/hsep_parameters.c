@@ -29,15 +29,23 @@ static int parameters_within(hsep_real value, hsep_real least, hsep_real most, h
     return (value >= least && value <= most && !tiny) || value == automatic;
 }
 
+/* Refuse a parameter whose value is out of its range, unless another one is refused already. */
+static void parameters_check(
+    const char **refused, const char *name, hsep_real value, hsep_real least, hsep_real most, hsep_real nonzero,
+    hsep_real automatic)
+{
+    if (*refused == NULL && !parameters_within(value, least, most, nonzero, automatic)) {
+        *refused = name;
+    }
+}
+
 static const char *parameters_mode_refused(const hsep_mode *mode)
 {
     const char *refused = NULL;
-#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
-    if (refused == NULL && !parameters_within(mode->name, least, most, nonzero, automatic)) { \
-        refused = #name; \
-    }
-    HSEP_MODE_RANGES(REFUSED)
-#undef REFUSED
+#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, mode->name, least, most, nonzero, automatic);
+    HSEP_MODE_RANGES(CHECK)
+#undef CHECK
     return refused;
 }
 
@@ -45,31 +53,24 @@ HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters)
 {
     const hsep_predictor_settings *settings = &parameters->predictor;
     const char *refused = NULL;
-#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
-    if (refused == NULL && !parameters_within((hsep_real)settings->name, least, most, nonzero, automatic)) { \
-        refused = #name; \
-    }
-    HSEP_PREDICTOR_RANGES(REFUSED)
-#undef REFUSED
-#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
-    if (refused == NULL && !parameters_within((hsep_real)parameters->trust.name, least, most, nonzero, automatic)) { \
-        refused = #name; \
-    }
-    HSEP_TRUST_RANGES(REFUSED)
-#undef REFUSED
+#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, (hsep_real)settings->name, least, most, nonzero, automatic);
+    HSEP_PREDICTOR_RANGES(CHECK)
+#undef CHECK
+#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, (hsep_real)parameters->trust.name, least, most, nonzero, automatic);
+    HSEP_TRUST_RANGES(CHECK)
+#undef CHECK
     if (refused == NULL && (parameters->n_modes < 1 || parameters->modes == NULL)) {
         refused = "modes";
     }
     for (hsep_word i = 0; refused == NULL && i < parameters->n_modes; i++) {
         refused = parameters_mode_refused(&parameters->modes[i]);
     }
-    if (refused == NULL && settings->p > settings->Np) {
-        refused = "p";
+    if (refused != NULL) {
+        return refused;
     }
-    if (refused == NULL && settings->q >= settings->Np) {
-        refused = "q";
-    }
-    return refused;
+    return settings->p > settings->Np ? "p" : settings->q >= settings->Np ? "q" : NULL;
 }
 
 HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
@@ -77,22 +78,20 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
     const hsep_compensator_settings *settings = &parameters->compensator;
     const hsep_predictor_settings *predictor = &parameters->predictor;
     const char *refused = hsep_predictor_refused(parameters);
-#define REFUSED(type, name, usual, least, most, nonzero, automatic, learned) \
-    if (refused == NULL && !parameters_within((hsep_real)settings->name, least, most, nonzero, automatic)) { \
-        refused = #name; \
+#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, (hsep_real)settings->name, least, most, nonzero, automatic);
+    HSEP_COMPENSATOR_RANGES(CHECK)
+#undef CHECK
+    if (refused != NULL) {
+        return refused;
     }
-    HSEP_COMPENSATOR_RANGES(REFUSED)
-#undef REFUSED
-    if (refused == NULL && predictor->Np % settings->spacing != 0) {
-        refused = "spacing";
+    if (predictor->Np % settings->spacing != 0) {
+        return "spacing";
     }
-    if (refused == NULL && settings->preview < predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END) {
-        refused = "preview";
+    if (settings->preview < predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END) {
+        return "preview";
     }
-    if (refused == NULL && predictor->measurement_delay != 0 && !parameters->trust.trust) {
-        refused = "measurement_delay";
-    }
-    return refused;
+    return predictor->measurement_delay != 0 && !parameters->trust.trust ? "measurement_delay" : NULL;
 }
 
 /* Warm-up, s. */
