@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from hybridsep_main import main
+from hybridsep.__main__ import main
 
 if __name__ == "__main__":
     sys.argv.insert(1, "build")

@@ -38,7 +38,7 @@ STARTS = {
     PEER: Start(PEER, may_load=True),
     "import hybridsep": Start("import hybridsep", 1.25),
     "hybridsep --help": Start(
-        "import sys; sys.argv = ['hybridsep', '--help']; from hybridsep_main import main; main()", 1.3
+        "import sys; sys.argv = ['hybridsep', '--help']; from hybridsep.__main__ import main; main()", 1.3
     ),
     "from hybridsep import HybridPredictor": Start("from hybridsep import HybridPredictor", may_load=True),
     "from hybridsep import cosimulate": Start("from hybridsep import cosimulate", may_load=True),

@@ -64,7 +64,6 @@ def live(
     """
     from contextlib import ExitStack
 
-    from ..base.interrupt import taken
     from ..cosim.fmus import FmuController
     from ..cosim.pairing import check_predictor, values_to_build
     from ..fmi.builds import build_here
@@ -75,7 +74,7 @@ def live(
     from ..live.run import LiveRun, Sink, run_live
     from ..logs.units import shown_of
     from ..machines.machine import load_machine
-    from .failures import Interrupted, errors_console
+    from .failures import errors_console
     from .log_intake import reading_of
 
     axis = load_machine(machine)
@@ -105,15 +104,14 @@ def live(
                 sinks.append(served)
                 errors_console.print(f"page: {served.address}", soft_wrap=True)
             controller = FmuController(ahead, values, 0.0)
-            run = run_live(origin, controller, sinks, ends=(Interrupted, KeyboardInterrupt), watch=watch)
+            run = run_live(origin, controller, sinks, ends=(KeyboardInterrupt,), watch=watch)
             _print_run(run.status, shown, as_json=as_json)
             if served is not None and served.n_dropped:
                 errors_console.print(f"note: the page was too slow for {served.n_dropped} samples")
             if served is not None and not run.interrupted:
                 errors_console.print("the source has ended; Ctrl-C ends the page")
                 served.wait()
-        except (Interrupted, KeyboardInterrupt) as error:  # before the first sample, or while the page is looked at
-            taken(error)
+        except KeyboardInterrupt:  # before the first sample, or while the page is looked at
             if not run.status:
                 _print_run({}, shown, as_json=as_json)
 

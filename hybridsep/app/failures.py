@@ -18,11 +18,10 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from ..base.errors import HybridSepError, LogError, brief
-from ..base.interrupt import interrupts_between_calls
 from ..base.new_folders import remove_empty_folders
 from ..base.version import version_text
 
-__all__ = ["DEBUG_VARIABLE", "Commands", "Interrupted", "errors_console", "run"]
+__all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "run"]
 
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
@@ -51,6 +50,9 @@ class Commands(TyperGroup):
                 wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
                 error.message = f"{wanted}, got {brief(first['input'])}"
             raise
+        except KeyboardInterrupt:
+            errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
+            raise typer.Exit(130) from None
         finally:
             remove_empty_folders()
 
@@ -75,10 +77,6 @@ def _machine_files(arguments: Sequence[str]) -> str:
     return f"It is the axis's machine file, which hybridsep fit {log} writes, or the name of one of the library's"
 
 
-class Interrupted(BaseException):
-    """Ctrl-C; no KeyboardInterrupt, which typer would turn into an exit without a word."""
-
-
 def run(app: Callable[[], object]) -> int:
     """Run a command line; return its exit status."""
     _open_closed()
@@ -86,13 +84,9 @@ def run(app: Callable[[], object]) -> int:
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
-        with interrupts_between_calls(Interrupted):
-            status = _status(app)
-            sys.stdout.flush()
-            return status
-    except Interrupted:
-        errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
-        return 130
+        status = _status(app)
+        sys.stdout.flush()
+        return status
     except BrokenPipeError:
         _abandon_stdout()
         return 1

@@ -17,8 +17,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any, TypeVar
 
-from .interrupt import starting_processes
-
 __all__ = ["run_apart", "serve"]
 
 Result = TypeVar("Result")
@@ -50,13 +48,13 @@ def run_apart(
     """
     # The folder is here, so that what a killed process had unpacked is removed
     with tempfile.TemporaryDirectory() as folder:
-        with starting_processes():
-            process = subprocess.Popen(
-                [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL if quiet else None,
-            )
+        process = subprocess.Popen(
+            [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if quiet else None,
+            start_new_session=True,
+        )
         assert process.stdin is not None
         assert process.stdout is not None
         try:

@@ -20,7 +20,6 @@ import fmpy
 from fmpy.fmi1 import FMICallException
 
 from ..base.errors import FmuError, first_line, listed
-from ..base.interrupt import uninterrupted
 from ..base.output import named_errors
 from ..fmi.pythonfmu_limits import check_unpacked
 from .archive_check import read_description_text
@@ -131,7 +130,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             _remove(folder)
             raise
 
-    @uninterrupted
     def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> None:
         """Unpack the archive, load its library and make the instance."""
         try:
@@ -193,7 +191,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    @uninterrupted
     def close(self) -> None:
         """Free the instance and its unpacked files; closing again does nothing."""
         if self._release is not None:
@@ -306,7 +303,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self._check_open()
         return self._call(function, *arguments)
 
-    @uninterrupted
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError, ParameterError
-from ..base.interrupt import interrupts_between_calls
 from ..base.signals import as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
@@ -101,7 +100,7 @@ def cosimulate(
     as_samples(command[:1], "r", 1)
     ahead = _controller(controller, controller_values, t_init, start_time)
     drive = _drive(plant, plant_values, encoder, start_time)
-    with one_blas_thread, interrupts_between_calls(), ExitStack() as stack:
+    with one_blas_thread, ExitStack() as stack:
         for adapter in (ahead, drive):
             if isinstance(adapter, AbstractContextManager):
                 stack.enter_context(adapter)

@@ -13,8 +13,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
-from ..base.interrupt import uninterrupted
-
 __all__ = ["run_together"]
 
 _PAUSE = 0.02
@@ -66,7 +64,6 @@ def run_together(
             complaints.close()
 
 
-@uninterrupted
 def _start(
     i: int, command: Sequence[str], folder: Path, running: dict[int, tuple[subprocess.Popen[bytes], IO[bytes]]]
 ) -> None:

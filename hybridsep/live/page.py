@@ -16,7 +16,6 @@ from contextlib import suppress
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.interrupt import starting_processes
 from ..logs.extras import library
 from ..logs.units import Shown
 from .core import Row
@@ -70,13 +69,13 @@ class Page:
     def __init__(self, title: str, shown: Shown, port: int = 0) -> None:
         library("the page (--no-page runs without it)", "bokeh", "live", "a Bokeh server")
         token = secrets.token_urlsafe(24)
-        with starting_processes():
-            self._process = subprocess.Popen(
-                [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                env={name: value for name, value in os.environ.items() if not name.startswith(_FOREIGN)},
-            )
+        self._process = subprocess.Popen(
+            [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={name: value for name, value in os.environ.items() if not name.startswith(_FOREIGN)},
+            start_new_session=True,  # a terminal's Ctrl-C ends this process, which ends it
+        )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._told, self.n_dropped = self._process.stdin, 0

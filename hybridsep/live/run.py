@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..base.interrupt import taken
 from ..cosim.fmus import FmuController
 from .core import LiveCore, Row
 from .first_seconds import FirstSeconds
@@ -91,8 +90,7 @@ def run_live(
                     run.take(sample, controller)
                 run.publish(idle=sample is None)
             run.finish()
-        except ends as error:
-            taken(error)
+        except ends:
             interrupted = True
         except BaseException as error:
             run.end(str(error) or type(error).__name__)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import signal
+import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
@@ -17,7 +19,6 @@ from contextlib import closing, contextmanager
 from typing import Any, NamedTuple, TypeVar
 
 from ..base.errors import HybridSepError, ParameterError, first_line
-from ..base.interrupt import starting_processes
 from ..logs.extras import library
 
 __all__ = ["Done", "Engine", "check_engine", "cluster", "cluster_of", "joblib_engine"]
@@ -50,6 +51,22 @@ _CLOSED = 30.0
 """Time within which a cluster closes, s: rarely, Dask has waited for a worker without end."""
 
 _ENDED = "the process that worked on it ended, twice: out of memory, or a fault of a library{limit}"
+
+
+@contextmanager
+def _ignoring_ctrl_c() -> Iterator[None]:
+    """Let processes that are started ignore a terminal's Ctrl-C: it ends this process, which ends them.
+
+    Meanwhile it is ignored here, too. Does nothing outside the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited, also by a new program
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Done(NamedTuple):
@@ -114,7 +131,7 @@ class _Joblib(Engine):
 
         parallel = Parallel(n_jobs=self._jobs if len(tasks) > 1 else 2, return_as="generator_unordered")
         try:
-            with starting_processes():
+            with _ignoring_ctrl_c():
                 running = parallel(delayed(_numbered)(work, i, task) for i, task in list(tasks.items()))
             with closing(running):  # ends the processes where this one is interrupted
                 yield from running
@@ -246,7 +263,7 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
             with client:
                 yield _Dask(client, distributed, f"Dask at {scheduler}", "")
             return
-        with starting_processes():
+        with _ignoring_ctrl_c():
             started = distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,

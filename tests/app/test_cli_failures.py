@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import zipfile
@@ -14,9 +15,11 @@ import pytest
 from command_line import Run, write_log
 from log_files import columns, write
 
+from hybridsep.cosim.fmus import FmuDrive
+
 MACHINE = "spring_mass_damper"
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")
-MAIN = [sys.executable, "-c", "import sys; from hybridsep_main import main; sys.exit(main())"]
+MAIN = [sys.executable, "-c", "import sys; from hybridsep.__main__ import main; sys.exit(main())"]
 DIGITS = "9" * 5000
 MACHINE_FILE = """
 name = "axis"
@@ -206,7 +209,22 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
 def test_closed_standard_streams(tmp_path: Path, streams: str) -> None:
     out = tmp_path / "machine.toml"
     answers = "--name axis --T_s 1e-3 --model lag --tau 0.01 --dead-time 0 --hold zoh --Np 100"
-    shell = f'exec "$0" -c "from hybridsep_main import main; main()" init "$1" {answers} {streams}'
+    shell = f'exec "$0" -c "from hybridsep.__main__ import main; main()" init "$1" {answers} {streams}'
     done = subprocess.run(["sh", "-c", shell, sys.executable, str(out)], capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert "[physics" in out.read_text(encoding="utf-8")
+
+
+def test_ctrl_c_is_one_line_and_status_130(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step = FmuDrive.step
+
+    def interrupt(drive: FmuDrive, k: int, *arguments: float) -> None:
+        if k == 1000:
+            signal.raise_signal(signal.SIGINT)
+        step(drive, k, *arguments)
+
+    monkeypatch.setattr(FmuDrive, "step", interrupt)
+    status, out, err = hybridsep("cosim", "--out", tmp_path / "run.csv")
+    said = "interrupted: nothing is half written, files are either as they were or complete"
+    assert (status, out, err.splitlines()[-1]) == (130, "", said)
+    assert not list(tmp_path.iterdir())

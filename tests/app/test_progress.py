@@ -56,7 +56,7 @@ def test_what_is_quick_and_what_prints_json_says_nothing(clock: Clock, capsys: p
 
 @pytest.mark.slow
 def test_the_demo_says_in_a_pipe_how_long_it_takes_and_where_it_is(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hybridsep_main", "demo", "--out", str(tmp_path / "demo")]
+    command = [sys.executable, "-m", "hybridsep", "demo", "--out", str(tmp_path / "demo")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         assert process.stdout is not None

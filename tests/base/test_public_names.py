@@ -79,7 +79,7 @@ def loaded(code: str) -> set[str]:
     ],
 )
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
-    command = f"sys.argv[1:] = {arguments!r}; from hybridsep_main import main; main()"
+    command = f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()"
     modules = loaded(command if arguments else "import hybridsep")
     assert "hybridsep" in modules
     assert not SLOW_MODULES & modules
@@ -91,6 +91,6 @@ def test_a_replay_loads_no_plots_and_no_fmus(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3},0,0\n" for k in range(200)))
     arguments = ["backtest", str(log), "-m", "spring_mass_damper"]
-    modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep_main import main; main()")
+    modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()")
     assert "hybridsep.evaluate.backtest" in modules
     assert not {"matplotlib", "control", "fmpy", "pythonfmu", "ruckig"} & modules

@@ -116,7 +116,7 @@ def test_what_is_refused(tmp_path: Path, fmus: BuiltFmus, hybridsep: Run) -> Non
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is a signal")
 def test_the_page_stays_until_ctrl_c(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=400)
-    command = [sys.executable, "-m", "hybridsep_main", "live", log, "-m", "spring_mass_damper", "--speed", "4"]
+    command = [sys.executable, "-m", "hybridsep", "live", log, "-m", "spring_mass_damper", "--speed", "4"]
     with subprocess.Popen(
         [*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]
     ) as process:
@@ -146,7 +146,7 @@ def test_ctrl_c_ends_a_stream() -> None:
         listener.bind(("127.0.0.1", 0))
         listener.settimeout(5e-3)
         shown = ("--plotjuggler", f"127.0.0.1:{listener.getsockname()[1]}", "--json")
-        command = [sys.executable, "-m", "hybridsep_main", "live", f"udp:{port}", *LIVE, *shown]
+        command = [sys.executable, "-m", "hybridsep", "live", f"udp:{port}", *LIVE, *shown]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]) as process:
             for _ in range(6000):
                 for _ in range(5):
