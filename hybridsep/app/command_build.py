@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
+from ..base.errors import ParameterError
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
 from .estimates import warn_of_estimates
-from .failures import errors_console
 from .options import (
     FlavourOption,
     FmiOption,
@@ -20,6 +21,13 @@ from .options import (
     UnitOption,
     WeightsOption,
 )
+
+if TYPE_CHECKING:
+    from ..fmi.libraries import Library
+    from ..machines.machine import Machine
+
+    Job = tuple[Machine, str, str, str]
+    """An FMU to build: its machine, name and model, and the version of FMI."""
 
 __all__ = ["build"]
 
@@ -75,9 +83,7 @@ def build(
 
     The same machine gives the same bytes.
     """
-    from ..base.errors import ParameterError
     from ..fmi.archive import build_fmu
-    from ..fmi.jobs import extras_of, jobs_of, libraries_of, without_files
     from ..fmi.libraries import library_paths, missing
     from ..fmi.twincat import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
@@ -91,11 +97,11 @@ def build(
         raise ParameterError(f"--for must be {' or '.join(CONTROLLERS)}, got {controller}")
     if controller is not None and flavour != "native":
         raise ParameterError(f"--for {controller} is for native FMUs; with --flavour {flavour} leave it out")
-    jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
+    jobs = _jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
     if controller is not None:
-        jobs = without_files(jobs, f"--for {controller}", named=bool(fmus))
+        jobs = _without_files(jobs, f"--for {controller}", named=bool(fmus))
         embed_weights = embed_weights or weights is not None
-    extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows, embed_weights=embed_weights)
+    extras = _extras_of(jobs, weights, trajectory, unit, T_s, windows=windows, embed_weights=embed_weights)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [
@@ -109,18 +115,10 @@ def build(
     paths = []
     with progress_bar(as_json) as advance:
         if flavour == "native":
-            needed = libraries_of(jobs, target or [])
-            compiling = iter(range(1, len(absent := missing(needed)) + 1))
-
-            def on_library(library: tuple[str, str]) -> None:
-                i = next(compiling)
-                text = f"compile {library[0]} for {library[1]}, {i} of {len(absent)}"
-                if as_json or errors_console.is_terminal:
-                    advance(text, (i - 1) / len(absent))
-                else:
-                    errors_console.print(text, soft_wrap=True)
-
-            library_paths(needed, on_library)
+            needed = _libraries_of(jobs, target or [])
+            made = iter(range(1, (n := len(missing(needed))) + 1))
+            advance(f"compile {n} libraries", 0.0)
+            library_paths(needed, lambda one: advance(f"compiled {one[0]} for {one[1]}", next(made) / n))
         for i, (axis, name, model, version) in enumerate(jobs):
             advance(name, i / len(jobs))
             given = {"targets": target or None, "fmi": version, **extras.get(model, {})}
@@ -133,3 +131,111 @@ def build(
     else:
         for path in paths:
             console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", soft_wrap=True)
+
+
+def _jobs_of(
+    fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
+) -> list[Job]:
+    """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
+    from ..fmi.archive import fmu_names
+    from ..fmi.libraries import check_available
+    from ..machines.machine import load_machine, machine_names
+
+    versions = versions_of(fmi, flavour)
+    jobs = [
+        (axis, name, model, version)
+        for axis in map(load_machine, machines or machine_names())
+        for version in versions
+        for name, model in fmu_names(axis, flavour, version).items()
+    ]
+    if unknown := sorted(set(fmus) - {name for _, name, _, _ in jobs}):
+        without = dict.fromkeys(axis.name for axis, _, _, _ in jobs if axis.drive_limits is None)
+        hint = ""
+        if without and any(name.startswith("SepCompensator") for name in unknown):
+            hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
+        if fmi == FMI_VERSIONS[0] and any("Fmi3" in name for name in unknown):
+            hint += "; FMUs of FMI 3.0 need --fmi 3"
+        raise ParameterError(
+            f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _, _ in jobs)}{hint}"
+        )
+    if targets and flavour != "native":
+        raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
+    if flavour == "native":
+        check_available(targets or ("host",))
+    return [job for job in jobs if not fmus or job[1] in fmus]
+
+
+def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
+    """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
+    from ..fmi.compiler import expanded
+    from ..fmi.fmu import table_of
+    from ..fmi.libraries import default_targets
+
+    kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model, _ in jobs)
+    return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
+
+
+def _extras_of(
+    jobs: Sequence[Job],
+    weights: Path | None,
+    trajectory: Path | None,
+    unit: str | None,
+    T_s: float | None,
+    *,
+    windows: bool = True,
+    embed_weights: bool = False,
+) -> dict[str, dict[str, Any]]:
+    """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
+
+    Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them;
+    ``windows=False`` for all that have windows.
+    """
+    from ..fmi.warm_start import load_trained
+    from ..logs.log import check_reading
+    from ..machines.agree import check_interval
+    from ..plants.trajectory import read_trajectory
+
+    extras: dict[str, dict[str, Any]] = {}
+    check_reading(unit, T_s)
+    if weights is not None:
+        axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
+        load_trained(weights, axis, model)
+        extras[model] = {"weights": weights, **({"embed_weights": True} if embed_weights else {})}
+    elif embed_weights:
+        raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
+    if trajectory is not None:
+        axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
+        samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
+        check_interval(trajectory.name, found, axis)
+        extras[model] = {"samples": samples}
+    if not windows:
+        if not any(model == "HybridPredictor" for _, _, model, _ in jobs):
+            names = ", ".join(name for _, name, _, _ in jobs)
+            raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
+        extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
+    return extras
+
+
+def _without_files(jobs: Sequence[Job], option: str, *, named: bool) -> list[Job]:
+    """Return the FMUs whose sources open no file; ReferenceTrajectory plays files.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or a ReferenceTrajectory was asked for by name.
+    """
+    kept = [job for job in jobs if job[2] != "ReferenceTrajectory"]
+    if not kept or (named and len(kept) < len(jobs)):
+        raise ParameterError(f"{option} is for FMUs that open no files; ReferenceTrajectory plays files, leave it out")
+    return kept
+
+
+def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
+    """Return machine and model of the one FMU of these models to which an option applies."""
+    found = [job for job in jobs if job[2] in models]
+    if len({(axis.name, model) for axis, _, model, _ in found}) != 1:
+        names = ", ".join(name for _, name, _, _ in found) or "none"
+        raise ParameterError(
+            f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
+        )
+    return found[0][0], found[0][2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +21,6 @@ from .options import (
     JsonOption,
     MachineOption,
     ReadingOptions,
-    SchedulerOption,
-    WorkersOption,
     takes_parameters,
     takes_reading,
 )
@@ -48,8 +47,6 @@ def tune(
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes; as many as there are processors if left out.")
     ] = None,
-    workers: WorkersOption = 0,
-    scheduler: SchedulerOption = "",
     out: Annotated[Path | None, typer.Option(help="Machine file to write, with what was chosen.")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="PNG, PDF or SVG with the error over each parameter and over the look-ahead.")
@@ -62,8 +59,7 @@ def tune(
     The look-ahead is the controller's.
     """
     from ..machines.machine import load_machine, machine_path
-    from ..parallel.engine import cluster_of
-    from ..tune.joint import n_processors, over_windows
+    from ..tune.joint import over_windows
     from ..tune.joint import tune as tune_on
     from ..tune.losses import n_unjudged
     from .log_intake import show
@@ -81,19 +77,17 @@ def tune(
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust, fix=fix, as_is=as_is)
-    with cluster_of(workers, scheduler) as engine, progress_bar(as_json) as advance:
-        jobs = n_processors() if jobs is None else jobs
+    with progress_bar(as_json) as advance:
+        jobs = jobs or os.cpu_count() or 1
         tuning = tune_on(
             *(given.model, read.pieces, tried),
             jobs=jobs,
-            engine=engine,
             progress=lambda done: advance(f"replay {len(tried)} candidates", 0.9 * done),
         )
         chosen = tuning.candidates[tuning.chosen]
         windows = over_windows(
             *(given.model, read.pieces, chosen),
             jobs=jobs,
-            engine=engine,
             progress=lambda done: advance("error over Np", 0.9 + 0.1 * done),
         )
     if figure is not None:

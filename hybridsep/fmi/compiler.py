@@ -18,7 +18,8 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -30,7 +31,6 @@ from ..base.errors import FmuError
 from ..base.output import named_errors
 from .flavours import FMI_VERSIONS
 from .macho import universal
-from .processes import run_together
 
 __all__ = [
     "ALL_TARGETS",
@@ -217,29 +217,28 @@ def compiler_for(target: str) -> Compiler:
 
 def compiled(
     jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
-    on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
-    on_made: Callable[[tuple[str, str], bytes], object] = lambda _job, _content: None,
-) -> dict[tuple[str, str], bytes]:
-    """Compile and link ``all.c`` into stripped shared libraries, always as many as there are processors.
+) -> Iterator[tuple[tuple[str, str], bytes]]:
+    """Compile and link ``all.c`` into stripped shared libraries, as many at a time as there are processors.
 
     Parameters
     ----------
     jobs : mapping
         (name of the library, key of :data:`TARGETS`) → its compiler, and its sources by file name.
-    on_job : callable, optional
-        Called with each key when its compilation begins.
-    on_made : callable, optional
-        Called with each key and its library when it is compiled, also where a later one fails or is interrupted.
+
+    Yields
+    ------
+    (tuple, bytes)
+        Each key and its library, in their order.
 
     Raises
     ------
     FmuError
         If a compiler refuses.
     """
-    made: dict[tuple[str, str], bytes] = {}
-    with TemporaryDirectory() as place:
-        commands = []
-        for (name, target), (compiler, sources) in jobs.items():
+    with TemporaryDirectory() as place, ThreadPoolExecutor(os.cpu_count()) as pool:
+
+        def compile_one(name: str, target: str) -> bytes:
+            compiler, sources = jobs[name, target]
             folder = Path(place) / name / target
             with named_errors(folder):
                 folder.mkdir(parents=True)
@@ -248,17 +247,18 @@ def compiled(
             # dladdr is no part of POSIX
             flags = [*compile_flags(compiler.command), "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
             output = f"{name}{TARGETS[target].suffix}"
-            commands.append(([*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags], folder))
-        keys = list(jobs)
-
-        def take(i: int) -> None:
-            name, target = keys[i]
-            made[keys[i]] = (commands[i][1] / f"{name}{TARGETS[target].suffix}").read_bytes()
-            on_made(keys[i], made[keys[i]])
-
-        for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i]), take).items():
-            if status != 0:
-                (name, target), (arguments, _) = keys[i], commands[i]
-                said = f"{' '.join(arguments)}\n{complaint.strip()}"
+            command = [*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags]
+            done = subprocess.run(
+                command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace", check=False
+            )
+            if done.returncode != 0:
+                said = f"{' '.join(command)}\n{done.stderr.strip()}"
                 raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
-    return {key: made[key] for key in jobs}
+            return (folder / output).read_bytes()
+
+        running = {key: pool.submit(compile_one, *key) for key in jobs}
+        try:
+            for key, future in running.items():
+                yield key, future.result()
+        finally:  # after a failure or Ctrl-C no other one begins
+            pool.shutdown(cancel_futures=True)

@@ -73,7 +73,7 @@ def library_paths(
     ----------
     wanted : sequence of pairs
     on_library : callable, optional
-        Called with each library that has to be compiled, when its compilation begins.
+        Called with each library that had to be compiled, when it is there.
 
     Raises
     ------
@@ -83,13 +83,13 @@ def library_paths(
     compilers = {target: compiler_for(target) for _, target in missing(wanted)}
     jobs = {(kind, target): (compilers[target], _sources(kind)) for kind, target in missing(wanted)}
 
-    def keep(library: Library, content: bytes) -> None:
+    for library, content in compiled(jobs):
         place = _place(compilers[library[1]].name, library)
         place.parent.mkdir(parents=True, exist_ok=True)
         with written_whole(place) as file:
             file.write(content)
-
-    if compiled(jobs, on_library, keep):
+        on_library(library)
+    if jobs:
         _forget_old_versions()
     return {library: kept(library) or _place(compiler_for(library[1]).name, library) for library in wanted}
 

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 from ..base.errors import HybridSepError, ParameterError, first_line
 from ..logs.extras import library
 
-__all__ = ["Done", "Engine", "check_engine", "cluster", "cluster_of", "joblib_engine"]
+__all__ = ["Done", "Engine", "check_engine", "cluster", "joblib_engine"]
 
 T = TypeVar("T")
 
@@ -281,14 +281,3 @@ def check_engine(workers: int, scheduler: str) -> None:
     """Raise ParameterError if both a cluster to be started and a running one are named."""
     if workers and scheduler:
         raise ParameterError("--workers and --scheduler exclude each other")
-
-
-@contextmanager
-def cluster_of(workers: int, scheduler: str) -> Iterator[Engine | None]:
-    """Yield the cluster that options name, as of :func:`cluster`; None if they name none."""
-    check_engine(workers, scheduler)
-    if not (workers or scheduler):
-        yield None
-        return
-    with cluster(workers, scheduler) as engine:
-        yield engine

@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
+import signal
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.interrupt import starting_processes
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.physics import ModalModel
-from ..parallel.engine import Engine
 from .choice import WORTH, window_sizes, with_window
 from .losses import Losses, Piece, replayed_losses
 
-__all__ = ["Tuning", "joint_ratio", "n_processors", "over_windows", "tune"]
+__all__ = ["Tuning", "joint_ratio", "over_windows", "tune"]
 
 Logs = Mapping[str, Sequence[Piece]]
 """Logs by name, each in pieces without a gap."""
 
 Progress = Callable[[float], object]
-
-_IDLE = 10
-"""Seconds after which a process without work ends; half a minute later where this one was killed."""
 
 _Task = tuple[str, Sequence[Piece], PredictorSettings]
 """Name and pieces of a log, and a candidate."""
@@ -92,13 +89,6 @@ class Tuning:
         return int(np.isinf(self.rms_h).any(axis=1).sum())
 
 
-def n_processors() -> int:
-    """Return the number of processors that this process may use."""
-    from joblib import cpu_count
-
-    return int(cpu_count())
-
-
 def joint_ratio(rms: Array, rms_hold: Array) -> float:
     """Return the geometric mean of RMS errors relative to hold's; infinite if one is."""
     ratios = [rms_ratio(float(one), float(hold)) for one, hold in zip(rms, rms_hold, strict=True)]
@@ -113,7 +103,6 @@ def tune(
     candidates: Sequence[PredictorSettings],
     *,
     jobs: int = 1,
-    engine: Engine | None = None,
     progress: Progress = lambda _done: None,
 ) -> Tuning:
     """Return the losses of candidates, which have one look-ahead, on each of the logs.
@@ -128,8 +117,6 @@ def tune(
         The machine's own first; each takes a replay a log.
     jobs : int
         Processes; the result is the same for any number.
-    engine : Engine, optional
-        What works in their place, such as a cluster.
     progress : callable, optional
         Called with the fraction done.
 
@@ -140,7 +127,7 @@ def tune(
     """
     given = tuple(candidates)
     tasks = [(name, pieces, one) for name, pieces in logs.items() for one in given]
-    return _tuning(logs, given, _losses(model, tasks, jobs, engine, progress))
+    return _tuning(logs, given, _losses(model, tasks, jobs, progress))
 
 
 def over_windows(
@@ -149,14 +136,13 @@ def over_windows(
     settings: PredictorSettings,
     *,
     jobs: int = 1,
-    engine: Engine | None = None,
     progress: Progress = lambda _done: None,
 ) -> dict[int, Tuning]:
     """Return the losses of settings with shorter and longer windows, as far as the logs reach, by ``Np``.
 
     Parameters
     ----------
-    model, logs, jobs, engine, progress
+    model, logs, jobs, progress
         As for :func:`tune`.
     settings : PredictorSettings
         Of the controller's window; others have as many of the lags as fit into them.
@@ -164,7 +150,7 @@ def over_windows(
     sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
     tried = [with_window(settings, Np) for Np in sizes]
     tasks = [(name, pieces, one) for one in tried for name, pieces in logs.items()]
-    found = _losses(model, tasks, jobs, engine, progress)
+    found = _losses(model, tasks, jobs, progress)
     n = len(logs)
     return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
 
@@ -184,39 +170,28 @@ def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[L
     )
 
 
-def _losses(
-    model: ModalModel, tasks: Sequence[_Task], jobs: int, engine: Engine | None, progress: Progress
-) -> list[Losses]:
+def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Losses]:
     """Return the losses of each task, in their order."""
     n, n_jobs = len(tasks), min(jobs, len(tasks))
-    if engine is not None:
-        by_number: dict[int, Losses] = {}
-        for done in engine.run(partial(_numbered_losses, model), list(enumerate(tasks))):
-            if done.failure:
-                raise SignalError(done.failure)
-            by_number[done.task[0]] = done.result
-            progress(len(by_number) / n)
-        return [by_number[i] for i in range(n)]
     if n_jobs == 1:
         return [
             _task_losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
             for i, task in enumerate(tasks)
         ]
-    from joblib import Parallel, delayed
-
     found = []
-    with starting_processes():
-        parallel = Parallel(n_jobs, return_as="generator", idle_worker_timeout=_IDLE)
-        running = parallel(delayed(_task_losses)(model, task) for task in tasks)
-    with closing(running):  # ends the processes where this one is interrupted
-        for losses in running:
+    pool = ProcessPoolExecutor(
+        n_jobs,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,  # a terminal's Ctrl-C ends this process, which ends them
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
+    try:
+        for losses in pool.map(partial(_task_losses, model), tasks):
             found.append(losses)
             progress(len(found) / n)
+    finally:
+        pool.shutdown(cancel_futures=True)
     return found
-
-
-def _numbered_losses(model: ModalModel, task: tuple[int, _Task]) -> Losses:
-    return _task_losses(model, task[1])
 
 
 def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Losses:

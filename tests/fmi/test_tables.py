@@ -72,7 +72,7 @@ def test_a_table_is_what_the_header_is(folders: Folders, tmp_path: Path, name: s
     sources = {path.name: path.read_bytes() for path in (folder / "sources").iterdir() if path.suffix in (".c", ".h")}
     job = (name, host_target())
     own = tmp_path / f"{name}.so"
-    own.write_bytes(compiled({job: (compiler_for(host_target()), {**sources, **fmi_headers()})})[job])
+    own.write_bytes(dict(compiled({job: (compiler_for(host_target()), {**sources, **fmi_headers()})}))[job])
     compiled_in = Library(own, folder / "modelDescription.xml")
     assert trace(library_of(folder), folder / "resources") == trace(compiled_in, folder / "resources")
 
