@@ -25,12 +25,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are n
 
 from hybridsep.base.errors import HybridSepError
 from hybridsep.evaluate.verdict import ALIKE
-from hybridsep.fit.fit import FitOptions, fit
-from hybridsep.fit.report import judged_by
+from hybridsep.fitting.advice import recommendation
+from hybridsep.fitting.fit import FitOptions, fit
+from hybridsep.fitting.report import judged_by
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log, read_log
 from hybridsep.machines.naming import machine_name
-from hybridsep.reports.judged import recommendation
 
 WINDOWS = (100, 20)
 

@@ -26,12 +26,12 @@ from hybridsep.base.metrics import coverage, rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Piece, predict_peers
+from hybridsep.fitting.choice import settings_for
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
 from hybridsep.logs.log import read_log
 from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel
-from hybridsep.tune.choice import settings_for
 
 __all__ = ["LEVELS", "Axis", "Errors", "Folders", "errors_of", "logs_of", "physics", "simulations_of"]
 

@@ -55,15 +55,14 @@ def backtest(
 
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
+    from ..fitting.advice import partly_used, whole_log_words
+    from ..fitting.replay import replay_log
     from ..fmi.warm_start import warm_predictor
     from ..intake.finding import findings_table
     from ..intake.repair import changed_by
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
-    from ..reports.extent import partly_used
-    from ..reports.judged import whole_log_words
-    from ..reports.log_replay import replay_log
     from .log_intake import CHECKED_MAX, open_checked, reading_of
     from .overwrite import BATCH_COLUMNS, BATCHES, FIGURES, RUNS, STATE, Output, check_outputs
     from .progress import progress_bar
@@ -88,7 +87,7 @@ def backtest(
     with progress_bar(as_json) as advance:
         short = isinstance(opened, Log) or opened.n_samples <= CHECKED_MAX
         whole = short or figure is not None or bool(predictions)
-        replayed = replay_log(predictor, opened, whole=whole, batches=out is not None, progress=advance)
+        replayed = replay_log(predictor, opened, whole=whole, progress=advance)
         if replayed.run is not None:
             for path in predictions:
                 replayed.run.save(path)
@@ -101,7 +100,7 @@ def backtest(
             csv.writer(file).writerows([BATCH_COLUMNS, *replayed.batches])
     if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
         console.print(line)
-    if replayed.peers is None and not as_json:
+    if replayed.judged is None and not as_json:
         console.print(f"ARX models are left out: they take at most {CHECKED_MAX} samples.")
     more: dict[str, Any] = {"findings": findings_table(intake.findings)}
     in_motion = any(finding.name == "start in motion" and not finding.applied for finding in intake.findings)

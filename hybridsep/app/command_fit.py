@@ -23,7 +23,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..fit.fit import Fit
+    from ..fitting.fit import Fit
     from ..intake.finding import Finding
     from ..logs.log import Log
 
@@ -54,17 +54,15 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
-    from ..fit.compensation import drive_limits
-    from ..fit.files import fit_files
-    from ..fit.fit import FitOptions
-    from ..fit.fit import fit as fit_logs
-    from ..fit.next_steps import next_steps
-    from ..fit.report import fit_report, judged_by
+    from ..fitting.advice import next_steps, recommendation
+    from ..fitting.compensation import drive_limits
+    from ..fitting.fit import FitOptions, fit_files
+    from ..fitting.fit import fit as fit_logs
+    from ..fitting.report import fit_report, judged_by
     from ..intake.finding import findings_table
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
-    from ..reports.judged import recommendation
     from .log_intake import different_logs, show
     from .overwrite import FIT_FILES, PDF, Output, check_outputs
     from .progress import progress_bar
@@ -140,9 +138,9 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     from rich.table import Table
 
     from ..base.metrics import shown_figure
-    from ..fit.compensation import tracking_lines
+    from ..fitting.advice import extent
+    from ..fitting.compensation import tracking_lines
     from ..intake.repair import changed_by
-    from ..reports.extent import extent
     from .tables import console
 
     unit, shown = logs[0].unit, logs[0].shown  # of all of them

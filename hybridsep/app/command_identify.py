@@ -79,12 +79,12 @@ def identify(
 
     From a log, a frequency response, a swept sine or Klipper's accelerometers.
     """
+    from ..fitting.advice import partly_used
     from ..identify.figures import operation_figure, response_figure
     from ..identify.frequency_response import IdentifiedResponse
     from ..identify.recording import Choices, FileReading, identify_recording, read_recording
     from ..logs.units import shown_in
     from ..machines.naming import checked_name, machine_name
-    from ..reports.extent import partly_used
     from .log_intake import show
     from .overwrite import MACHINE, PNG, Output, check_outputs
     from .progress import progress_bar

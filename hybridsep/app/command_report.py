@@ -49,18 +49,16 @@ def report(
     from ..cosim.importer import faulty
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
+    from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words
+    from ..fitting.fit import SAMPLES_MAX, step_times
+    from ..fitting.replay import Recording, replay
+    from ..fitting.report import write_changes, write_errors, write_findings, write_use
     from ..fmi.warm_start import warm_predictor
     from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
-    from ..reports.extent import extent, partly_used
-    from ..reports.judged import Judged, recommendation, whole_log_words
-    from ..reports.sections import write_changes, write_errors, write_findings
-    from ..reports.step_times import SAMPLES_MAX, step_times
-    from ..reports.use import write_use
-    from ..tune.recordings import Recording, replay
     from .log_intake import open_checked, reading_of
     from .overwrite import PDF, REPORT, Output, check_outputs
     from .progress import progress_bar

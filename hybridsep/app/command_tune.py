@@ -58,10 +58,9 @@ def tune(
 
     The look-ahead is the controller's.
     """
+    from ..fitting.tuning import n_unjudged, over_windows
+    from ..fitting.tuning import tune as tune_on
     from ..machines.machine import load_machine, machine_path
-    from ..tune.joint import over_windows
-    from ..tune.joint import tune as tune_on
-    from ..tune.losses import n_unjudged
     from .log_intake import show
     from .overwrite import FIGURES, MACHINE, Output, check_outputs
     from .progress import progress_bar
@@ -69,7 +68,7 @@ def tune(
     from .tune_table import print_tuning, tuning_summary
 
     if figure is not None:
-        from ..tune.figures import tuning_figure
+        from ..fitting.tuning import tuning_figure
 
     given = load_machine(machine)
     outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, FIGURES))
@@ -127,8 +126,8 @@ def _tried(
     given: Machine, parameters: Mapping[str, Any], *, writes: bool
 ) -> tuple[Machine, dict[str, tuple[Any, ...]], list[PredictorSettings]]:
     """Return the machine with what is fixed, the values of what is tuned, and the settings that are tried."""
-    from ..tune.choice import with_window
-    from ..tune.grid import TUNED, candidates, default_values
+    from ..fitting.choice import with_window
+    from ..fitting.tuning import TUNED, candidates, default_values
 
     ranges = {
         field: parse_range(parameters[parameter.name], parameter)
@@ -149,9 +148,9 @@ def _read(
     logs: Sequence[Path], given: Machine, reading: ReadingOptions, *, may_miss: bool, fix: bool, as_is: bool
 ) -> _Read:
     """Read and check the logs."""
+    from ..fitting.advice import partly_used
     from ..logs.log import Log
     from ..logs.units import shown_of
-    from ..reports.extent import partly_used
     from .log_intake import open_checked, reading_of
 
     how = reading_of(given, reading, may_miss=may_miss)

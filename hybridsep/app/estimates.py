@@ -15,7 +15,7 @@ __all__ = ["warn_of_estimates"]
 
 def warn_of_estimates(machines: Iterable[Machine]) -> None:
     """Say on standard error whose limits of the drive are estimated from a log's motion."""
-    from ..fit.compensation import LIMITS_WORDS
+    from ..fitting.compensation import LIMITS_WORDS
 
     for machine in machines:
         if machine.drive_limits is not None and machine.drive_limits.estimated:

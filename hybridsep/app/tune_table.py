@@ -13,10 +13,9 @@ from rich.table import Table
 from ..base.metrics import reduction_percent, shown_figure
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..fitting.choice import WORTH
+from ..fitting.tuning import TUNED, Tuning, joint_ratio
 from ..logs.units import Shown
-from ..tune.choice import WORTH
-from ..tune.grid import TUNED
-from ..tune.joint import Tuning, joint_ratio
 from .tables import console
 
 __all__ = ["entries", "print_tuning", "tuning_summary"]

@@ -17,8 +17,10 @@ from ..base.errors import MachineError, brief
 from ..base.metrics import rms_ratio
 from ..base.threads import one_blas_thread
 from ..evaluate.report import Report
-from ..fit.fit import FitOptions, fit
-from ..fit.report import fit_report, judged_by
+from ..fitting.advice import Judged, extent, recommendation
+from ..fitting.fit import FitOptions, fit
+from ..fitting.replay import Recording, Replay, replay
+from ..fitting.report import fit_report, judged_by, write_errors, write_findings
 from ..intake.finding import Finding, findings_table
 from ..intake.repair import changes, take_in
 from ..logs.formats import open_source
@@ -26,10 +28,6 @@ from ..machines.agree import check_interval, check_unit
 from ..machines.machine import Machine, load_machine
 from ..machines.naming import machine_name
 from ..predict.predictor import HybridPredictor
-from ..reports.extent import extent
-from ..reports.judged import Judged, recommendation
-from ..reports.sections import write_errors, write_findings
-from ..tune.recordings import Recording, Replay, replay
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 

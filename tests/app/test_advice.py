@@ -11,9 +11,9 @@ import pytest
 
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Peer
+from hybridsep.fitting.advice import Judged, recommendation
+from hybridsep.fitting.replay import Recording, Replay
 from hybridsep.logs.units import shown_in
-from hybridsep.reports.judged import Judged, recommendation
-from hybridsep.tune.recordings import Recording, Replay
 
 NP, N = 20, 1000
 

@@ -128,7 +128,7 @@ def test_what_is_left_is_one_line(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("hybridsep.reports.log_replay.backtest", fail)
+    monkeypatch.setattr("hybridsep.fitting.replay.backtest", fail)
     monkeypatch.delenv("HYBRIDSEP_DEBUG", raising=False)
     log = write_log(tmp_path / "log.csv", n=300)
     assert message in refusal(hybridsep, "backtest", log, "-m", MACHINE)

@@ -19,18 +19,14 @@ from staircase_data import commanded, measured
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
-from hybridsep.fit import fit as fitting
-from hybridsep.fit.files import fit_files
-from hybridsep.fit.fit import Fit, FitOptions, fit
-from hybridsep.fit.origin import sha256_of
-from hybridsep.fit.report import fit_report, judged_by
-from hybridsep.fit.stages import key_of
+from hybridsep.fitting.advice import recommendation
+from hybridsep.fitting.fit import Fit, FitOptions, fit, fit_files, sha256_of
+from hybridsep.fitting.replay import replay, split_log
+from hybridsep.fitting.report import fit_report, judged_by
 from hybridsep.fmi.resource_data import RESOURCE_DATA_FILE
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.naming import machine_name
-from hybridsep.reports.judged import recommendation
-from hybridsep.tune.recordings import replay, split_log
 
 N = 3000
 NP = 50
@@ -103,20 +99,6 @@ def test_the_fmus_name_the_log_the_settings_and_the_figures(fitted: Fit, log: Pa
 
 def test_step_times_are_of_the_steps(fitted: Fit) -> None:
     assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("quick_fit")
-def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def never(*_arguments: object, **_options: object) -> None:
-        raise AssertionError("identified again")
-
-    monkeypatch.setattr(fitting, "identify_operation", never)
-    monkeypatch.setattr(fitting, "choose_settings", never)
-    out = log.parent / "out"
-    assert fit([read_log(log)], out, FitOptions(NP, "axis")).judged.rms() == fitted.judged.rms()
-    with pytest.raises(AssertionError, match="identified again"):
-        fit([read_log(log)], out, FitOptions(NP + 1, "axis"))
 
 
 @pytest.mark.slow
@@ -344,19 +326,6 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
     assert status == 0, err
     assert "Done: unwrap both positions; your controller must do the same." in " ".join(out.split())
     assert json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]["rms_h"] < 12e-6 * scale
-
-
-def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
-    found = read_log(log)
-    [recording] = split_log([(found.x_d, found.x_meas)], 0.5)
-    keys = {
-        key_of([recording], "m"),
-        key_of([recording], "rad"),
-        key_of([replace(recording, x=-recording.x)], "m"),
-        key_of([replace(recording, n_train=recording.n_train + 1)], "m"),
-    }
-    assert len(keys) == 4
-    assert key_of([replace(recording, x=recording.x.copy())], "m") in keys
 
 
 @pytest.mark.slow

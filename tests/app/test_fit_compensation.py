@@ -16,7 +16,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import read_description
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fit.compensation import drive_limits
+from hybridsep.fitting.compensation import drive_limits
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate

@@ -59,8 +59,8 @@ def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None
     words = " ".join(out.split())
     assert "the residual repeats every 10 mm: with --period 0.01 the hybrid's error would go from " in words
     found = json.loads((tmp_path / "without" / "fit.json").read_text())
-    assert len(found["period"]) == 1
-    assert found["period"][0].split(" m")[0] in (tmp_path / "without" / "report.html").read_text(encoding="utf-8")
+    [period] = [one for one in found["identification"]["findings"] if one.startswith("the residual repeats")]
+    assert period.split(" m")[0] in (tmp_path / "without" / "report.html").read_text(encoding="utf-8")
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
     assert status == 0, err
     assert "the residual repeats" not in out

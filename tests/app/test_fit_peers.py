@@ -17,10 +17,10 @@ from staircase_data import commanded, measured
 
 from hybridsep import read_log
 from hybridsep.base.signals import Array
+from hybridsep.fitting.advice import extent
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log
 from hybridsep.logs.units import shown_in, shown_of
-from hybridsep.reports.extent import extent
 
 NP = 20
 

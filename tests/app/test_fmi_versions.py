@@ -16,7 +16,7 @@ from hybridsep.cosim.fmus import FmuController
 from hybridsep.cosim.importer import read_description
 from hybridsep.demo import cases
 from hybridsep.demo.demo import demo, demo_files
-from hybridsep.fit.files import fit_files
+from hybridsep.fitting.fit import fit_files
 from hybridsep.fmi.libraries import ready_targets
 
 NP = 20

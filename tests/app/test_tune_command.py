@@ -13,9 +13,8 @@ from command_line import Run, write_log, write_rows
 from hybridsep import load_machine
 from hybridsep.app.tune_table import print_tuning
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.fitting.tuning import Tuning, tuning_figure
 from hybridsep.logs.units import shown_in
-from hybridsep.tune.figures import tuning_figure
-from hybridsep.tune.joint import Tuning
 
 MACHINE = ("-m", "spring_mass_damper", "--jobs", "1")
 PAPER = (*MACHINE, "--trust", "false")

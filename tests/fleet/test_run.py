@@ -17,7 +17,8 @@ from staircase_data import commanded, measured
 
 from benchmarks.mutations import log_text
 from hybridsep.base.errors import LogError, StateError
-from hybridsep.fit.fit import FitOptions, fit
+from hybridsep.fitting.fit import FitOptions, fit
+from hybridsep.fitting.replay import Recording, replay
 from hybridsep.fleet.results import Results
 from hybridsep.fleet.run import FleetRun, run_fleet
 from hybridsep.fleet.settings import FleetSettings
@@ -25,7 +26,6 @@ from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import load_machine, machine_path
 from hybridsep.parallel.engine import Engine, joblib_engine
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.recordings import Recording, replay
 
 DAYS = ("2026-03-05", "2026-03-06")
 

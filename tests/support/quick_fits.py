@@ -11,15 +11,15 @@ __all__ = ["without_other_settings", "without_other_windows", "without_python_fm
 
 def without_other_windows(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` judge the controller's look-ahead alone, none that are shorter or longer: a third of its time."""
-    patch.setattr("hybridsep.tune.choice._WINDOWS", (1.0,))
+    patch.setattr("hybridsep.fitting.choice._WINDOWS", (1.0,))
 
 
 def without_python_fmus(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` write the native FMUs alone: a tenth of its time."""
-    patch.setattr("hybridsep.fit.files.FLAVOURS", FLAVOURS[:1])
+    patch.setattr("hybridsep.fitting.fit.FLAVOURS", FLAVOURS[:1])
 
 
 def without_other_settings(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try the default settings alone: a fifth of its time."""
-    patch.setattr("hybridsep.tune.choice._SHARES", ())
-    patch.setattr("hybridsep.tune.choice._Q", ())
+    patch.setattr("hybridsep.fitting.choice._SHARES", ())
+    patch.setattr("hybridsep.fitting.choice._Q", ())

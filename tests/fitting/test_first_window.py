@@ -14,8 +14,8 @@ from staircase_data import commanded, measured
 from hybridsep import HybridPredictor, load_machine
 from hybridsep.base.metrics import rms
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.tune.choice import with_window
-from hybridsep.tune.losses import n_unjudged, replayed_losses
+from hybridsep.fitting.choice import with_window
+from hybridsep.fitting.tuning import n_unjudged, replayed_losses
 
 NP = 50
 FIRST = 40

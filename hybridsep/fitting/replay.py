@@ -10,14 +10,27 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.metrics import rms
+from ..base.metrics import largest, rms
 from ..base.signals import Array, Indices
-from ..evaluate.backtest import Backtest, backtest
+from ..cosim.run import Run
+from ..evaluate.backtest import Backtest, Batch, backtest, backtest_stream
 from ..evaluate.peers import Peer, Piece, predict_peers
+from ..evaluate.replayed import replayed_run
+from ..evaluate.scores import Scores
 from ..evaluate.verdict import Tally, Verdict
+from ..logs.log import Log, LogReader
 from ..predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTIONS", "Recording", "Replay", "Scored", "replay", "split_log"]
+__all__ = [
+    "PREDICTIONS",
+    "LogReplay",
+    "Recording",
+    "Replay",
+    "Scored",
+    "replay",
+    "replay_log",
+    "split_log",
+]
 
 PREDICTIONS = ("x_pb", "x_hold", "x_h")
 """What a replay predicts by: physics model, hold baseline, hybrid."""
@@ -311,3 +324,118 @@ def replay(
         )
         done += len(recording.x)
     return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.measurement_delay)
+
+
+@dataclass(frozen=True)
+class LogReplay:
+    """A log that was replayed, beside ARX models, as ``hybridsep backtest`` scores and saves it.
+
+    Attributes
+    ----------
+    scores : Scores
+    first : Batch
+        The first window.
+    batches : list of (t, rms_pb, rms_hold, rms_h), s and m
+        Of each window.
+    judged : Replay or None
+        With ARX models fitted again before each window to all samples so far; None where the log was not held in
+        memory.
+    run : Run or None
+        Predictions sample by sample, likewise.
+    """
+
+    scores: Scores
+    first: Batch
+    batches: list[tuple[float, ...]]
+    judged: Replay | None = None
+    run: Run | None = None
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Verdict with all that was compared."""
+        own = self.scores.verdict
+        if self.judged is None:
+            return own
+        found = self.judged.verdict()
+        return replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples)
+
+    @cached_property
+    def _of_peers(self) -> dict[str, Scored]:
+        """Errors of the ARX models by their names in :meth:`summary`, such as ``arx20``."""
+        if self.judged is None:
+            return {}
+        scored = self.judged.scored()[2:-1]
+        return {peer.name.lower(): one for peer, one in zip(self.judged.peers, scored, strict=True)}
+
+    def summary(self) -> dict[str, float | int | str]:
+        """Return the figures of the replay and of the ARX models by name.
+
+        ``rms_arx20_um``, ``max_arx20_um``, … are as :meth:`~hybridsep.evaluate.scores.Scores.summary` has the others,
+        and ``"diverged"`` of one that did.
+        """
+        found: dict[str, float | int | str] = dict(self.scores.summary())
+        active = self.scores.active if isinstance(self.scores, Backtest) else np.empty(0, np.bool_)
+        for suffix, counted in (("", np.ones(len(active), np.bool_)), ("_after_warm_up", active)):
+            for quantity, figure in (("rms", rms), ("max", largest)):
+                for name, one in self._of_peers.items():
+                    known = one.errors[counted & ~np.isnan(one.errors)]
+                    value = 1e6 * figure(known) if known.size else math.nan
+                    found[f"{quantity}_{name}_um{suffix}"] = "diverged" if one.diverged else value
+        return found
+
+    def without_first_window(self) -> dict[str, float]:
+        """Return the RMS errors from the second window on by name, m; empty where there is one window."""
+        if self.scores.n_batches < 2:
+            return {}
+        first = self.first
+        n = int(np.count_nonzero(~np.isnan(first.x)))
+        rest = self.scores.overall.rms_without(n, (first.rms_pb, first.rms_hold, first.rms_h))
+        found = dict(zip(("pb", "hold", "h"), rest, strict=True))
+        errors = {name: one.errors[len(first.x) :] for name, one in self._of_peers.items() if not one.diverged}
+        return found | {name: _rms(one) for name, one in errors.items() if not np.isnan(one).all()}
+
+
+def replay_log(
+    predictor: HybridPredictor,
+    opened: LogReader | Log,
+    *,
+    whole: bool,
+    progress: Callable[[str, float], object] = lambda _message, _done: None,
+) -> LogReplay:
+    """Replay a log.
+
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        It learns the log on the way.
+    opened : LogReader or Log
+    whole : bool
+        Whether the log is held in memory, for ARX models and predictions sample by sample; a Log always is.
+    progress : callable, optional
+        Called with a message and the fraction done.
+
+    Raises
+    ------
+    SignalError
+        If a prediction diverges.
+    """
+    n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
+    rows: list[tuple[float, ...]] = []
+    first: list[Batch] = []
+
+    def on_batch(batch: Batch) -> None:
+        rows.append((round(batch.k * opened.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
+        if batch.j == 0:
+            first.append(batch)
+        progress("replay", 0.8 * batch.k / n_samples)
+
+    if isinstance(opened, LogReader) and not whole:
+        scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
+        return LogReplay(scores, first[0], rows)
+    log = opened if isinstance(opened, Log) else opened.read()
+    found = backtest(predictor, log.x_d, log.x_meas, on_batch=on_batch)
+    delay = predictor.settings.measurement_delay
+    judged = Replay((Recording(log.x_d, log.x_meas, 0),), (found,), predictor.Np, delay)
+    judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
+    run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
+    return LogReplay(found, first[0], rows, judged, run)

@@ -10,11 +10,11 @@ import pytest
 from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.fit.compensation import estimated_limits
-from hybridsep.fit.plant import commands_to_try, identified_plant, plant_words
+from hybridsep.fitting.compensation import estimated_limits
+from hybridsep.fitting.plant import commands_to_try, identified_plant, plant_words
+from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
 from hybridsep.plants.stage_drive import StageDrive
-from hybridsep.tune.recordings import Recording
 
 T_S = 1e-3
 MODE = Mode(35.0, 0.4, (70 * np.pi) ** 2)

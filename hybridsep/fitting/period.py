@@ -13,7 +13,7 @@ from ..identify.periodic import residual_period
 from ..identify.segments import in_time
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .recordings import Recording, replay
+from .replay import Recording, replay
 
 __all__ = ["PeriodHint", "period_hint"]
 

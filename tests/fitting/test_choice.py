@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.fitting.choice import choose_settings, settings_for, settings_to_try, window_scores
+from hybridsep.fitting.replay import Recording, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.choice import choose_settings, settings_for, settings_to_try, window_scores
-from hybridsep.tune.recordings import Recording, replay, split_log
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 

@@ -15,8 +15,8 @@ from predictor_cases import MODEL, Array, small_signals
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.fitting.tuning import Piece, n_unjudged, replayed_losses
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.losses import Piece, n_unjudged, replayed_losses
 
 PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, trust=False, t_init=0.0)
 

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from ..base.data_files import COMMANDS, COMMANDS_HEAD
 from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
+from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from ..fmi.flavours import FMI_VERSIONS
+from ..base.version import __version__
+from ..cosim.fmus import FmuController
+from ..fmi.archive import fmu_name
+from ..fmi.builds import build_here
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
+from ..fmi.libraries import check_available, has_native
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.segments import in_time
@@ -26,17 +36,13 @@ from ..machines.seal import sealed
 from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
-from ..reports.step_times import step_times
-from ..tune.choice import choose_settings, settings_for, window_scores
-from ..tune.period import period_hint
-from ..tune.recordings import Recording, Replay, replay, split_log
+from .choice import choose_settings, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, estimated_limits, expected_tracking
-from .files import build_fmus, fit_files, write_commands
-from .origin import fit_origin
+from .period import period_hint
 from .plant import commands_to_try, identified_plant, plant_words
-from .stages import Stages, key_of
+from .replay import Recording, Replay, replay, split_log
 
-__all__ = ["REPEATS", "Fit", "FitOptions", "fit"]
+__all__ = ["REPEATS", "SAMPLES_MAX", "Fit", "FitOptions", "fit", "fit_files", "sha256_of", "step_times"]
 
 REPEATS = "the residual repeats every"
 """Beginning of the finding that a period would help, which names its option."""
@@ -88,9 +94,10 @@ class Fit:
     files : tuple of Path
         Files that were written.
     tracking : dict
-        Tracking errors to be expected, of :func:`~hybridsep.fit.compensation.expected_tracking`; empty without limits.
+        Tracking errors to be expected, of :func:`~hybridsep.fitting.compensation.expected_tracking`; empty without
+        limits.
     plant : dict
-        Plant to try with, of :func:`~hybridsep.fit.plant.identified_plant`.
+        Plant to try with, of :func:`~hybridsep.fitting.plant.identified_plant`.
     """
 
     machine: Machine
@@ -157,7 +164,7 @@ def fit(
     logs : sequence of Log
         Of one axis, all sampled alike.
     out : Path
-        Folder of :func:`~hybridsep.fit.files.fit_files`; it exists.
+        Folder of :func:`~hybridsep.fitting.fit.fit_files`; it exists.
     options : FitOptions
     progress : callable, optional
         Called with a message and the fraction done.
@@ -177,7 +184,7 @@ def fit(
         If a log is too short to be split.
     """
     T_s = _common(logs)
-    Np = _window(options.Np, T_s)
+    Np = max(1, round(_LOOK_AHEAD / T_s)) if options.Np is None else options.Np
     recordings = [
         piece for log in logs for piece in split_log([(s.x_d, s.x_meas) for s in log.segments()], options.share, Np)
     ]
@@ -191,54 +198,53 @@ def fit(
     default = replace(settings_for(Np, T_s, "zoh"), **options.known)
     compensates = bool(options.drive_limits)
     files = fit_files(out, options.name, compensator=compensates, fmi=fmi)
-    stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit, logs[0].shown)))
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
 
-    found = stages.result(
-        "identification", lambda: _identified(recordings, default, logs, within(0.0, 0.33, "identify"))
-    )
+    found = _identified(recordings, default, logs, within(0.0, 0.33, "identify"))
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
     progress("look for what repeats with the position", 0.33)
-    repeats = stages.result("period", lambda: _repeats(model, recordings, default, logs[0]))
-    found = {**found, "findings": [*found["findings"], *repeats]}
-    choice = stages.result("choice", lambda: _choice(model, recordings, default, within(0.35, 0.6, "choose p and q")))
-    p, q = _chosen(choice)
-    settings = replace(default, p=p, q=q)
-    windows = stages.result(
-        "windows",
-        lambda: [
-            {name: _known(value) for name, value in asdict(one).items()}
-            for one in window_scores(
-                *(model, recordings, settings, within(0.6, 0.8, "error over Np")), offset=found["offset"]
-            )
-        ],
-    )
+    found["findings"] = [*found["findings"], *_repeats(model, recordings, default, logs[0])]
+    chosen = choose_settings(model, recordings, default, within(0.35, 0.6, "choose p and q"))
+    settings = chosen.settings
+    choice = [
+        {"p": one.settings.p, "q": one.settings.q, "rms_h": _known(one.rms_h), "chosen": one.settings == settings}
+        for one in chosen.tried
+    ]
+    judge = within(0.6, 0.8, "error over Np")
+    windows = [
+        {name: _known(value) for name, value in asdict(one).items()}
+        for one in window_scores(model, recordings, settings, judge, offset=found["offset"])
+    ]
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=within(0.8, 0.83, "judge on the second half"))
     judged = replace(replayed, offset=found["offset"]).with_peers(within(0.83, 0.85, "peers on the second half"))
-    plant = stages.result("plant", lambda: identified_plant(model, settings, recordings))
+    plant = identified_plant(model, settings, recordings)
     limits = dict(options.drive_limits) or estimated_limits(recordings, T_s)
     machine = _machine(options, logs, model, settings, changes, plant["entries"], limits)
     with written_text(files["machine file"]) as file:
         file.write(sealed(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)), "fit"))
-    write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
+    _write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
     predictor.save(files["trained predictor"])
     tracking: dict[str, float | None] = {}
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
-        tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
+        tracking = expected_tracking(machine, recordings, estimate)
     if not fmus:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
-    result = Fit(machine, found, choice, windows, {}, options.share, judged, tuple(files.values()), tracking, plant)
+    written = tuple(files.values())
+    result = Fit(machine, found, choice, windows, {}, options.share, judged, written, tracking, plant)
+    summary = result.summary()["judged"]
     if fmus:
-        origin = fit_origin(machine, logs, found, result.summary()["judged"], share=options.share, changes=changes)
-        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
+        origin = _origin(result, logs, summary, changes)
+        built = _build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
         progress("time the FMU's steps", 0.95)
         result = replace(result, steps=step_times(built, recordings[0].x_d, recordings[0].x))
-    stages.keep("judged", result.summary()["judged"])
+    kept = {"identification": found, "choice": choice, "windows": windows, "plant": plant, "tracking": tracking}
+    with written_text(files["results"]) as file:
+        file.write(json.dumps({"hybridsep": __version__, **kept, "judged": summary}, indent=2) + "\n")
     progress("done", 1.0)
     return result
 
@@ -254,11 +260,6 @@ def _common(logs: Sequence[Log]) -> float:
     return T_s
 
 
-def _window(Np: int | None, T_s: float) -> int:
-    """Return the window, samples."""
-    return max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
-
-
 def _identified(
     recordings: Sequence[Recording],
     settings: PredictorSettings,
@@ -268,6 +269,8 @@ def _identified(
     """Return the identification from the training samples, as plain values, in the units of the logs."""
     training = [in_time(*one.training, settings.measurement_delay) for one in recordings if one.n_train > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_train, len(one.x)) for one in recordings), strict=True))
+    log = "this log" if len(logs) == 1 else "these logs"
+    rests = all(np.ptp(one.x_d) == 0 for one in recordings)
     try:
         if n < SAMPLES_MIN:
             raise IdentificationError(
@@ -278,19 +281,12 @@ def _identified(
             *(training, settings.T_s),
             unit=logs[0].unit,
             shown=logs[0].shown,
-            part=_what_trains(recordings, logs),
+            part=log if rests else f"the first half of {log}",
             progress=lambda _message, done: progress(done),
         )
     except IdentificationError as error:
         found = unit_gain_model(settings.T_s, f"{error}; a gain of 1 without lag is taken")
-    summary = dict(found.summary())
-    return {name: _known(value) for name, value in summary.items()}
-
-
-def _what_trains(recordings: Sequence[Recording], logs: Sequence[Log]) -> str:
-    """Return what the training samples are, in words: where all of it rests, all of the log."""
-    log = "this log" if len(logs) == 1 else "these logs"
-    return log if all(np.ptp(one.x_d) == 0 for one in recordings) else f"the first half of {log}"
+    return {name: _known(value) for name, value in dict(found.summary()).items()}
 
 
 def _known(value: Any) -> Any:
@@ -310,31 +306,6 @@ def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: Predi
         f"{REPEATS} {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
         f"error would go from {before} to {after} {unit}, by replays of the training half"
     ]
-
-
-def _choice(
-    model: ModalModel,
-    recordings: Sequence[Recording],
-    default: PredictorSettings,
-    progress: Callable[[float], object],
-) -> list[dict[str, Any]]:
-    """Return all settings that were tried, as plain values."""
-    choice = choose_settings(model, recordings, default, progress)
-    return [
-        {
-            "p": one.settings.p,
-            "q": one.settings.q,
-            "rms_h": _known(one.rms_h),
-            "chosen": one.settings == choice.settings,
-        }
-        for one in choice.tried
-    ]
-
-
-def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
-    """Return ``p`` and ``q``."""
-    chosen = next(one for one in choice if one["chosen"])
-    return int(chosen["p"]), int(chosen["q"])
 
 
 def _machine(
@@ -377,3 +348,134 @@ def _comments(found: Mapping[str, Any], machine: Machine, plant: Mapping[str, An
     if machine.drive_limits is not None and machine.drive_limits.estimated:
         lines.append(f"[drive_limits]: {LIMITS_WORDS}")
     return lines
+
+
+_MODELS = {"": "HybridPredictor", "compensator ": "SepCompensator"}
+"""Models of the FMUs, by how a compensator's are called."""
+
+
+def fit_files(out: Path, name: str, *, compensator: bool = False, fmi: str = FMI_VERSIONS[0]) -> dict[str, Path]:
+    """Return the files that :func:`~hybridsep.fitting.fit.fit` writes and its report, by what they are.
+
+    Parameters
+    ----------
+    out : Path
+        Their folder.
+    name : str
+        The machine's.
+    compensator : bool
+        Whether there is a compensator's FMU beside each predictor's.
+    fmi : str
+        Version of the native FMUs, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`.
+
+    Raises
+    ------
+    ParameterError
+        If ``fmi`` is another word.
+    FmuError
+        If it asks for FMUs of FMI 3.0, and no native ones can be built here.
+    """
+    return {
+        "machine file": out / "machine.toml",
+        "trained predictor": out / "trained.state",
+        "results": out / "fit.json",
+        "report": out / "report.html",
+        "commands to try": out / COMMANDS,
+        **{
+            _called(what, flavour, version): out / f"{fmu_name(model, name, flavour, version)}.fmu"
+            for what, model in list(_MODELS.items())[: 2 if compensator else 1]
+            for flavour, version in _variants(fmi)
+        },
+    }
+
+
+def _write_commands(path: Path, x_d: Array, T_s: float, unit: str) -> None:
+    """Write commands as a CSV that ``--trajectory`` takes, m, or rad where that is the unit."""
+    with written_text(path) as file:
+        file.write(f"{COMMANDS_HEAD}\nt [s],x_d [{unit}]\n")
+        file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate(x_d.tolist()))
+
+
+def _build_fmus(
+    machine: Machine,
+    files: Mapping[str, Path],
+    progress: Callable[[float], object],
+    fmi: str,
+    origin: Mapping[str, Any],
+) -> Path:
+    """Build the FMUs among :func:`fit_files`, trained, with what they say of their origin; return the predictor's."""
+    variants = _variants(fmi)
+    for i, (flavour, version) in enumerate(variants):
+        progress(i / len(variants))
+        for what, model in _MODELS.items():
+            if path := files.get(_called(what, flavour, version)):
+                given: dict[str, Any] = {"weights": files["trained predictor"], "fmi": version, "origin": origin}
+                build_here(machine, model, path.parent, flavour, **given)
+    return files[_called("", *variants[0])]
+
+
+def _variants(fmi: str) -> list[tuple[str, str]]:
+    """Return flavour and version of FMI of the FMUs that can be built here."""
+    if fmi != FMI_VERSIONS[0]:
+        check_available(("host",))
+    native = [(FLAVOURS[0], version) for version in versions_of(fmi, FLAVOURS[0])]
+    python = [(flavour, FMI_VERSIONS[0]) for flavour in FLAVOURS[1:]]
+    return [*native, *python] if has_native() else python
+
+
+def _called(what: str, flavour: str, version: str) -> str:
+    return f"{flavour} {what}FMU" if version == FMI_VERSIONS[0] else f"{flavour} {what}FMU, FMI {version}.0"
+
+
+def _origin(found: Fit, logs: Sequence[Log], judged: Mapping[str, Any], changes: Sequence[str]) -> dict[str, Any]:
+    """Return what FMUs say of their origin: logs with their hashes, settings, figures of the fit."""
+    machine, identification = found.machine, found.identification
+    return {
+        "tool": f"hybridsep {__version__}",
+        "log": [
+            {"file": log.path.name, "sha256": sha256_of(log.path), "samples": len(log.t), "T_s": log.T_s}
+            for log in logs
+        ],
+        "change": list(changes),
+        "machine": {"name": machine.name, "unit": machine.unit},
+        "identification": {"structure": identification["structure"], "offset": identification["offset"]},
+        "settings": machine.predictor_settings.to_fmi(),
+        "trained": {"share": found.share},
+        "judged": {name: "unknown" if value is None else value for name, value in judged.items()},
+    }
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hash of a log's file, ``"unknown"`` where it is none that can be read again, as a pipe."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "unknown"
+
+
+SAMPLES_MAX = 5000
+"""Samples that are timed, at most."""
+
+
+def step_times(fmu: Path, x_d: Array, x: Array) -> dict[str, float]:
+    """Return times of a predictor FMU's steps over the beginning of a log, s.
+
+    Parameters
+    ----------
+    fmu : Path
+        A HybridPredictor.
+    x_d, x : (n,) array, m
+        Commanded and measured positions.
+
+    Returns
+    -------
+    dict
+        ``median``, ``p99_9`` and ``largest``.
+    """
+    n = min(len(x_d), SAMPLES_MAX)
+    taken = np.empty(n)
+    controller = FmuController(fmu, {}, 0.0)
+    with controller:
+        controller.initialise(float(x_d[0]))
+        for k in range(n):
+            begin = perf_counter()
+            controller.step(k, float(x_d[k]), float(x[max(k - controller.delay, 0)]))
+            taken[k] = perf_counter() - begin
+    return {"median": float(np.median(taken)), "p99_9": float(np.quantile(taken, 0.999)), "largest": float(taken.max())}

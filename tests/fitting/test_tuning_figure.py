@@ -12,8 +12,7 @@ import pytest
 from drawn import cut_off, figures_drawn, hiding_legends
 
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.tune.figures import tuning_figure
-from hybridsep.tune.joint import Tuning
+from hybridsep.fitting.tuning import Tuning, tuning_figure
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .recordings import Recording, replay
+from .replay import Recording, replay
 
 __all__ = [
     "WORTH",
@@ -170,7 +170,7 @@ def window_scores(
     model, recordings, settings, progress
         As for :func:`choose_settings`.
     offset : float
-        As of :class:`~hybridsep.tune.recordings.Replay`, m.
+        As of :class:`~hybridsep.fitting.replay.Replay`, m.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []

@@ -11,8 +11,7 @@ from predictor_cases import MODEL, small_signals
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.tune.joint import Logs, Tuning, over_windows, tune
-from hybridsep.tune.losses import replayed_losses
+from hybridsep.fitting.tuning import Logs, Tuning, over_windows, replayed_losses, tune
 
 PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, trust=False, t_init=0.0)
 CANDIDATES = [PAPER, *(replace(PAPER, p=p, lam=lam) for p in (1, 20) for lam in (1e-10, 1e-6))]

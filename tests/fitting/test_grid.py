@@ -8,8 +8,8 @@ import pytest
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.tune.choice import with_window
-from hybridsep.tune.grid import TUNED, candidates, default_values
+from hybridsep.fitting.choice import with_window
+from hybridsep.fitting.tuning import TUNED, candidates, default_values
 
 PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, trust=False)
 TRUST = replace(PAPER, trust=True)

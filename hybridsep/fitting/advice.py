@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
+from ..fmi.builds import other_platforms
 from ..identify.operation import LITTLE_MOTION
+from ..logs.log import Log
 from ..logs.units import Shown
-from ..tune.recordings import Replay
+from .fit import Fit
+from .replay import Replay
 
-__all__ = ["Judged", "peers_in_words", "recommendation", "whole_log_words"]
+__all__ = ["Judged", "extent", "next_steps", "partly_used", "peers_in_words", "recommendation", "whole_log_words"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
@@ -182,3 +189,100 @@ def peers_in_words(judged: Judged) -> str:
             "the physics model is judged with the offset that was identified beside it; the FMU's x_pb has none"
         )
     return "; ".join(words) + "."
+
+
+def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> list[str]:
+    """Return the lines.
+
+    Parameters
+    ----------
+    found : Fit
+    files : mapping
+        Of :func:`~hybridsep.fitting.fit.fit_files`.
+    again : str
+        Command line of this fit.
+    fmi : str
+        Version of its FMUs.
+    """
+    machine = found.machine
+    file, state = shlex.quote(str(files["machine file"])), shlex.quote(str(files["trained predictor"]))
+    lines = ["", "Next, to paste:"]
+
+    def step(says: str, *commands: str) -> None:
+        lines.extend([f"  # {says}", *(f"  hybridsep {command}" for command in commands)])
+
+    limits = machine.drive_limits
+    if machine.plant is None:
+        lines.append(f"  # no plant to try with: {found.plant.get('reason', '')}")
+    elif limits is not None:
+        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
+        warm = f" --weights {state}" if "mode" in found.plant["entries"] else ""
+        step(
+            "the compensated axis, on the identified model: to try with, results are optimistic",
+            f"cosim -m {file} --compensate off",
+            f"cosim -m {file} --compensate hybrid{warm}",
+        )
+        step("the same as one file for tools that read SSP", f"system -m {file} --compensate{warm}")
+    else:
+        step("prediction, on the identified model: to try with, results are optimistic", f"cosim -m {file}")
+        step("the same as one file for tools that read SSP", f"system -m {file}")
+    if limits is not None and limits.estimated:
+        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
+        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
+        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
+        lines.append(f"  {again} {' '.join(known)}")
+    native = next((path for what, path in files.items() if what.startswith("native FMU")), None)
+    note = other_platforms(native, files["machine file"], files["trained predictor"], fmi) if native else ""
+    if note:
+        says, _, command = note.rpartition(": ")
+        lines += [f"  # {says}", f"  {command}"]
+    lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
+    return lines
+
+
+_ALL = 0.995
+"""Share of a file's samples from which on it counts as used, all of it."""
+
+_RATE = 0.01
+"""Relative difference from the file's own rate from which on both are said."""
+
+
+def extent(logs: Sequence[Log]) -> str:
+    """Return how many samples logs of one sampling interval have, over what time and at what rate.
+
+    Where measurements are missing or were cut out, or samples left out, the share of the files' samples and their own
+    rate are said as well.
+    """
+    T_s, n = logs[0].T_s, sum(len(log.t) for log in logs)
+    n_used, n_recorded = sum(map(_n_used, logs)), sum(map(_n_recorded, logs))
+    words = f"{n} samples" if _is_all(logs) else f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
+    words += f", {n * T_s:.4g} s at {1 / T_s:.4g} Hz"
+    own = logs[0].T_recorded
+    if own and abs(T_s / own - 1.0) > _RATE:
+        words += f" (recorded at {1 / own:.4g} Hz)"
+    segments = sum(len(log.starts) for log in logs)
+    if segments == len(logs):
+        return words
+    lasted = sum(float(log.t[-1] - log.t[0]) + T_s for log in logs)
+    return f"{words} in {segments} segments of a record of {lasted:.4g} s"
+
+
+def partly_used(log: Log) -> str:
+    """Return the extent of a log of which a part is used, or at another rate than its file's; empty otherwise."""
+    own = log.T_recorded or log.T_s
+    if _is_all([log]) and abs(log.T_s / own - 1.0) <= _RATE:
+        return ""
+    return f"{log.path.name}: used are {extent([log])}"
+
+
+def _is_all(logs: Sequence[Log]) -> bool:
+    return sum(map(_n_used, logs)) >= _ALL * sum(map(_n_recorded, logs))
+
+
+def _n_used(log: Log) -> int:
+    """Return the samples that are measured."""
+    return int(np.count_nonzero(~np.isnan(log.x_meas)))
+
+
+def _n_recorded(log: Log) -> int:
+    return log.n_recorded or len(log.t)

@@ -26,7 +26,7 @@ from ..logs.units import Shown
 from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel, Mode
 from ..plants.stage_drive import StageDrive
-from ..tune.recordings import Recording
+from .replay import Recording
 
 __all__ = ["commands_to_try", "identified_plant", "plant_words"]
 

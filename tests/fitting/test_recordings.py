@@ -11,9 +11,9 @@ import pytest
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.fitting.replay import Recording, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.recordings import Recording, replay, split_log
 
 N = 400
 

@@ -16,7 +16,7 @@ from ..compensate.expected import expected_errors
 from ..evaluate.report import Report
 from ..logs.units import Shown
 from ..machines.machine import Machine
-from ..tune.recordings import Recording
+from .replay import Recording
 
 __all__ = [
     "COMPENSATE",

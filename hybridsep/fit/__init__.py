@@ -1,1 +1,0 @@
-"""From logs of an axis to its model, its FMUs and a report."""

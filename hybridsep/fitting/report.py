@@ -1,0 +1,374 @@
+"""Report of ``hybridsep fit``: what was found, how good and how sure it is, and how to use it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from scipy.signal import welch
+
+from ..base.metrics import coverage, rms_ratio
+from ..base.signals import Array
+from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
+from ..evaluate.chart import Chart, Line
+from ..evaluate.report import Report
+from ..identify.operation import TOO_LITTLE
+from ..identify.shown import deviation_words, shown_estimates
+from ..intake.finding import Finding
+from ..intake.repair import changes
+from ..logs.log import Log
+from ..logs.units import Shown
+from .advice import Judged, extent, peers_in_words, recommendation
+from .choice import WORTH
+from .compensation import write_tracking
+from .fit import REPEATS, Fit
+
+__all__ = [
+    "COLOURS",
+    "NAMES",
+    "fit_report",
+    "judged_by",
+    "write_changes",
+    "write_errors",
+    "write_findings",
+    "write_use",
+]
+
+_SETTLING = (
+    " The window after a gap is no test window: no model knows the state of the axis there; a controller has no gaps."
+)
+
+
+def judged_by(fit: Fit, shown: Shown) -> Judged:
+    """Return the replay that judges a fit as it is reported, in the units of its logs."""
+    period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
+    return Judged(
+        *(fit.judged, fit.machine.T_s, shown, "the log's second half"),
+        share=1.0 - fit.share,
+        period=period,
+        unidentified=any(one.startswith(TOO_LITTLE) for one in fit.identification["findings"]),
+    )
+
+
+def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:
+    """Return the report.
+
+    Parameters
+    ----------
+    fit : Fit
+    logs : sequence of Log
+        As they were used.
+    findings : mapping
+        Log's name → findings of its intake.
+    """
+    T_s, Np = fit.machine.T_s, fit.judged.Np
+    judged = judged_by(fit, logs[0].shown)
+    report = Report(
+        f"Axis {fit.machine.name}: from its log to its FMU",
+        f"{', '.join(log.path.name for log in logs)} · {extent(logs)} · look-ahead "
+        f"{Np} samples, {1e3 * Np * T_s:.4g} ms",
+    )
+    report.paragraph(recommendation(judged), "verdict")
+    write_changes(report, changes(findings))
+    write_errors(
+        report,
+        judged,
+        "Tested on held-out samples",
+        "The first half of each log trained the physics model and chose the settings; these are the errors of the "
+        "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in fit.judged.recordings) else ""),
+    )
+    _write_other_windows(report, fit, judged)
+    write_findings(report, findings)
+    _write_identification(report, fit, judged)
+    _write_settings(report, fit, judged)
+    write_tracking(report, fit.tracking, judged.shown)
+    fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
+    if fmus:
+        write_use(report, fmus, fit.steps, T_s, Np)
+        report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
+    return report
+
+
+def _write_other_windows(report: Report, fit: Fit, judged: Judged) -> None:
+    report.heading("Errors with other look-aheads")
+    scale, unit = judged.unit
+    windows = np.array(
+        [[one[name] for name in ("Np", "rms_pb", "rms_hold", "rms_h")] for one in fit.windows], np.float64
+    )
+    lengths = 1e3 * judged.T_s * windows[:, 0]
+    lines = [Line(name, lengths, scale * windows[:, 1 + i], COLOURS[i]) for i, name in enumerate(NAMES)]
+    lines += [Line("", lengths, scale * windows[:, 3], HYBRID, points=True)]
+    report.chart(
+        Chart(
+            "look-ahead Np·T_s [ms]",
+            (f"RMS error [{unit}]",),
+            lines,
+            "The look-ahead is the controller's; it is not chosen, as a shorter one always looks better.",
+        )
+    )
+
+
+def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
+    scale, unit = judged.unit
+    found = fit.identification
+    report.heading("Physics model")
+    report.paragraph(
+        f"{found['structure']}, {'zero' if found['input_hold'] == 'zoh' else 'first'}-order hold, dead time "
+        f"{found['dead_time']} samples."
+    )
+    if found["parameters"]:
+        rows = [
+            [name, f"{value:.6g}", deviation_words(std, "± "), unit]
+            for name, value, std, unit in shown_estimates(found["parameters"], judged.shown)
+        ]
+        report.table(["parameter", "value", "standard deviation", "unit"], rows)
+    if found["alternatives"]:
+        rows = [
+            [
+                other["name"],
+                str(other["n_parameters"]),
+                f"{scale * other['rms_fitted']:.4g}",
+                f"{scale * other['rms_held_out']:.4g}",
+                other["objection"] or ("chosen" if other["name"] == found["structure"] else ""),
+            ]
+            for other in found["alternatives"]
+        ]
+        report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
+        report.paragraph("RMS of the simulated position within the training half.", "dim")
+    report.bullets(found["findings"])
+
+
+def _write_settings(report: Report, fit: Fit, judged: Judged) -> None:
+    scale, unit = judged.unit
+    report.heading("Settings")
+    rows = [
+        [
+            str(one["p"]),
+            str(one["q"]),
+            "diverged" if one["rms_h"] is None else f"{scale * one['rms_h']:.4g}",
+            "chosen" if one["chosen"] else "",
+        ]
+        for one in fit.choice
+    ]
+    report.table(["p", "q", f"RMS [{unit}]", ""], rows)
+    report.paragraph(
+        "Errors of causal replays over the later half of the training samples. The first row, the default, stays "
+        f"unless another is better by {100 * WORTH:g} %.",
+        "dim",
+    )
+
+
+NAMES = ("physics model", "hold the last residual", "hybrid")
+"""Names of :data:`~hybridsep.fitting.replay.PREDICTIONS`."""
+
+COLOURS = (PHYSICS, HOLD, HYBRID)
+"""Their colours."""
+
+_COMMAND = "#1d2733"
+
+
+def write_changes(report: Report, changes: Sequence[str]) -> None:
+    """Write what was done to the log's positions that a controller must do as well."""
+    if changes:
+        report.paragraph("These figures, and the FMUs, are of positions that were changed before:")
+        report.bullets(changes)
+
+
+def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
+    """Write the sections on the errors: figures and verdict, over time, over the look-ahead, spectra.
+
+    Parameters
+    ----------
+    report : Report
+    judged : Judged
+    title, how : str
+        Heading of the figures, and how they came about.
+    """
+    _write_figures(report, judged, title, how)
+    if np.isnan(judged.replay.errors()[0]).all():  # nothing judges
+        return
+    _write_time(report, judged)
+    _write_windows(report, judged)
+    _write_horizon(report, judged)
+    _write_spectra(report, judged)
+
+
+def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:
+    report.heading(title)
+    scale, unit = judged.unit
+    scored = judged.replay.scored()
+    rows = []
+    for one in scored:
+        size = np.abs(one.errors[~np.isnan(one.errors)])
+        if one.diverged or not size.size:
+            rows.append([one.name, "diverged" if one.diverged else "–", "", "", ""])
+            continue
+        figures = (one.rms, np.quantile(size, 0.95), size.max())
+        ratio = rms_ratio(one.rms, scored[0].rms)
+        rows.append([one.name, *(f"{scale * figure:.4g}" for figure in figures), f"{ratio:.3f}"])
+    report.table(["prediction by", f"RMS [{unit}]", "95 % below", "largest", "× physics"], rows)
+    report.paragraph(
+        f"{how} Each window was predicted before any of its samples was known, as in the machine. "
+        f"{peers_in_words(judged)}",
+        "dim",
+    )
+    report.bullets(line.rstrip(".") for line in str(judged.replay.verdict()).splitlines())
+
+
+def _write_time(report: Report, judged: Judged) -> None:
+    scale, unit = judged.unit
+    replay = judged.replay
+    errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
+    t = judged.T_s * np.arange(errors.shape[1])
+    factor, position = judged.shown.position
+    lines = [Line("command", t, factor * replay.commands(), _COMMAND)]
+    within = coverage(errors[2], std, 0.95)
+    for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
+        if name != NAMES[1]:
+            lines.append(Line(name, t, row, colour, panel=1))
+    half = np.minimum(1.96 * std, 1.2 * np.nanmax(np.abs(errors)))  # at first it may be far wider than any error
+    lines.append(Line("95 % interval of the hybrid", t, -half, HYBRID, upper=half, panel=1))
+    chart = Chart(
+        f"time in {judged.part} [s]",
+        (f"command [{position}]", f"error x − x̂ [{unit}]"),
+        lines,
+        f"The hybrid states its own standard deviation with each window; {100 * within:.0f} % of the errors are within "
+        "its 95 % interval.",
+    )
+    report.heading("Errors over time")
+    report.chart(chart)
+
+
+def _write_windows(report: Report, judged: Judged) -> None:
+    scale, unit = judged.unit
+    begins, errors = judged.replay.window_errors()
+    if len(begins) < 2:
+        return
+    t = np.repeat(judged.T_s * np.append(begins, len(judged.replay.commands())), 2)[1:-1]
+    lines = [
+        Line(name, t, scale * np.repeat(row, 2), colour)
+        for name, row, colour in zip(NAMES, errors, COLOURS, strict=True)
+    ]
+    worse = int((errors[2] > errors[0]).sum())
+    report.chart(
+        Chart(
+            f"time in {judged.part} [s]",
+            (f"RMS of each window [{unit}]",),
+            lines,
+            f"Window by window: the hybrid is worse than the physics model in {worse} of {len(begins)}.",
+        )
+    )
+
+
+def _write_horizon(report: Report, judged: Judged) -> None:
+    report.heading("Errors over the look-ahead")
+    scale, unit = judged.unit
+    horizon = scale * judged.replay.horizon()
+    ahead = 1e3 * judged.T_s * np.arange(1, judged.replay.Np + 1)
+    lines = [Line(name, ahead, row, colour) for name, row, colour in zip(NAMES, horizon, COLOURS, strict=True)]
+    report.chart(
+        Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, "How the error grows from the window's first sample on.")
+    )
+
+
+def _write_spectra(report: Report, judged: Judged) -> None:
+    scale, unit = judged.unit
+    errors = judged.replay.errors()
+    errors = errors[:, ~np.isnan(errors[0])]
+    if errors.shape[1] < 64:
+        return
+    f, power = welch(errors, 1.0 / judged.T_s, nperseg=min(2048, errors.shape[1]))
+    amplitude: Array = scale * np.sqrt(power)
+    lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(NAMES, amplitude, COLOURS, strict=True)]
+    report.heading("Spectra of the errors")
+    report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
+
+
+def write_findings(report: Report, findings: Mapping[str, Iterable[Finding]]) -> None:
+    """Write what the intake of the logs, by name, found, with its pictures."""
+    report.heading("What the checks of the log found")
+    listed = {name: list(found) for name, found in findings.items()}
+    if not any(listed.values()):
+        report.paragraph("Nothing: time axis, samples, signs, scales, delay and motion are plausible.")
+    for name, found in listed.items():
+        rows = [
+            [
+                finding.name,
+                str(finding).partition(":")[0],
+                finding.words + (f". {finding.fix.words}" if finding.fix else ""),
+            ]
+            for finding in found
+        ]
+        if rows:
+            report.table([name, "", "finding, and what puts it right"], rows, words=2)
+        for finding in found:
+            picture = finding.picture
+            lines = [
+                Line(label, x, y, colour)
+                for (label, (x, y)), colour in zip(
+                    picture.lines.items(), (_COMMAND, PHYSICS, HYBRID, HOLD), strict=False
+                )
+            ]
+            report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
+
+
+def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float, Np: int) -> None:
+    """Write how FMUs are used, and how long a step of the first takes.
+
+    Parameters
+    ----------
+    report : Report
+    fmus : iterable of str
+        Names of their files.
+    steps : mapping
+        As of :func:`~hybridsep.fitting.fit.step_times`.
+    T_s : float
+        Sampling interval, s.
+    Np : int
+        Samples of the look-ahead.
+    """
+    names = list(fmus)
+    report.heading("Use it")
+    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
+    report.paragraph(
+        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; 99.9 % at "
+        f"most {_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
+        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
+    )
+    report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
+    report.bullets(
+        [
+            "OMSimulator: add the FMU to a system, connect x_d to the drive and its measured position to x_meas, fixed "
+            f"step size {T_s:g} s",
+            "OpenModelica: File > Import FMU; in an OMSimulator model as above",
+            f"Dymola: File > Open > Import FMU, co-simulation, communication step {T_s:g} s",
+            f"Simulink: FMU Import block (FMI 2.0, co-simulation), sample time {T_s:g} s",
+            "x_d_ahead is the trajectory, as many samples early as the look-ahead is long; wire x_d to the drive: the "
+            "FMU is the look-ahead buffer",
+        ]
+    )
+
+
+_LATE = (
+    " They take longer than the sampling interval: a real-time task of this interval would overrun on such a machine."
+)
+"""What is added where steps do not fit into the sampling interval."""
+
+_REPLAY = """\
+import numpy as np
+from fmpy import simulate_fmu
+
+# x_d, x_meas: commanded and measured positions of a log, m or rad, one sample every {T_s!r} s:
+# log = hybridsep.read_log("my_axis.csv"); x_d, x_meas = log.x_d, log.x_meas
+signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_meas", float)])
+signals["time"] = {T_s!r} * np.arange(len(signals))
+signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...
+signals["x_meas"] = np.pad(x_meas, ({Np}, 0), mode="edge")  # ... and measured
+result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], output_interval={T_s!r},
+                      input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
+"""Replay of a log with fmpy."""
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration in ms, or in µs if it is shorter."""
+    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"

@@ -1,0 +1,460 @@
+"""Tuning on one or several logs: losses of all candidates, in processes side by side, and their ranking."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..base.errors import ParameterError, SignalError
+from ..base.metrics import rms_ratio
+from ..base.settings import PredictorSettings
+from ..base.signals import Array, as_measured, as_samples
+from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, finish_panels, save_figure
+from ..intake.motion import starts_in_motion
+from ..model.physics import ModalModel
+from ..predict.predictor import HybridPredictor
+from .choice import WORTH, settings_to_try, window_sizes, with_window
+from .replay import Recording, replay
+
+__all__ = [
+    "TUNED",
+    "Losses",
+    "Piece",
+    "Tuning",
+    "candidates",
+    "default_values",
+    "joint_ratio",
+    "n_unjudged",
+    "over_windows",
+    "replayed_losses",
+    "tune",
+    "tuning_figure",
+]
+
+Piece = tuple[Array, Array]
+"""Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
+
+Logs = Mapping[str, Sequence[Piece]]
+"""Logs by name, each in pieces without a gap."""
+
+Values = Mapping[str, Sequence[Any]]
+"""Values to try, by the fields of settings."""
+
+Progress = Callable[[float], object]
+
+_Task = tuple[str, Sequence[Piece], PredictorSettings]
+"""Name and pieces of a log, and a candidate."""
+
+TUNED = {name: PredictorSettings.parameters()[name] for name in PredictorSettings.TUNED}
+"""Parameters that can be tuned, by their fields."""
+
+_CANDIDATES_MAX = 100_000
+"""Candidates beyond which a list is a slip of the pen."""
+
+_LAMBDA_FACTORS = (1.0, 1e2, 1e4)
+"""Values without trust, relative to the machine's own."""
+
+_FORGETTING = 30
+"""Windows after which samples are forgotten in half of the candidates with trust."""
+
+
+@dataclass(frozen=True)
+class Losses:
+    """RMS errors against the measured position over a log, m, as of a backtest without :func:`n_unjudged` samples.
+
+    Attributes
+    ----------
+    rms_pb, rms_hold : float
+        Physics model, hold baseline.
+    rms_h : float
+        Hybrid; infinite where the prediction diverges.
+    """
+
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Losses of candidates with a given look-ahead.
+
+    Attributes
+    ----------
+    logs : tuple of str
+        Their names.
+    candidates : tuple of PredictorSettings
+        The machine's own settings first.
+    rms_pb, rms_hold : (n_logs,) array, m
+        RMS errors of physics model and hold baseline.
+    rms_h : (n_candidates, n_logs) array, m
+        Of the hybrids; infinite where the prediction diverges.
+    """
+
+    logs: tuple[str, ...]
+    candidates: tuple[PredictorSettings, ...]
+    rms_pb: Array
+    rms_hold: Array
+    rms_h: Array
+
+    @cached_property
+    def ratio(self) -> Array:
+        """Geometric mean over the logs of RMS relative to hold, ``(n_candidates,)``.
+
+        Which baseline the ratios are to does not change the ranking by it, and no log counts more for its size.
+        """
+        return np.array([joint_ratio(row, self.rms_hold) for row in self.rms_h])
+
+    @property
+    def ratio_pb(self) -> float:
+        """The same for the physics model."""
+        return joint_ratio(self.rms_pb, self.rms_hold)
+
+    @cached_property
+    def ranking(self) -> list[int]:
+        """Indices of the candidates, the best first."""
+        return sorted(range(len(self.candidates)), key=lambda i: self.ratio[i])
+
+    @property
+    def chosen(self) -> int:
+        """Index of the best candidate, or 0, the machine's own settings, if they are at most 5 % worse."""
+        best = self.ranking[0]
+        return best if self.ratio[best] < (1.0 - WORTH) * self.ratio[0] else 0
+
+    @property
+    def alike(self) -> list[int]:
+        """Indices of the candidates that are at most 5 % worse than the best, the best first."""
+        limit = self.ratio[self.ranking[0]] / (1.0 - WORTH)
+        return [i for i in self.ranking if self.ratio[i] <= limit < math.inf]
+
+    @property
+    def n_diverged(self) -> int:
+        """Number of candidates whose prediction diverges on some log."""
+        return int(np.isinf(self.rms_h).any(axis=1).sum())
+
+
+def joint_ratio(rms: Array, rms_hold: Array) -> float:
+    """Return the geometric mean of RMS errors relative to hold's; infinite if one is."""
+    ratios = [rms_ratio(float(one), float(hold)) for one, hold in zip(rms, rms_hold, strict=True)]
+    if any(math.isinf(ratio) for ratio in ratios) or 0.0 in ratios:
+        return math.inf if math.inf in ratios else 0.0
+    return math.exp(math.fsum(map(math.log, ratios)) / len(ratios))
+
+
+def tune(
+    model: ModalModel,
+    logs: Logs,
+    candidates: Sequence[PredictorSettings],
+    *,
+    jobs: int = 1,
+    progress: Progress = lambda _done: None,
+) -> Tuning:
+    """Return the losses of candidates, which have one look-ahead, on each of the logs.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``.
+    logs : mapping
+        Pieces ``(x_d, x)`` by the log's name; on each log every candidate begins untrained.
+    candidates : sequence of PredictorSettings
+        The machine's own first; each takes a replay a log.
+    jobs : int
+        Processes; the result is the same for any number.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    SignalError
+        If a log's samples cannot be used; the message names the log.
+    """
+    given = tuple(candidates)
+    tasks = [(name, pieces, one) for name, pieces in logs.items() for one in given]
+    return _tuning(logs, given, _losses(model, tasks, jobs, progress))
+
+
+def over_windows(
+    model: ModalModel,
+    logs: Logs,
+    settings: PredictorSettings,
+    *,
+    jobs: int = 1,
+    progress: Progress = lambda _done: None,
+) -> dict[int, Tuning]:
+    """Return the losses of settings with shorter and longer windows, as far as the logs reach, by ``Np``.
+
+    Parameters
+    ----------
+    model, logs, jobs, progress
+        As for :func:`tune`.
+    settings : PredictorSettings
+        Of the controller's window; others have as many of the lags as fit into them.
+    """
+    sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
+    tried = [with_window(settings, Np) for Np in sizes]
+    tasks = [(name, pieces, one) for one in tried for name, pieces in logs.items()]
+    found = _losses(model, tasks, jobs, progress)
+    n = len(logs)
+    return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
+
+
+def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[Losses]) -> Tuning:
+    """Return the tuning of the losses of each log, one after the other."""
+    n = len(found) // len(logs)
+    by_log = [found[i : i + n] for i in range(0, len(found), n)]
+    # A replay that diverges leaves no baselines; all replays of a log have the same.
+    baselines = [next((one for one in losses if not math.isnan(one.rms_pb)), losses[0]) for losses in by_log]
+    return Tuning(
+        tuple(logs),
+        candidates,
+        np.array([one.rms_pb for one in baselines]),
+        np.array([one.rms_hold for one in baselines]),
+        np.array([[one.rms_h for one in losses] for losses in by_log]).T,
+    )
+
+
+def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Losses]:
+    """Return the losses of each task, in their order."""
+    n, n_jobs = len(tasks), min(jobs, len(tasks))
+    if n_jobs == 1:
+        return [
+            _task_losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
+            for i, task in enumerate(tasks)
+        ]
+    ignore = (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is this process's
+    pool = ProcessPoolExecutor(n_jobs, get_context("spawn"), initializer=signal.signal, initargs=ignore)
+    found = []
+    try:
+        for losses in pool.map(partial(_task_losses, model), tasks):
+            found.append(losses)
+            progress(len(found) / n)
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return found
+
+
+def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Losses:
+    name, pieces, candidate = task
+    try:
+        return replayed_losses(model, pieces, candidate, progress)
+    except SignalError as error:
+        raise SignalError(f"{name}: {error}") from error
+
+
+def n_unjudged(x_d: Array, Np: int) -> int:
+    """Return how many leading samples of a piece are not scored: the first window, if the piece begins in motion.
+
+    No model knows the state of the axis there, so its error says nothing of a candidate, but would dominate the RMS.
+    """
+    return Np if len(x_d) > Np and starts_in_motion(x_d) else 0
+
+
+def replayed_losses(
+    model: ModalModel,
+    pieces: Sequence[Piece],
+    candidate: PredictorSettings,
+    progress: Progress = lambda _done: None,
+) -> Losses:
+    """Return the losses of a candidate by a replay of its own; NaN for the baselines where it diverges.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``.
+    pieces : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
+        Each begins at rest; what was learned before is kept, and only the first has a warm-up. With trust measurements
+        may be NaN, and are not scored there.
+    candidate : PredictorSettings
+    progress : callable, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    SignalError
+        If samples cannot be used.
+    """
+    for x_d, x in pieces:
+        if len(x_d) != len(x) or not len(x_d):
+            raise SignalError(f"x_d and x must have as many samples, at least one, got {len(x_d)}, {len(x)}")
+        (as_measured if candidate.trust else as_samples)(x, "x", len(as_samples(x_d, "x_d")))
+    try:
+        recordings = [Recording(x_d, x, 0) for x_d, x in pieces]
+        found = replay(HybridPredictor(model, candidate), recordings, progress=progress)
+    except SignalError:  # the samples are sound: it diverges
+        return Losses(math.nan, math.nan, math.inf)
+    firsts = np.cumsum([0, *(len(x) for _, x in pieces[:-1])])
+    left = [first + np.arange(n_unjudged(x_d, candidate.Np)) for first, (x_d, _) in zip(firsts, pieces, strict=True)]
+    errors = np.delete(found.errors(), np.concatenate(left), axis=1)
+    return Losses(*np.sqrt(np.nanmean(errors**2, axis=1)).tolist())
+
+
+def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
+    """Return the values to try, by the fields of settings.
+
+    Some sixteen combinations with trust, and two dozen without.
+
+    Parameters
+    ----------
+    settings : PredictorSettings
+        The machine's own, whose values are among them.
+    """
+    tried = settings_to_try(settings)
+    lags = {name: tuple(sorted({getattr(one, name) for one in tried})) for name in ("p", "q")}
+    if settings.trust:
+        forgetting = {settings.forgetting, float(f"{_FORGETTING * settings.Np * settings.T_s:.3g}")}
+        return {**lags, "forgetting": tuple(sorted(forgetting))}
+    lam = {settings.lam, *(float(f"{settings.lam * factor:.6g}") for factor in _LAMBDA_FACTORS)}
+    return {**lags, "lam": tuple(sorted(value for value in lam if TUNED["lam"].allows(value)))}
+
+
+def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSettings]:
+    """Return all combinations of values, after the settings themselves.
+
+    Parameters
+    ----------
+    settings : PredictorSettings
+        The machine's own, which have the other parameters.
+    values : mapping
+        Values by the fields of settings, of :data:`TUNED`.
+
+    Raises
+    ------
+    ParameterError
+        If a value does not fit the window or has no effect, or there are too many candidates; options are named.
+    """
+    for name, given in values.items():
+        if name in PredictorSettings.TRUST and not settings.trust:
+            raise ParameterError(f"--{TUNED[name].name} has an effect with trust only: give --trust true, too")
+        for value in given:
+            try:
+                replace(settings, **{name: value})
+            except ParameterError as error:
+                raise ParameterError(f"--{TUNED[name].name}: {error}") from error
+    n = math.prod(len(given) for given in values.values())
+    if n > _CANDIDATES_MAX:
+        options = " and ".join(f"--{TUNED[name].name}" for name in values)
+        raise ParameterError(f"{options} have {n} combinations, at most {_CANDIDATES_MAX} are allowed; take fewer")
+    combined = [
+        replace(settings, **dict(zip(values, combination, strict=True)))
+        for combination in itertools.product(*values.values())
+    ]
+    return list(dict.fromkeys([settings, *combined]))
+
+
+_COLUMNS = 2
+
+_VALUES_NAMED = 10
+"""Values that are named below a panel, the first and the last among them."""
+
+_SHOWN = 0.95
+"""Share of the candidates that the span of the errors is chosen for; candidates beyond it are at its edge."""
+
+
+def tuning_figure(
+    tuning: Tuning,
+    windows: Mapping[int, Tuning],
+    values: Values,
+    title: str,
+    path: str | Path,
+) -> None:
+    """Draw the error over each tuned parameter, and over the look-ahead, to a PNG, PDF or SVG.
+
+    Parameters
+    ----------
+    tuning : Tuning
+    windows : mapping
+        Tunings of the chosen settings by ``Np``.
+    values : mapping
+        Values that were tried, by the fields of settings.
+    title : str
+        Heading.
+    path : str or Path
+        The file.
+    """
+    fields = [field for field in values if len({getattr(one, field) for one in tuning.candidates}) > 1]
+    n_rows = -(-(len(fields) + 1) // _COLUMNS)
+    figure = Figure(figsize=(9.0, 1.2 + 3.1 * n_rows), layout="constrained")
+    panels = figure.subplots(n_rows, _COLUMNS, squeeze=False).ravel().tolist()
+    settings = tuning.candidates[tuning.chosen]
+    figure.suptitle(f"{title}\n{len(tuning.candidates)} candidates, Np = {settings.Np}")
+    highest = _highest(tuning)
+    for axes, field in zip(panels, fields, strict=False):
+        _draw_parameter(axes, tuning, field, highest)
+    _draw_windows(panels[len(fields)], windows, settings.Np)
+    for axes in panels[len(fields) + 1 :]:
+        axes.remove()
+    for axes in panels[::_COLUMNS]:
+        axes.set_ylabel("RMS error relative to hold")
+    named = {}
+    for axes in panels[: len(fields) + 1]:
+        named.update(dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True)))
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=3, frameon=False)
+    finish_panels(panels[: len(fields) + 1])
+    save_figure(figure, path)
+
+
+def _highest(tuning: Tuning) -> float:
+    """Return the largest error that is shown, relative to hold; hold is, unless that would flatten the others."""
+    finite = np.sort(tuning.ratio[np.isfinite(tuning.ratio)])
+    shown = [*finite[: max(1, round(_SHOWN * len(finite)))], *tuning.ratio[[0, tuning.chosen]]]
+    highest = max((float(value) for value in shown if value < np.inf), default=1.0)
+    return 1.1 * (1.0 if 0.5 < highest < 1.0 else highest)
+
+
+def _draw_parameter(axes: Axes, tuning: Tuning, field: str, highest: float) -> None:
+    """Draw all candidates over one parameter, each value at its own place, and the best at each value."""
+    own = [getattr(one, field) for one in tuning.candidates]
+    values = sorted(set(own))
+    place = np.array([values.index(value) for value in own])
+    ratio = np.minimum(tuning.ratio, highest)
+    best = [float(ratio[place == i].min()) for i in range(len(values))]
+    axes.plot(place, ratio, ".", color=HYBRID, markersize=3, alpha=0.35, label="candidates", rasterized=True)
+    axes.plot(range(len(values)), best, color=HYBRID, linewidth=1.6, label="best over the others")
+    axes.plot(place[tuning.chosen], ratio[tuning.chosen], "*", color="black", markersize=11, label="chosen")
+    axes.plot(place[0], ratio[0], "o", color="black", fillstyle="none", markersize=8, label="machine's own")
+    for level, color in ((1.0, HOLD), (tuning.ratio_pb, PHYSICS)):
+        if level < highest:
+            axes.axhline(level, color=color, linewidth=1.2, linestyle="--")
+    margin = 0.05 * max(highest - min(best), 0.1 * highest)
+    axes.set_ylim(max(min(best) - margin, 0.0), highest + 0.2 * margin)
+    shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _VALUES_NAMED)).round().astype(np.intp)).tolist()
+    axes.set_xticks(shown, [f"{values[i]:g}" for i in shown], fontsize="small")
+    unit = TUNED[field].unit
+    name = "λ" if field == "lam" else field
+    axes.set_xlabel(name if unit == "1" else f"{name} [{unit.replace('m2', 'm²')}]")
+
+
+def _draw_windows(axes: Axes, windows: Mapping[int, Tuning], Np: int) -> None:
+    """Draw the error of the chosen settings over the look-ahead."""
+    sizes = sorted(windows)
+    ratio = np.array([windows[size].ratio[0] for size in sizes])
+    axes.plot(sizes, np.where(np.isfinite(ratio), ratio, np.nan), "o-", color=HYBRID, markersize=4)
+    physics = [windows[size].ratio_pb for size in sizes]
+    axes.plot(sizes, physics, color=PHYSICS, linewidth=1.2, linestyle="--", label="physics")
+    axes.axhline(1.0, color=HOLD, linewidth=1.2, linestyle="--", label="hold")
+    axes.axvline(Np, color="black", linewidth=0.8, linestyle=":")
+    left = Np > 0.5 * (sizes[0] + sizes[-1])  # beside the line there is room to the inside
+    axes.annotate(
+        "the controller's",
+        (Np, 0.02),
+        xycoords=("data", "axes fraction"),
+        fontsize="small",
+        ha="right" if left else "left",
+        xytext=(-4 if left else 4, 0),
+        textcoords="offset points",
+    )
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("look-ahead Np: given, no choice\n(with the chosen settings)")

@@ -1,1 +1,0 @@
-"""Reports of a replay: advice, charts by section, use of the FMU, step times."""

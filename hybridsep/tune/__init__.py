@@ -1,1 +1,0 @@
-"""Choice of a predictor's settings by causal replays of recordings."""
