@@ -26,7 +26,6 @@ __all__ = [
     "Library",
     "check_available",
     "chosen_targets",
-    "compilers_of",
     "default_targets",
     "has_native",
     "is_kept_here",
@@ -113,17 +112,6 @@ def is_kept_here(kind: str) -> bool:
         return kept((kind, host_target())) is not None
     except FmuError:  # a platform that no library is for
         return False
-
-
-def compilers_of(kind: str, targets: Sequence[str]) -> list[str]:
-    """Return the names of the compilers that the libraries of a kind are from; arguments as of :func:`libraries`.
-
-    Raises
-    ------
-    FmuError
-        As :func:`libraries`.
-    """
-    return [ZIG if kept((kind, target)) else compiler_for(target).name for target in expanded(targets)]
 
 
 def check_available(targets: Sequence[str]) -> None:

@@ -21,7 +21,6 @@ from ..base.data_files import data_folder
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
-from .bill_of_materials import BILL_FILE, bill_of_materials, native_parts
 from .c_header import c_header
 from .c_sources import FMI_HEADERS, c_sources, fmi_headers
 from .compiler import placed
@@ -30,7 +29,7 @@ from .flavours import FMI_VERSIONS
 from .fmi3_description import fmi3_description
 from .fmu import Fmu
 from .fmu_table import FmuTable
-from .libraries import compilers_of, default_targets, libraries
+from .libraries import default_targets, libraries
 from .model_description import build_description, model_description
 from .pages import compile_note, dependencies_note, icon, index_page, reference_note
 from .reference import has_reference
@@ -55,7 +54,7 @@ It starts no other program, opens no connection, and reads no file but its own r
 Elsewhere compile sources/all.c (documentation/index.html), which needs a C99 compiler and libm.
 """
 _RUNTIME_LICENSES = """\
-Binaries that Zig compiled (extra/org.cyclonedx/bom.json) have parts of its run-time library:
+Binaries that Zig compiled have parts of its run-time library:
 
 {}
 Those for Windows have parts of mingw-w64 besides:
@@ -112,9 +111,7 @@ def files(fmu: Fmu, *, targets: Sequence[str] | None = None, embed_weights: bool
         content |= reference_run(fmu, guid, content, native=True)
     if fmu.origin is not None:
         content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
-    kind, targets = table.kind, targets or default_targets()
-    compiled = libraries(kind, targets)
-    content[BILL_FILE] = bill_of_materials(name, guid, native_parts(compilers_of(kind, targets), list(compiled)))
+    compiled = libraries(table.kind, targets or default_targets())
     content[MANIFEST_FILE] = manifest(content)
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 

@@ -16,7 +16,6 @@ import pythonfmu
 
 from ..base.data_files import data_folder
 from ..base.version import __version__
-from .bill_of_materials import BILL_FILE, bill_of_materials, python_parts
 from .content import content_guid
 from .fmu import Fmu
 from .imported import imported_modules
@@ -95,7 +94,6 @@ def files(fmu: Fmu) -> dict[str, bytes]:
         content |= reference_run(fmu, guid, content, native=False)
     if fmu.origin is not None:
         content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
-    content[BILL_FILE] = bill_of_materials(name, guid, python_parts(version))
     content[MANIFEST_FILE] = manifest(content)
     return content
 

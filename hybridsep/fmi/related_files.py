@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from xml.etree import ElementTree as ET
 
-from .bill_of_materials import BILL_FILE
 from .model_description import document, xml_text
 from .resource_data import RESOURCE_DATA_FILE
 
@@ -32,7 +31,6 @@ _NAMED = {
     "description": "Layered Standard providing information on related files included in an FMU.",
 }
 _ELSEWHERE = {
-    BILL_FILE: ("application/vnd.cyclonedx+json", "meta-data", "software bill of materials"),
     RESOURCE_DATA_FILE: ("application/x-srmd-meta-data", "meta-data", "log, settings and figures of the fit"),
 }
 """Files of other folders, if they are there: type, role and description."""
