@@ -100,13 +100,10 @@ def judged_figures(judged: dict[str, Any]) -> Figures:
 
 
 def identified(folder: Path, chromium: str) -> Made:
-    """Make the pictures of the identification."""
+    """Make the picture of the identification."""
     run(folder, str(ROOT / "examples" / "recordings_to_identify.py"), "recordings")
-    made = {}
-    for name, log in (("identify_log.png", "log.csv"), ("identify_response.png", "frf.csv")):
-        hybridsep(folder, "identify", f"recordings/{log}", "--out", f"{log}.toml", "--figure", name)
-        made[name] = folder / name
-    return made, {}
+    hybridsep(folder, "identify", "recordings/log.csv", "--out", "log.toml", "--figure", "identify_log.png")
+    return {"identify_log.png": folder / "identify_log.png"}, {}
 
 
 def watched(folder: Path, chromium: str) -> Made:
@@ -121,7 +118,7 @@ def watched(folder: Path, chromium: str) -> Made:
 MAKERS: dict[tuple[str, ...], Callable[[Path, str], Made]] = {
     ("staircase.png", "staircase_compensated.png", "spiral_y.png", "spiral_contour.png"): demonstration,
     ("fit_report.png", "tune.png"): fitted,
-    ("identify_log.png", "identify_response.png"): identified,
+    ("identify_log.png",): identified,
     ("live.png",): watched,
 }
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from importlib.metadata import EntryPoint, entry_points
+from typing import Annotated, Any
 
 import typer
 
+from ..base.errors import ParameterError
 from ..base.version import version_text
 from .command_backtest import backtest
 from .command_build import build
@@ -28,8 +30,41 @@ from .panels import EXAMPLES, PanelledCommand
 
 __all__ = ["app", "main"]
 
+PLUG_INS = ("modal",)
+"""Commands that this repository has as plug-ins, in ``plugins``."""
+
+
+class _WithPlugIns(Commands):
+    """Commands, and those of plug-ins: functions that are installed as entry points ``hybridsep.commands``."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return [*super().list_commands(ctx), *sorted(_plug_ins())]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command; ParameterError if its plug-in is not installed."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            return command
+        found = _plug_ins().get(cmd_name)
+        if found is None and cmd_name in PLUG_INS:
+            raise ParameterError(
+                f"hybridsep {cmd_name} is a plug-in, which is not installed: pip install ./plugins/{cmd_name} in a "
+                f"checkout (hybridsep-{cmd_name} once released)"
+            )
+        if found is None:
+            return None
+        alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+        alone.command(cmd_name, cls=PanelledCommand)(found.load())
+        return typer.main.get_command(alone)
+
+
+def _plug_ins() -> dict[str, EntryPoint]:
+    return {one.name: one for one in entry_points(group="hybridsep.commands")}
+
+
 app = typer.Typer(
-    cls=Commands,
+    cls=_WithPlugIns,
     help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",
     epilog=f"An error is one line and exit status 2, Ctrl-C 130. {DEBUG_VARIABLE}=1 in the environment shows "
     "the traceback of an unexpected error.",

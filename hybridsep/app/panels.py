@@ -34,7 +34,7 @@ EXAMPLES = {
     ),
     "identify": (
         "hybridsep identify my_axis.csv --out machine.toml",
-        "hybridsep identify response.csv --modes 3 --out x.toml",
+        "hybridsep identify my_axis.csv --unit-gain --figure identified.png",
     ),
     "tune": (
         "hybridsep tune my_axis.csv -m my_axis/machine.toml",

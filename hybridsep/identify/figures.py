@@ -1,10 +1,9 @@
-"""Figures of an identification: errors over time and by structure, or frequency response with its fit."""
+"""Figure of an identification: errors over time and by structure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +13,9 @@ from matplotlib.ticker import LogFormatter
 from ..base.signals import Array
 from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
 from ..logs.units import Shown, shown_in
-from .frequency_response import IdentifiedResponse
 from .model import IdentifiedModel
 
-__all__ = ["operation_figure", "response_figure"]
+__all__ = ["operation_figure"]
 
 
 def operation_figure(
@@ -81,52 +79,3 @@ def _draw_structures(axes: Axes, found: IdentifiedModel, scale: float, unit: str
         axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.5)))
         legend_above(axes, axes.get_lines()[:2])
     axes.set_xlabel(f"RMS error of the simulated position [{unit}]; pale: not to be chosen")
-
-
-def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> None:
-    """Draw magnitude, phase and error of a frequency response and its fit to a PNG.
-
-    Where no phase was measured, none is drawn, and the error is the magnitude's.
-
-    Parameters
-    ----------
-    found : IdentifiedResponse
-    title : str
-        Heading.
-    path : str or Path
-        The PNG.
-    """
-    ratios = [1.6, 1.2, 1.0] if found.phase_measured else [1.6, 1.0]
-    figure = Figure(figsize=(9.0, 2.0 + 1.6 * sum(ratios)), layout="constrained")
-    panels = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
-    magnitude, error = panels[0], panels[-1]
-    figure.suptitle(title)
-    f = found.frequency
-    n = len(found.model.modes)
-    labels = ("measured", f"{n} mode{'s' if n > 1 else ''}")
-    for values, label, style in zip((found.response, found.fitted), labels, (_MEASURED, _FITTED), strict=True):
-        magnitude.plot(f, 20 * np.log10(np.abs(values)), label=label, **style)
-        if found.phase_measured:
-            panels[1].plot(f, np.rad2deg(np.unwrap(np.angle(values))), **style)
-            panels[1].set_ylabel("phase [°]")
-    magnitude.set_ylabel("magnitude [dB]")
-    relative = found.fitted / found.response if found.phase_measured else np.abs(found.fitted) / np.abs(found.response)
-    error.plot(f, 100 * np.maximum(np.abs(relative - 1), 1e-16), ".", color=PHYSICS, markersize=2)
-    error.set_yscale("log")
-    error.yaxis.set_major_formatter("{x:g}")
-    error.set_ylabel("error [%]" if found.phase_measured else "error of the\nmagnitude [%]")
-    error.set_xlabel("frequency [Hz]")
-    label = "natural frequency" if n == 1 else "natural frequencies"
-    for mode in found.model.modes:
-        if f[0] <= mode.f_n <= f[-1]:
-            for axes in panels:
-                axes.axvline(mode.f_n, color="black", linewidth=0.7, linestyle=":", label=label)
-    handles = dict(zip(*reversed(magnitude.get_legend_handles_labels()), strict=True))
-    legend_above(magnitude, list(handles.values()))
-    finish_panels(panels)
-    figure.align_ylabels()
-    save_figure(figure, path)
-
-
-_MEASURED: dict[str, Any] = {"color": HOLD, "linewidth": 4.0, "alpha": 0.6}
-_FITTED: dict[str, Any] = {"color": PHYSICS, "linewidth": 1.2}

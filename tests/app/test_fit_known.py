@@ -116,8 +116,4 @@ def test_identify_takes_a_late_encoder(hybridsep: Run, tmp_path: Path) -> None:
     machine = load_machine(out)
     assert machine.predictor_settings.measurement_delay == LATE
     assert machine.model.dead_time == json.loads(said)["dead_time"] == 0
-    response = write_rows(tmp_path / "frf.csv", x_d[:50], late[:50], header="frequency,real,imag")
-    status, _, err = hybridsep("identify", response, "--measurement-delay", LATE)
-    assert status == 2
-    assert "--measurement-delay is for a log, frf.csv is read as --kind response" in " ".join(err.split())
     np.testing.assert_array_equal(in_time(x_d, late, LATE)[1], x[: len(x) - LATE])

@@ -6,13 +6,11 @@ import contextlib
 import io
 import json
 import re
-import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from command_line import Run
+from command_line import Run, run_line
 from places import ROOT
 from quick_fits import without_other_windows
 
@@ -27,8 +25,8 @@ PAGES = [
 RUN = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np 100 --v_max ")
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
-BY_NIGHT = tuple(f"hybridsep identify recordings/{kind}.csv" for kind in ("log", "sweep", "frf"))
-"""Begin of lines that run at night: ``test_identify_command`` has identify read each kind of file."""
+BY_NIGHT = ("hybridsep identify recordings/log.csv",)
+"""Begin of lines that run at night: ``test_identify_command`` has identify read a log."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 3001
@@ -80,7 +78,7 @@ def test_the_pages_run_from_first_to_last(
                 if language == "python":
                     python(piece, page)
                 else:
-                    line(piece, hybridsep)
+                    run_line(piece, hybridsep)
                     capsys.readouterr()
                 if piece == FIT and whole:
                     assert_the_row_of_the_readme(tmp_path / "my_axis" / "fit.json")
@@ -90,18 +88,6 @@ def test_the_pages_run_from_first_to_last(
     assert len([piece for piece in done if piece.startswith("hybridsep ")]) >= 12
     for name in ("my_axis/report.html", "replay.html", "tuned.toml", "run.png"):
         assert (tmp_path / name).stat().st_size > 0, name
-
-
-def line(text: str, hybridsep: Run) -> None:
-    """Run a line as a shell would."""
-    program, *arguments = shlex.split(text)
-    if program == "hybridsep":
-        status, _, err = hybridsep(*arguments, *(["--jobs", "1"] if arguments[0] == "tune" else []))
-        assert status == 0, f"{text}: {err}"
-    else:
-        assert program == "python", text
-        done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True)
-        assert done.returncode == 0, f"{text}: {done.stderr}"
 
 
 def assert_the_row_of_the_readme(results: Path) -> None:

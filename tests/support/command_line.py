@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from staircase_data import commanded, measured
 
 from hybridsep.app import cli, progress
 
-__all__ = ["Run", "write_log", "write_rows"]
+__all__ = ["Run", "run_line", "run_page", "write_log", "write_rows"]
 
 
 class Run:
@@ -32,6 +35,25 @@ class Run:
             status = int(stop.code or 0)
         out, err = self.capsys.readouterr()
         return status, out, err
+
+
+def run_line(text: str, hybridsep: Run) -> None:
+    """Run a line as a shell would."""
+    program, *arguments = shlex.split(text)
+    if program == "hybridsep":
+        status, _, err = hybridsep(*arguments, *(["--jobs", "1"] if arguments[0] == "tune" else []))
+        assert status == 0, f"{text}: {err}"
+    else:
+        assert program == "python", text
+        done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True)
+        assert done.returncode == 0, f"{text}: {done.stderr}"
+
+
+def run_page(page: Path, hybridsep: Run) -> None:
+    """Run the command lines of a page in the current folder."""
+    for block in re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+        for text in block.splitlines():
+            run_line(text, hybridsep)
 
 
 def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import csd
 
-from ..base.errors import IdentificationError
-from ..base.settings import check
-from ..base.signals import Array, as_samples
+from hybridsep.base.errors import IdentificationError
+from hybridsep.base.settings import check
+from hybridsep.base.signals import Array, as_samples
 
 __all__ = ["Response", "h1"]
 

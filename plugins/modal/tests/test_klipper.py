@@ -10,7 +10,7 @@ from scipy.signal import chirp
 
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError, LogError
-from hybridsep.identify.klipper import Acceleration, identify_resonance, is_klipper, read_klipper
+from hybridsep_modal.klipper import Acceleration, identify_resonance, is_klipper, read_klipper
 
 T = 1 / 3200
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.signals import Array
+from hybridsep.base.signals import Array
 
 __all__ = ["starting_poles", "vector_fit"]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hybridsep import ModalModel, load_machine
-from hybridsep.identify.frequency_response import identify_frequency_response
-from hybridsep.identify.vector_fitting import starting_poles, vector_fit
+from hybridsep_modal.frequency_response import identify_frequency_response
+from hybridsep_modal.vector_fitting import starting_poles, vector_fit
 
 F = np.linspace(1.0, 100.0, 1000)
 OMEGA = 2 * np.pi * F
@@ -25,7 +25,7 @@ def noise(seed: int) -> Any:
 
 
 @pytest.mark.filterwarnings("ignore")  # the package's own
-@pytest.mark.parametrize("axis", ["x", pytest.param("y", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("axis", ["x", "y"])
 def test_poles_are_those_of_scikit_rf(axis: str) -> None:
     from skrf import Frequency, Network
     from skrf.vectorFitting import VectorFitting
@@ -47,7 +47,6 @@ def test_poles_are_those_of_scikit_rf(axis: str) -> None:
     assert (np.abs(np.sort_complex(ours).real - others[0].real) < 4 * spread).all()
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_poles_are_among_those_of_sdypy_ema(axis: str) -> None:

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import LogError, brief, listed
-from ..base.signals import Array
-from ..logs.formats import open_source
-from ..logs.source import Source
+from hybridsep.base.errors import LogError, brief, listed
+from hybridsep.base.signals import Array
+from hybridsep.logs.formats import open_source
+from hybridsep.logs.source import Source
 
 __all__ = ["ResponseFile", "has_response", "read_response"]
 

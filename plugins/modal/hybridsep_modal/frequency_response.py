@@ -6,31 +6,41 @@ numerator and denominator are differentiated alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..base.errors import IdentificationError, ParameterError
-from ..base.settings import check
-from ..base.signals import Array
-from ..base.threads import one_blas_thread
-from ..machines.machine import Machine
-from ..model.physics import ModalModel
-from .modal_fit import ModalFit
-from .mode_count import best_fit, doubtful_modes
-from .model import machine_of
-from .response_fit import MODES_MAX, Lines, fits_by_size
-from .uncertainty import Estimate
+from hybridsep.base.errors import IdentificationError, ParameterError
+from hybridsep.base.settings import check
+from hybridsep.base.signals import Array
+from hybridsep.base.threads import one_blas_thread
+from hybridsep.identify.cancelling import slow_parts
+from hybridsep.identify.model import machine_of
+from hybridsep.identify.uncertainty import Estimate
+from hybridsep.machines.machine import Machine
+from hybridsep.model.physics import ModalModel
+
+from .fit import MODES_MAX, Complex, Lines, ModalFit, fits_by_size
 
 __all__ = ["IdentifiedResponse", "identify_frequency_response"]
 
-Complex = NDArray[np.complex128]
-
 LINES_MIN = 8
 """Lines below which nothing is fitted."""
+
+WORTH = 10.0
+"""Decrease of the criterion from which more modes are taken, very strong evidence by Kass and Raftery, J. Am. Stat.
+Assoc. 90 (1995) 773."""
+
+DEVIATIONS = 3.0
+"""Standard deviations by which a damping ratio is above 0, at least."""
+
+FRICTION_WORTH = 0.6
+"""Ratio of the weighted errors, with and without them, at which modes that do not oscillate, or slow modes that zeros
+all but cancel, are taken beside others: modes that fit friction in a swept sine leave 0.9, a true real pole less than
+0.1."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +126,7 @@ def identify_frequency_response(
     std : (n,) array_like, optional
         Standard deviation of each line's complex error; a constant part of its magnitude if left out.
     n_modes : int, optional
-        Number of modes; by the Bayesian information criterion (:mod:`.mode_count`) if left out.
+        Number of modes; by the Bayesian information criterion  if left out.
     unit_gain : bool
         Whether the static gain is 1.
     T_s : float
@@ -146,7 +156,7 @@ def identify_frequency_response(
     delay = np.exp(1j * omega * dead_time * T_s)
     lines = Lines(omega, G * delay, sigma, std is None, unit_gain, (T_s, input_hold) if sampled else None)
     fits = fits_by_size(lines, counts, progress)
-    best, part = fits[best_fit(lines, fits)]
+    best, part = fits[_best_fit(lines, fits)]
     model = ModalModel(best.modes(), dead_time)
     noise = float(np.sqrt(best.cost / max(1, 2 * len(f) - best.n_free))) * np.sqrt(2.0)
     return IdentifiedResponse(
@@ -186,6 +196,53 @@ def _usable(frequency: ArrayLike, response: ArrayLike, std: ArrayLike | None) ->
     return f, G, sigma
 
 
+def _best_fit(lines: Lines, fits: Sequence[tuple[ModalFit, Complex]]) -> int:
+    """Return the index of the fit to take among fits with growing numbers of modes."""
+    n_effective = max(_independent(fit) for fit, _ in fits)  # too few modes leave errors that are alike
+    sound = [i for i, (fit, _) in enumerate(fits) if i == 0 or not _doubtful_modes(fit, lines)]
+    chosen = _by_criterion(lines, fits, sound, n_effective)
+    plain = [i for i in sound if i == 0 or not _like_friction(fits[i][0])]
+    other = _by_criterion(lines, fits, plain, n_effective)
+    return chosen if fits[chosen][0].cost <= FRICTION_WORTH**2 * fits[other][0].cost else other
+
+
+def _like_friction(fit: ModalFit) -> bool:
+    modes = fit.modes()
+    return any(mode.zeta >= 1.0 for mode in modes) or bool(slow_parts(modes))
+
+
+def _doubtful_modes(fit: ModalFit, lines: Lines) -> list[int]:
+    """Return the modes that oscillate and whose damping ratio is not significantly above 0."""
+    scale = fit.cost / max(1, 2 * len(lines.omega) - fit.n_free)  # variance of each real or imaginary part
+    log_zeta = fit.parameters[:, 1]
+    std = np.sqrt(np.maximum(scale * np.diag(fit.covariance)[1::4], 0.0))  # of log ζ, so relative to ζ
+    return [int(i) for i in np.flatnonzero((log_zeta < 0.0) & (DEVIATIONS * std > 1.0))]
+
+
+def _by_criterion(
+    lines: Lines, fits: Sequence[tuple[ModalFit, Complex]], places: Sequence[int], n_effective: float
+) -> int:
+    chosen = places[0]
+    values = {i: lines.criterion(fits[i][0], n_effective) for i in places}
+    for i in places[1:]:
+        if values[i] < values[chosen] - WORTH:
+            chosen = i
+    return chosen
+
+
+def _independent(fit: ModalFit) -> float:
+    """Return the number of real values that tell as much as the lines, whose errors may be correlated."""
+    r = fit.residual
+    n, power = len(r), fit.cost
+    total = 1.0
+    for lag in range(1, n // 2):
+        correlation = float((r[lag:] @ r[:-lag].conj()).real) / power if power > 0.0 else 0.0
+        if correlation < 2.0 / np.sqrt(n):
+            break
+        total += 2.0 * correlation
+    return 2.0 * n / total
+
+
 def _estimates(fit: ModalFit, noise: float) -> tuple[Estimate, ...]:
     """Return the parameters with Cramér–Rao deviations for a complex error of that standard deviation a line."""
     covariance = fit.covariance * noise**2 / 2  # real and imaginary part have half of the variance each
@@ -215,7 +272,7 @@ def _doubts(fit: ModalFit, lines: Lines) -> list[str]:
     return [
         f"the damping of mode[{i + 1}], {frequencies[i]:.4g} Hz, is not significantly above 0: the mode may be one "
         "line's error"
-        for i in doubtful_modes(fit, lines)
+        for i in _doubtful_modes(fit, lines)
     ]
 
 

@@ -15,11 +15,12 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import welch
 
-from ..base.errors import IdentificationError, LogError
-from ..base.signals import Array
-from ..model.physics import ModalModel, Mode
+from hybridsep.base.errors import IdentificationError, LogError
+from hybridsep.base.signals import Array
+from hybridsep.identify.uncertainty import Estimate
+from hybridsep.model.physics import ModalModel, Mode
+
 from .frequency_response import IdentifiedResponse
-from .uncertainty import Estimate
 
 __all__ = ["Acceleration", "identify_resonance", "is_klipper", "read_klipper"]
 

@@ -1,0 +1,26 @@
+"""Set up what the plug-ins' tests share with the core's."""
+
+from __future__ import annotations
+
+import os
+
+# Before NumPy is loaded; tests/conftest.py says why.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
+
+import pytest
+from command_line import Run
+from quick_fits import without_other_settings, without_other_windows, without_python_fmus
+
+
+@pytest.fixture
+def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    return Run(monkeypatch, capsys)
+
+
+@pytest.fixture
+def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let ``fit`` judge one look-ahead, with the default settings alone, and write the native FMUs alone."""
+    without_python_fmus(monkeypatch)
+    without_other_windows(monkeypatch)
+    without_other_settings(monkeypatch)
