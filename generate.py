@@ -21,20 +21,12 @@ from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.records import leaves
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
-from hybridsep.compensate import (
-    constraints,
-    interior,
-    linearised,
-    paper_planning,
-    splines,
-    trusted_plan,
-    trusted_planning,
-)
+from hybridsep.compensate import newton, planning, qp, splines
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict import uncertainty
-from hybridsep.predict.trust import disturbances, expert, forecast, learn, stack, start, state
-from hybridsep.predict.trust.constants import CONSTANTS
+from hybridsep.predict.averaging import experts, features, model, stacking, start
+from hybridsep.predict.averaging.constants import CONSTANTS
 
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_settings.h"
@@ -47,21 +39,18 @@ Declared = Mapping[str, list[ModuleType]]
 PREDICTIONS: Declared = {
     "uncertainty": [uncertainty],
     "start": [start],
-    "stack": [stack],
-    "expert": [expert],
-    "disturbances": [disturbances],
-    "trusted": [state, forecast, learn],
+    "stacking": [stacking],
+    "experts": [experts],
+    "features": [features],
+    "averaging": [model],
 }
 """Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
 
 PLANS: Declared = {
     "splines": [splines],
-    "constraints": [constraints],
-    "interior": [interior],
-    "linearised": [linearised],
-    "paper_planning": [paper_planning],
-    "trusted_planning": [trusted_planning],
-    "trusted_plan": [trusted_plan],
+    "qp": [qp],
+    "newton": [newton],
+    "planning": [planning],
 }
 """Modules of plans, likewise."""
 
@@ -154,9 +143,9 @@ def constants_header() -> str:
     """Return the C header of the constants of predictions, which the library declares with their reasons."""
     defines = _defines(PREDICTIONS)
     trust = [f"#define HSEP_TRUST_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
-    defines.append("\n".join(["/* hybridsep/predict/trust/constants.py */", *trust]))
+    defines.append("\n".join(["/* hybridsep/predict/averaging/constants.py */", *trust]))
     settings = PredictorSettings(period=1.0)
-    trusted = state.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
+    trusted = model.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
     records = {"LEARNED": trusted.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
     ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
     defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))

@@ -27,10 +27,10 @@ from joblib import Parallel, delayed
 from benchmarks.core_variant import Changes, CoreVariant
 from benchmarks.yardstick import Axis, Errors, Folders, errors_of, logs_of, simulations_of
 from hybridsep.base.errors import SignalError
-from hybridsep.predict.trust.constants import CONSTANTS
+from hybridsep.predict.averaging.constants import CONSTANTS
 
-TRUST = "predict/trust/"
-STACK, START = TRUST + "hsep_stack.c", TRUST + "hsep_start.c"
+TRUST = "predict/averaging/"
+STACK, START = TRUST + "hsep_stacking.c", TRUST + "hsep_start.c"
 STATE, FORECAST = (TRUST + f"hsep_trusted_{part}.c" for part in ("state", "forecast"))
 
 
@@ -97,7 +97,7 @@ VARIANTS: Mapping[str, Changes] = {
     "predictions hardly bounded": constants(bound=100.0, bound_of_command=100.0),
     "A bounded as all others": constants(bound_of_command=1.2),
     "no shrinking": {
-        TRUST + "hsep_expert.c": [
+        TRUST + "hsep_experts.c": [
             (
                 "    return self->largest_square / (self->largest_square + variance);",
                 "    (void)self, (void)variance;\n    return 1.0;",

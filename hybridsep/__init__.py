@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .base.errors import HybridSepError
     from .base.settings import CompensatorSettings, Limits, PredictorSettings
     from .compensate.compensator import SepCompensator
-    from .compensate.plan import SepState
+    from .compensate.planning import SepState
     from .cosim.importer import FmuInstance
     from .cosim.library import Compensator
     from .cosim.loop import cosimulate

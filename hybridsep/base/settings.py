@@ -163,7 +163,7 @@ class PredictorSettings(Settings):
     input_hold : {"zoh", "foh"}
         Zero-order or first-order hold of ``x_d`` in the physics model.
     trust : bool
-        Whether the residual model is :class:`~hybridsep.predict.trust.model.TrustedModel`; else it is the paper's.
+        Whether the residual model is :class:`~hybridsep.predict.averaging.model.TrustedModel`; else it is the paper's.
     effect, noise_std : float
         With trust: prior standard deviation of the effect of a feature, and standard deviation of the measurement
         noise, m; 0: from the residuals.
@@ -312,7 +312,7 @@ class CompensatorSettings(Settings):
         The drive's limits, which the differences of ``x_dm`` keep; none if left out.
     change_max : float, optional
         Bound on the magnitude of the change, m; none if None. About twice the servo error without compensation: hybrid
-        plans that ask for far more end for the run (:func:`~hybridsep.compensate.trusted_plan.runs_away`).
+        plans that ask for far more end for the run (:func:`~hybridsep.compensate.newton.runs_away`).
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of the velocity of ``x_d``: where it turns, friction changes its
         sign. It has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.

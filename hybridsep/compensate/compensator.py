@@ -28,16 +28,13 @@ from ..base.state import pack, unpack
 from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead
 from ..online.planner import PublishedWindow
+from ..predict.averaging.features import Disturbance
+from ..predict.averaging.model import TrustedModel
 from ..predict.predictor import HybridPredictor
-from ..predict.trust.disturbances import Disturbance
-from ..predict.trust.state import TrustedModel
 from ..predict.window import Prediction
-from .constraints import DriveBounds
-from .paper_planning import PaperPlanning
-from .plan import PendingPlan, SepState
-from .planning import Planning, Preview
+from .planning import PaperPlanning, PendingPlan, Planning, Preview, SepState, TrustedPlanning
+from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis, direct_samples
-from .trusted_planning import TrustedPlanning
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
@@ -59,7 +56,7 @@ class SepCompensator:
     ----------
     predictor : HybridPredictor
         At the beginning of a run; it learns from the modified commands. With ``trust`` plans follow the slope of its
-        model (:mod:`~hybridsep.compensate.trusted_plan`); else they use the paper's.
+        model (:mod:`~hybridsep.compensate.newton`); else they use the paper's.
     settings : CompensatorSettings, optional
         The defaults if left out.
 

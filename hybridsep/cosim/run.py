@@ -15,7 +15,7 @@ from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction
 from ..base.output import written_text, written_whole
 from ..base.shown_results import html_table, line_plot, one_line
 from ..base.signals import Array
-from ..compensate.plan import SepState
+from ..compensate.planning import SepState
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,7 +96,7 @@ class Run:
     x_h_std : (n,) array, m
         Standard deviation of ``x_meas − x_h``; 0 where it is not known.
     state : (n,) array of int
-        :class:`~hybridsep.compensate.plan.SepState` of each sample: the model that predicts, or that planned.
+        :class:`~hybridsep.compensate.planning.SepState` of each sample: the model that predicts, or that planned.
     T_s : float
         Sampling interval, s.
     Np : int

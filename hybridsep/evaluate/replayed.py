@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.signals import Array
-from ..compensate.plan import SepState
+from ..compensate.planning import SepState
 from ..cosim.run import PREDICTOR, Run
 from .backtest import Backtest
 

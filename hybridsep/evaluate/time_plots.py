@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from ..base.metrics import rms
 from ..base.signals import Array
-from ..compensate.plan import SepState
+from ..compensate.planning import SepState
 from ..cosim.run import Run
 from ..logs.units import Shown, shown_in
 from .canvas import CASES, HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure

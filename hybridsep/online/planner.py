@@ -27,7 +27,7 @@ class PublishedWindow:
     x_h_std : (Np,) array, m
         Standard deviation of the error of ``x_h``; 0 where it is not known.
     state : int
-        Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
+        Model that planned it (:class:`~hybridsep.compensate.planning.SepState`); 0 without a planner.
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
     n_followed, state_before : int

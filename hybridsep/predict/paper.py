@@ -16,7 +16,7 @@ from ..base.records import FIXED
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from .regression import RidgeRegression, lags
-from .residual_window import Forecast, ResidualWindow
+from .window import Forecast, ResidualWindow
 
 __all__ = ["PaperModel", "forecast", "free_run", "impulse_response", "init", "learn", "restart"]
 

@@ -25,17 +25,14 @@ from ..base.state import pack, unpack
 from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
 from . import paper, residual_model
+from .averaging.features import Disturbance
+from .averaging.model import TrustedForecast, TrustedModel, begin_in_motion
+from .averaging.start import motion_before
 from .paper import PaperModel
 from .regression import RidgeRegression
 from .residual_model import ResidualModel
-from .residual_window import FeatureScales, Forecast, ResidualWindow
-from .trust.disturbances import Disturbance
-from .trust.forecast import TrustedForecast
-from .trust.learn import begin_in_motion
-from .trust.start import motion_before
-from .trust.state import TrustedModel
 from .uncertainty import Uncertainty, first_variance
-from .window import PredictedWindow, Prediction, WindowOperator
+from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualWindow, WindowOperator
 
 __all__ = ["HybridPredictor", "PredictorState"]
 

@@ -15,14 +15,12 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from . import paper
+from .averaging import model as averaging
+from .averaging.features import Disturbance
+from .averaging.model import TrustedModel
 from .paper import PaperModel
 from .regression import RidgeRegression
-from .residual_window import FeatureScales, Forecast, ResidualWindow
-from .trust import forecast as trust_forecast
-from .trust import learn as trust_learn
-from .trust import state as trust_state
-from .trust.disturbances import Disturbance
-from .trust.state import TrustedModel
+from .window import FeatureScales, Forecast, ResidualWindow
 
 __all__ = ["ResidualModel", "forecast", "init", "learn", "plan_ahead", "restart", "take_over"]
 
@@ -32,30 +30,30 @@ ResidualModel: TypeAlias = PaperModel | TrustedModel
 
 def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...]) -> ResidualModel:
     """Return the model at rest, with nothing learned: of ``G_pb``, with trust with disturbances of the user's own."""
-    return trust_state.init(settings, discrete, own) if settings.trust else paper.init(settings)
+    return averaging.init(settings, discrete, own) if settings.trust else paper.init(settings)
 
 
 def plan_ahead(state: ResidualModel) -> ResidualModel:
     """Return the model where a compensator decides the commands."""
-    return trust_state.plan_ahead(state) if isinstance(state, TrustedModel) else state
+    return averaging.plan_ahead(state) if isinstance(state, TrustedModel) else state
 
 
 def take_over(state: ResidualModel, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
     """Return the model with what another one of its kind has learned."""
     if isinstance(state, TrustedModel):
-        return trust_state.take_over(state, learned, regressions)
+        return averaging.take_over(state, learned, regressions)
     return replace(state, regression=regressions[0])
 
 
 def restart(state: ResidualModel) -> ResidualModel:
     """Return the model at the beginning of another run, at rest; what was learned is kept."""
-    return trust_state.restart(state) if isinstance(state, TrustedModel) else paper.restart(state)
+    return averaging.restart(state) if isinstance(state, TrustedModel) else paper.restart(state)
 
 
 def forecast(state: ResidualModel, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
     """Predict the residual over the next window; with trust a compensator gives the ``scales`` of its preview."""
     if isinstance(state, TrustedModel):
-        return trust_forecast.forecast(state, window, scales)
+        return averaging.forecast(state, window, scales)
     return paper.forecast(state, window)
 
 
@@ -68,6 +66,6 @@ def learn(
     starts from them in any case.
     """
     if isinstance(state, TrustedModel):
-        assert isinstance(forecast, trust_forecast.TrustedForecast)
-        return trust_learn.learn(state, forecast, x, fold=fold)
+        assert isinstance(forecast, averaging.TrustedForecast)
+        return averaging.learn(state, forecast, x, fold=fold)
     return paper.learn(state, forecast, x, fold=fold)

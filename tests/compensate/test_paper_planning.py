@@ -13,7 +13,7 @@ from properties import examples
 
 from hybridsep.base.errors import SignalError
 from hybridsep.compensate.compensator import SepState
-from hybridsep.compensate.paper_planning import has_stable_poles
+from hybridsep.compensate.planning import has_stable_poles
 
 
 @examples(200)

@@ -19,10 +19,9 @@ from staircase_data import commanded
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState, direct_samples
-from hybridsep.compensate.constraints import Bounds, DriveBounds, solve, solve_again
-from hybridsep.compensate.interior import EXACT, Minimum, Tolerance
+from hybridsep.compensate.newton import TOLERANCE
+from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve, solve_again
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
-from hybridsep.compensate.trusted_plan import TOLERANCE
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest

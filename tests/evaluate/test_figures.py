@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from drawn import cut_off, figures_drawn, hiding_legends
 
-from hybridsep.compensate.plan import SepState
+from hybridsep.compensate.planning import SepState
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
 from hybridsep.evaluate.path_plots import contour_figure, spiral_figure
 from hybridsep.evaluate.time_plots import prediction_figure, tracking_figure

@@ -199,7 +199,7 @@ def travelling(path: Path) -> dict[str, str]:
 def test_each_fmu_carries_what_it_needs(python_fmu: Build, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
-    assert {"predict/predictor.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
+    assert {"predict/predictor.py", "compensate/qp.py", "compensate/__init__.py"} < set(mine)
     assert not {"machines/machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))

@@ -13,10 +13,10 @@ from benchmarks.random_drives.generator import RandomDrive, random_drives
 from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
+from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.model import OF_PHYSICS
+from hybridsep.predict.averaging.stacking import COMMAND, DOUBTING, LAGGED
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.stack import COMMAND, DOUBTING, LAGGED
-from hybridsep.predict.trust.state import OF_PHYSICS
 
 NOISE = 1e-6  # m
 

@@ -17,8 +17,8 @@ from hybridsep.base.errors import ParameterError, SignalError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.predict.averaging.features import Disturbance
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.disturbances import Disturbance
 
 START, WALL = 0.3, 0.302
 """Position of rest, and that beyond which a spring acts, m."""

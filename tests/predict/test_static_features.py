@@ -9,8 +9,8 @@ import pytest
 from hybridsep.base.records import numbers_of
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.residual_window import ResidualWindow
-from hybridsep.predict.trust.disturbances import StaticFeatures
+from hybridsep.predict.averaging.features import StaticFeatures
+from hybridsep.predict.window import ResidualWindow
 
 TS, N = 1e-3, 800
 MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]

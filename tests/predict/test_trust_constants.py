@@ -12,27 +12,27 @@ from typing import Any
 
 import pytest
 
-from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.expert import ExpertErrors, ResidualScale
-from hybridsep.predict.trust.reach import Reach
-from hybridsep.predict.trust.stack import Stack
-from hybridsep.predict.trust.state import Learned
+from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.experts import ExpertErrors, ResidualScale
+from hybridsep.predict.averaging.gate import Reach
+from hybridsep.predict.averaging.model import Learned
+from hybridsep.predict.averaging.stacking import Stack
 
 ROOT = Path(__file__).parents[2]
-LIBRARY = sorted((ROOT / "hybridsep/predict/trust").glob("*.py"))
-CORE = sorted((ROOT / "fmu_src/c/core/predict/trust").glob("*.[ch]"))
+LIBRARY = sorted((ROOT / "hybridsep/predict/averaging").glob("*.py"))
+CORE = sorted((ROOT / "fmu_src/c/core/predict/averaging").glob("*.[ch]"))
 
 PLAIN = {0.0, 0.5, 1.0, 2.0}
 """Magnitudes that need no reason."""
 
-LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor", "window"}
+LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor"}
 """Constants are generated for C; its regression is below ``numeric``, its predictor below ``online``."""
 
-CORE_ALONE = {"predict_constants", "physics", "trusted"}
-"""Generated headers; the physics model, in the library below ``model``; the header of three files."""
+CORE_ALONE = {"predict_constants", "averaged_forecast", "averaged_learn"}
+"""Generated header; parts of the model, which the library has in one file."""
 
-TRUSTED = {"state": "trusted_state", "forecast": "trusted_forecast", "learn": "trusted_learn"}
-"""Files of the residual model itself."""
+AVERAGED = {"model": "averaged_model"}
+"""Names of C's files that are not the library's: C's own `hsep_model.h` is what an adapter sees."""
 
 DECLARED = re.compile(r"\s*(static const|#define)")
 
@@ -102,9 +102,9 @@ def names(record: type[Any]) -> list[str]:
 @pytest.mark.parametrize(
     ("header", "struct", "record"),
     [
-        ("hsep_stack.h", "hsep_stack", Stack),
-        ("hsep_expert.h", "hsep_expert_errors", ExpertErrors),
-        ("hsep_expert.h", "hsep_residual_scale", ResidualScale),
+        ("hsep_stacking.h", "hsep_stack", Stack),
+        ("hsep_experts.h", "hsep_expert_errors", ExpertErrors),
+        ("hsep_experts.h", "hsep_residual_scale", ResidualScale),
     ],
 )
 def test_what_is_learned_has_the_same_names_in_the_same_order(header: str, struct: str, record: type[Any]) -> None:
@@ -114,17 +114,17 @@ def test_what_is_learned_has_the_same_names_in_the_same_order(header: str, struc
 def test_all_that_is_learned_has_the_same_order() -> None:
     """The largest magnitudes of the features, whose number the settings decide, are behind the struct."""
     *struct, largest = names(Learned)
-    assert members("hsep_trusted.h", "hsep_learned") == struct
-    assert largest == members("hsep_trusted.h", "hsep_trusted")[-2]
+    assert members("hsep_averaged_model.h", "hsep_learned") == struct
+    assert largest == members("hsep_averaged_model.h", "hsep_trusted")[-2]
 
 
 def test_what_is_known_of_the_reach_has_the_same_names() -> None:
-    assert members("hsep_reach.h", "hsep_reach")[:2] == names(Reach)
+    assert members("hsep_gate.h", "hsep_reach")[:2] == names(Reach)
 
 
-@pytest.mark.parametrize("package", ["predict", "predict/trust"])
+@pytest.mark.parametrize("package", ["predict", "predict/averaging"])
 def test_both_have_the_same_files(package: str) -> None:
     """But for what one language alone needs."""
     of_library = {path.stem for path in (ROOT / "hybridsep" / package).glob("*.py")} - LIBRARY_ALONE
     of_core = {path.stem.removeprefix("hsep_") for path in (ROOT / "fmu_src/c/core" / package).glob("*.[ch]")}
-    assert {TRUSTED.get(name, name) for name in of_library} == of_core - CORE_ALONE
+    assert {AVERAGED.get(name, name) for name in of_library} == of_core - CORE_ALONE

@@ -12,10 +12,10 @@ from trusted_cases import FRICTION, PERIOD, TS, cycles, friction, physics, run, 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.model import OF_PHYSICS
+from hybridsep.predict.averaging.stacking import COMMAND, LAGGED, STATIC
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.constants import CONSTANTS
-from hybridsep.predict.trust.stack import COMMAND, LAGGED, STATIC
-from hybridsep.predict.trust.state import OF_PHYSICS
 
 NOISE = 1e-7  # m
 

@@ -24,7 +24,7 @@ from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
-from hybridsep.predict.trust.stack import COMMAND, LAGGED, N_EXPERTS
+from hybridsep.predict.averaging.stacking import COMMAND, LAGGED, N_EXPERTS
 
 TRUST: dict[str, Value] = {"trust": True, "t_init": 0.0}
 DELAY = 5

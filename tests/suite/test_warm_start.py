@@ -22,7 +22,7 @@ from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.trust.stack import COMMAND, N_EXPERTS, Stack
+from hybridsep.predict.averaging.stacking import COMMAND, N_EXPERTS, Stack
 
 Trained = Callable[[str], Path]
 

@@ -75,7 +75,7 @@ class CGram:
 
 
 class CSolution:
-    """Weights of the first features with penalties, as hsep_expert.c solves for them.
+    """Weights of the first features with penalties, as hsep_experts.c solves for them.
 
     Parameters
     ----------

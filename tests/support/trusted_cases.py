@@ -10,8 +10,8 @@ from predictor_cases import MODEL
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.predict.averaging.model import TrustedModel
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.state import TrustedModel
 
 __all__ = [
     "FRICTION",

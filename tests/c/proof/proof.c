@@ -12,7 +12,7 @@
 #include "hsep_parameters.h"
 #include "hsep_planner.h"
 #include "hsep_ranges.h"
-#include "hsep_stack.h"
+#include "hsep_stacking.h"
 
 #include <limits.h>
 #include <math.h>
@@ -136,7 +136,7 @@ void prove_constraints(void)
         .jerk_weight = 1.0,
         .limit = {1e-3, 1e-4, 1e-5, 1e-5},
         .no_reversal = 1,
-        .pinned = HSEP_PAPER_PLANNING_PINNED};
+        .pinned = HSEP_PLANNING_PINNED_PAPER};
     static double x_d[PREVIEW - SHORT], from[HSEP_ORDERS * PREVIEW], way[HSEP_ORDERS * PREVIEW];
     double least, most;
     hsep_planner *planner = (hsep_planner *)plan;

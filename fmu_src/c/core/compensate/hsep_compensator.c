@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_tolerance compensator_exact = {HSEP_INTERIOR_EXACT};
+static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 
 static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
@@ -169,8 +169,7 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_word pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_word left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    const hsep_word due =
-        left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_INTERIOR_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
+    const hsep_word due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
     if (self->trusted ? compensator_advance(self, left) : compensator_step(self, due)) {
         self->solving = 0;
         self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;

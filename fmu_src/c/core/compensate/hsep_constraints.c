@@ -20,8 +20,7 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[])
         const hsep_real delta = hsep_planner_delta(self, k), step = x_d[k] - last;
         hsep_real now[HSEP_ORDERS];
         last = x_d[k];
-        moves[k] =
-            self->no_reversal ? (hsep_real)((step > HSEP_CONSTRAINTS_MOVES) - (step < -HSEP_CONSTRAINTS_MOVES)) : 0.0;
+        moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
         now[0] = x_d[k] + delta;
         total[k] = delta * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
@@ -38,15 +37,15 @@ HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep
 {
     const hsep_word preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
-    *most = 1.0 - HSEP_CONSTRAINTS_ROUNDING;
+    *most = 1.0 - HSEP_QP_ROUNDING;
     *least = -*most;
     if (r >= preview && r < 2 * preview) { /* velocities */
         const hsep_real moves = hsep_at_const(self, self->moves)[r - preview];
         *least = moves > 0.0 ? 0.0 : *least;
         *most = moves < 0.0 ? 0.0 : *most;
     }
-    *least = hsep_fmin(*least, total - HSEP_CONSTRAINTS_INTERIOR);
-    *most = hsep_fmax(*most, total + HSEP_CONSTRAINTS_INTERIOR);
+    *least = hsep_fmin(*least, total - HSEP_QP_INTERIOR);
+    *most = hsep_fmax(*most, total + HSEP_QP_INTERIOR);
 }
 
 HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
@@ -59,7 +58,7 @@ HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_r
         hsep_constraints_range(self, r, &least, &most);
         const hsep_real here = total[r] + from[r];
         const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - here : here - least;
-        if (to > HSEP_CONSTRAINTS_ROUNDING && room < share * to) {
+        if (to > HSEP_QP_ROUNDING && room < share * to) {
             share = room / to;
         }
     }

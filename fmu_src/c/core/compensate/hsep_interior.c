@@ -64,7 +64,7 @@ HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max)
     hsep_interior got;
     memcpy(&got, block, sizeof got);
     return got.first <= first_max && got.steps <= got.tolerance.steps && got.part < HSEP_INTERIOR_PARTS &&
-           got.tolerance.steps <= HSEP_INTERIOR_STEPS;
+           got.tolerance.steps <= HSEP_QP_STEPS;
 }
 
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
@@ -100,7 +100,7 @@ static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
 
-/* The proximal term that bounds A' W A by P / HSEP_INTERIOR_REGULARISATION: where active bounds hardly differ, rounding
+/* The proximal term that bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding
  * in it would outgrow P. */
 static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_word n)
 {
@@ -109,7 +109,7 @@ static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real 
         largest = hsep_fmax(largest, P[0]);
         P += n - i;
     }
-    return HSEP_INTERIOR_REGULARISATION * hsep_splines_energy(splines) / largest;
+    return HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
 }
 
 /* Start at x, with or without the multipliers that are there. */

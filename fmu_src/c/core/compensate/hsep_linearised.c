@@ -104,10 +104,10 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
             const hsep_real *w = weights + part * self->count;
             hsep_real friction = 0.0;
             hsep_real of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
-            for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
+            for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
                 friction += slopes[i] * w[i];
             }
-            for (hsep_word i = HSEP_DISTURBANCES_N_LASTING; i < self->count; i++) {
+            for (hsep_word i = HSEP_FEATURES_N_LASTING; i < self->count; i++) {
                 of_position += w[i] * slopes[i];
             }
             given[part][0] = friction;
@@ -228,14 +228,14 @@ HSEP_API void hsep_linearised_slopes(
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(model);
     const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
-    hsep_real spread[HSEP_DISTURBANCES_N_FRICTION];
-    for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
+    hsep_real spread[HSEP_FEATURES_N_FRICTION];
+    for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
         spread[i] = hsep_disturbances_sign_velocity(scale, i);
     }
     for (hsep_word j = self->n; j-- > 0; slopes += self->count) {
         const hsep_real v_d = (x_d[j] - last) / disturbances->T_s;
         last = x_d[j];
-        for (hsep_word i = 0; i < HSEP_DISTURBANCES_N_FRICTION; i++) {
+        for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
             if (half > 0.0) {
                 slopes[i] = (hsep_tanh((v_d + half) / spread[i]) - hsep_tanh((v_d - half) / spread[i])) / (2.0 * half);
             } else {
@@ -246,11 +246,11 @@ HSEP_API void hsep_linearised_slopes(
         const hsep_real v = hsep_disturbances_damped_velocity(disturbances, x_pb, x, self->n, j);
         slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * hsep_fabs(x[j]);
         slopes[HSEP_DISTURBANCES_DAMPING] = 2.0 * hsep_fabs(v);
-        if (self->count > HSEP_DISTURBANCES_N_LASTING) {
+        if (self->count > HSEP_FEATURES_N_LASTING) {
             const hsep_real angle = hsep_disturbances_angle(disturbances, x[j]);
             const hsep_real turns = HSEP_TWO_PI / disturbances->period;
-            slopes[HSEP_DISTURBANCES_N_LASTING] = turns * hsep_cos(angle);
-            slopes[HSEP_DISTURBANCES_N_LASTING + 1] = -turns * hsep_sin(angle);
+            slopes[HSEP_FEATURES_N_LASTING] = turns * hsep_cos(angle);
+            slopes[HSEP_FEATURES_N_LASTING + 1] = -turns * hsep_sin(angle);
         }
     }
 }

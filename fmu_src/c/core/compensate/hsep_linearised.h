@@ -16,7 +16,7 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_real.h"
-#include "hsep_trusted.h"
+#include "hsep_averaged_model.h"
 
 #define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
 

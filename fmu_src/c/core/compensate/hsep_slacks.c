@@ -13,8 +13,8 @@ static inline hsep_real slacks_distance(int i, hsep_real Ax, hsep_real b) { retu
 
 HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost, int again)
 {
-    const hsep_real least = again ? HSEP_INTERIOR_SLACK_AGAIN : HSEP_INTERIOR_FIRST_SLACK;
-    const hsep_real mu = (again ? HSEP_INTERIOR_MU_AGAIN : HSEP_INTERIOR_FIRST_MU) * cost;
+    const hsep_real least = again ? HSEP_QP_SLACK_AGAIN : HSEP_QP_FIRST_SLACK;
+    const hsep_real mu = (again ? HSEP_QP_MU_AGAIN : HSEP_QP_FIRST_MU) * cost;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (hsep_word r = self->range[order].begin; r < self->range[order].end; r++) {
             for (int i = 0; i < 2; i++) {
@@ -226,8 +226,8 @@ HSEP_API void hsep_slacks_correct(const hsep_slacks *self, hsep_real sigma_mu)
 HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self)
 {
     const hsep_lengths alpha = slacks_lengths(self);
-    const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_INTERIOR_TAU * alpha.primal;
-    const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_INTERIOR_TAU * alpha.dual;
+    const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.primal;
+    const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.dual;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];

@@ -7,9 +7,9 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real trusted_planner_reaches[] = {HSEP_TRUSTED_PLAN_REACHES};
-static const hsep_real trusted_planner_lengths[] = {HSEP_TRUSTED_PLAN_LENGTHS};
-static const hsep_word trusted_planner_solved[] = {HSEP_TRUSTED_PLAN_SOLVED};
+static const hsep_real trusted_planner_reaches[] = {HSEP_NEWTON_REACHES};
+static const hsep_real trusted_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
+static const hsep_word trusted_planner_solved[] = {HSEP_NEWTON_SOLVED};
 
 HSEP_ASSERT(reaches, sizeof trusted_planner_reaches == HSEP_TRUSTED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof trusted_planner_lengths == HSEP_TRUSTED_TRIES * sizeof(hsep_real));
@@ -19,7 +19,7 @@ HSEP_ASSERT(solved, sizeof trusted_planner_solved == (1 + HSEP_TRUSTED_STEPS) * 
  * rounding leaves up to 2e-4 of a bound of third differences, so that the margin is wider. */
 static hsep_tolerance trusted_planner_tolerance(hsep_word programme)
 {
-    hsep_tolerance tolerance = {HSEP_TRUSTED_PLAN_TOLERANCE};
+    hsep_tolerance tolerance = {HSEP_NEWTON_TOLERANCE};
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F;
 #endif
@@ -30,7 +30,7 @@ static hsep_tolerance trusted_planner_tolerance(hsep_word programme)
 /* Whether a plan costs less than another; not if it is NaN. */
 static int trusted_planner_better(hsep_real cost, hsep_real other)
 {
-    return cost < (1.0 - HSEP_TRUSTED_PLAN_LEAST_GAIN) * other;
+    return cost < (1.0 - HSEP_NEWTON_LEAST_GAIN) * other;
 }
 
 static void trusted_planner_copy(hsep_trusted_planner *self, hsep_real to[], const hsep_real from[])
@@ -200,7 +200,7 @@ static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_
 {
     const hsep_word all = self->late + self->preview, window = self->late + self->Np;
     const int is_within = self->varied < window;
-    const hsep_word apart = is_within ? 1 : HSEP_LINEARISED_APART, left = (is_within ? window : all) - self->varied;
+    const hsep_word apart = is_within ? 1 : HSEP_NEWTON_APART, left = (is_within ? window : all) - self->varied;
     const hsep_word most = apart * HSEP_TRUSTED_VARIED, last = self->varied + (left < most ? left : most);
     hsep_trusted_go_on(task->model, hsep_at(self, self->x_pb), hsep_at(self, self->e_h), self->varied, last, apart);
     self->varied = last;
@@ -355,7 +355,7 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
     self->tries++;
     self->stage = HSEP_TRUSTED_COMPARE;
     if (trusted_planner_better(cost, self->cost)) {
-        const int is_last = gain < HSEP_TRUSTED_PLAN_GAIN * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
+        const int is_last = gain < HSEP_NEWTON_GAIN * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
         trusted_planner_copy(self, best, c);
         self->cost = cost;
         self->stage = is_last ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
@@ -376,7 +376,7 @@ static hsep_real trusted_planner_bounded(
     const hsep_word count = HSEP_N_DECIDED + self->n;
     hsep_real bounded = 0.0;
     for (hsep_word k = 0; k < self->Np; k++) {
-        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_TRUSTED_PLAN_AT_BOUND;
+        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_NEWTON_AT_BOUND;
     }
     return bounded / (hsep_real)self->Np;
 }
@@ -390,7 +390,7 @@ static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hse
     const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * splines->share[0];
     const hsep_real longer = trusted_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
                              trusted_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
-    return error > HSEP_TRUSTED_PLAN_LEFT && longer > HSEP_TRUSTED_PLAN_BOUND_SHARE;
+    return error > HSEP_NEWTON_LEFT && longer > HSEP_NEWTON_BOUND_SHARE;
 }
 
 /* Take the plan whose cost is lower. */

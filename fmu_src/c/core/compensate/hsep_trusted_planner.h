@@ -19,7 +19,7 @@
 #include "hsep_physics.h"
 #include "hsep_planner.h"
 #include "hsep_real.h"
-#include "hsep_trusted.h"
+#include "hsep_averaged_model.h"
 
 #define HSEP_TRUSTED_STEPS 3    /* Newton steps of a plan at most, */
 #define HSEP_TRUSTED_TRIES 2    /* lengths of a step that are tried, */

@@ -20,7 +20,7 @@ static const hsep_real work_completed = 50.0, work_pivots = 1.5, work_product = 
                        work_shifted = 20.0, work_bounds = 280.0, work_allowed = 90.0;
 static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 200.0;
 
-static const hsep_word work_solved[1 + HSEP_TRUSTED_STEPS] = {HSEP_TRUSTED_PLAN_SOLVED};
+static const hsep_word work_solved[1 + HSEP_TRUSTED_STEPS] = {HSEP_NEWTON_SOLVED};
 
 /* Disturbances that are filtered for a prediction: friction once, stiffness and damping twice. */
 static const hsep_real work_filtered = 10.0, work_of_mode = 9.0;
@@ -121,7 +121,7 @@ static hsep_real work_aim(const work_sizes *sizes) { return work_shifted * sizes
 static hsep_real work_commands(const work_sizes *sizes)
 {
     return sizes->all *
-           (HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_filtered * work_of_mode * sizes->modes + work_command);
+           (HSEP_FEATURES_N_FRICTION * work_tanh + work_filtered * work_of_mode * sizes->modes + work_command);
 }
 
 static hsep_real work_run(const work_sizes *sizes, hsep_real count)
@@ -151,7 +151,7 @@ static hsep_real work_samples(const work_sizes *sizes, hsep_real count, hsep_rea
 
 static hsep_real work_slopes(const work_sizes *sizes)
 {
-    return sizes->all * (HSEP_DISTURBANCES_N_FRICTION * work_tanh + work_slope);
+    return sizes->all * (HSEP_FEATURES_N_FRICTION * work_tanh + work_slope);
 }
 
 static hsep_real work_linearise(const work_sizes *sizes) { return sizes->all * work_sample; }
@@ -201,7 +201,7 @@ HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, c
     case HSEP_TRUSTED_VARY:
         return self->varied < self->late + self->Np
                    ? work_samples(&sizes, HSEP_TRUSTED_VARIED, 1.0)
-                   : work_samples(&sizes, HSEP_LINEARISED_APART * HSEP_TRUSTED_VARIED, HSEP_LINEARISED_APART);
+                   : work_samples(&sizes, HSEP_NEWTON_APART * HSEP_TRUSTED_VARIED, HSEP_NEWTON_APART);
     case HSEP_TRUSTED_CHANGE:
         return work_begin(&sizes);
     case HSEP_TRUSTED_BEGIN:
@@ -292,7 +292,7 @@ HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, c
     case HSEP_TRUSTED_DONE:
         return 0.0;
     case HSEP_TRUSTED_VARY:
-        left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_LINEARISED_APART);
+        left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_NEWTON_APART);
         return left + work_begin(&sizes) + begin;
     case HSEP_TRUSTED_CHANGE:
         return work_begin(&sizes) + begin;

@@ -141,7 +141,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
             {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
              settings->j_max * (T_s * T_s * T_s)},
         .no_reversal = settings->no_reversal != 0,
-        .pinned = parameters->trust.trust ? HSEP_TRUSTED_PLANNING_PINNED : HSEP_PAPER_PLANNING_PINNED};
+        .pinned = parameters->trust.trust ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER};
     derived.compensate = (hsep_sep_state)settings->compensate;
     return derived;
 }

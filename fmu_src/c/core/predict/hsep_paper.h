@@ -9,7 +9,7 @@
 #define HSEP_PAPER_H
 
 #include "hsep_regression.h"
-#include "hsep_residual_window.h"
+#include "hsep_window.h"
 
 /* e(k) = bias + sum_i w_x,i x(k - i) + sum_i w_e,i e(k - i) */
 typedef struct {

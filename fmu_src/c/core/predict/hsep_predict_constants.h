@@ -23,12 +23,12 @@
 #define HSEP_UNCERTAINTY_RATIO_RATE 0.8
 #define HSEP_UNCERTAINTY_RATIO_MAX 16.0
 
-/* hybridsep/predict/trust/start.py */
+/* hybridsep/predict/averaging/start.py */
 #define HSEP_START_MOVING 0.05
 #define HSEP_START_SAMPLES 4
 #define HSEP_START_DAMPING 0.001
 
-/* hybridsep/predict/trust/stack.py */
+/* hybridsep/predict/averaging/stacking.py */
 #define HSEP_HOLD 0
 #define HSEP_LAGGED 1
 #define HSEP_STATIC 2
@@ -36,30 +36,30 @@
 #define HSEP_DOUBTING 4
 #define HSEP_N_EXPERTS 5
 #define HSEP_N_JUDGED 4
-#define HSEP_STACK_LEAST_SQUARE HSEP_TINY(1e-300)
+#define HSEP_STACKING_LEAST_SQUARE HSEP_TINY(1e-300)
 
-/* hybridsep/predict/trust/expert.py */
-#define HSEP_EXPERT_DIVERGED 1000000.0
-#define HSEP_EXPERT_LAG_BOUND 10.0
-#define HSEP_EXPERT_RESOLUTION 1e-13
+/* hybridsep/predict/averaging/experts.py */
+#define HSEP_EXPERTS_DIVERGED 1000000.0
+#define HSEP_EXPERTS_LAG_BOUND 10.0
+#define HSEP_EXPERTS_RESOLUTION 1e-13
 
-/* hybridsep/predict/trust/disturbances.py */
-#define HSEP_DISTURBANCES_N_FRICTION 6
-#define HSEP_DISTURBANCES_N_LASTING 8
-#define HSEP_DISTURBANCES_N_PERIODIC 2
-#define HSEP_DISTURBANCES_LEAST_VELOCITY HSEP_TINY(1e-200)
-#define HSEP_DISTURBANCES_DIFFERENCES 3
+/* hybridsep/predict/averaging/features.py */
+#define HSEP_FEATURES_N_FRICTION 6
+#define HSEP_FEATURES_N_LASTING 8
+#define HSEP_FEATURES_N_PERIODIC 2
+#define HSEP_FEATURES_LEAST_VELOCITY HSEP_TINY(1e-200)
+#define HSEP_FEATURES_DIFFERENCES 3
 
-/* hybridsep/predict/trust/state.py, hybridsep/predict/trust/forecast.py, hybridsep/predict/trust/learn.py */
+/* hybridsep/predict/averaging/model.py */
 #define HSEP_OF_PHYSICS 0
 #define HSEP_OF_COMMAND 1
 #define HSEP_N_RESIDUALS 2
-#define HSEP_TRUSTED_AHEAD 20
-#define HSEP_TRUSTED_ROUNDING 1e-06
-#define HSEP_TRUSTED_LEAST HSEP_TINY(1e-150)
-#define HSEP_TRUSTED_BRIDGED 3
+#define HSEP_AVERAGING_AHEAD 20
+#define HSEP_AVERAGING_ROUNDING 1e-06
+#define HSEP_AVERAGING_LEAST HSEP_TINY(1e-150)
+#define HSEP_AVERAGING_BRIDGED 3
 
-/* hybridsep/predict/trust/constants.py */
+/* hybridsep/predict/averaging/constants.py */
 #define HSEP_TRUST_KAPPA 1.0
 #define HSEP_TRUST_GAMMA 0.95
 #define HSEP_TRUST_FIRST_LAGGED 0.5

@@ -1,4 +1,4 @@
-/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the trusted one (hsep_trusted.h); as
+/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the trusted one (hsep_averaged_model.h); as
  * predict/residual_model.py.
  *
  * The block holds one of them, and each function calls its counterpart. For a window: hsep_residual_begin; _predict,
@@ -9,7 +9,7 @@
 #define HSEP_RESIDUAL_MODEL_H
 
 #include "hsep_paper.h"
-#include "hsep_trusted.h"
+#include "hsep_averaged_model.h"
 
 typedef struct {
     hsep_word Np, late, n; /* samples of a window, late samples before it, both */

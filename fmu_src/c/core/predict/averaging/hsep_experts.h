@@ -1,0 +1,111 @@
+/* Expert of the residual: a regression on static features and lags with normal priors, trusted as far as its own
+ * variance allows; as predict/averaging/experts.py, which says how.
+ *
+ * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
+ * them are the window, which is measured then. A block as hsep_layout.h has them.
+ */
+#ifndef HSEP_EXPERTS_H
+#define HSEP_EXPERTS_H
+
+#include "hsep_api.h"
+#include "hsep_warm_start.h"
+#include "hsep_layout.h"
+#include "hsep_real.h"
+#include "hsep_solution.h"
+
+/* Size of the residuals so far. */
+typedef struct {
+    hsep_real largest_square; /* m2, largest mean square of a window */
+    hsep_real largest;        /* m, largest magnitude */
+} hsep_residual_scale;
+
+/* What is known of the errors of an expert. */
+typedef struct {
+    hsep_real noise_variance; /* m2, of a row about the model; 0 until it is known */
+    hsep_real correlation;    /* rows that count as one: errors of neighbouring rows are alike */
+} hsep_expert_errors;
+
+typedef struct {
+    hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
+    hsep_word n_static, p; /* features without lags, lags */
+    hsep_word room;        /* rows that may wait in its solution */
+} hsep_expert_shape;
+
+typedef struct {
+    hsep_word Np, n, n_static, p;
+    hsep_real variance;       /* m2, of the noise that the penalties come from */
+    hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
+    hsep_real largest_square; /* m2, largest mean square of a window, and */
+    hsep_real bound;          /* m, bound on the prediction, as it was made */
+    /* Offsets in words from the beginning of the struct */
+    hsep_word lag_scales; /* (p,) prior standard deviations of the weights of the lags */
+    hsep_word run;        /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_word unshrunk;   /* (n + p,) m, the same within bounds */
+    hsep_word e_h;        /* (n,) m, shrunk by its variance, and bounded */
+    hsep_word kept;       /* (n,) what the variance leaves of it */
+    hsep_word response;   /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_word squares;    /* (n,) its squares, oldest first */
+    hsep_word variances;  /* (n,) m2, of the rows */
+    hsep_word solution;   /* hsep_solution, whose head are the lags */
+} hsep_expert;
+
+HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
+HSEP_ASSERT_WORDS(hsep_expert_shape, 5);
+HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
+HSEP_ASSERT_WORDS(hsep_expert, 17);
+
+/* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
+HSEP_API void hsep_residual_scale_follow(
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count);
+
+HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
+HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
+HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
+
+static inline hsep_solution *hsep_expert_solution(hsep_expert *self)
+{
+    return (hsep_solution *)hsep_at(self, self->solution);
+}
+
+/* Weights of the features without lags, then of the lags, (n_static + p,). */
+static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
+{
+    const hsep_solution *solution = (const hsep_solution *)hsep_at_const(self, self->solution);
+    return hsep_at_const(solution, solution->weights);
+}
+
+/* Take the penalties that the next weights are solved for with from the rows so far, rows of earlier runs weighed by
+ * weight; they begin to be solved for by hsep_expert_begin_solution. first, least: m2, variance of the noise while
+ * it is not known, and the least one. */
+HSEP_API void hsep_expert_prepare(
+    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
+    hsep_real least);
+
+/* Begin to solve for them from the rows so far, those of earlier runs settled. Cost: n^2 multiply-adds. */
+HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_evidence *evidence, hsep_real weight);
+
+/* Complete the factor with the penalties of the features without lags, before the last row comes; scales: as below. */
+HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[]);
+
+/* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
+ * without lags; apart: as hsep_solution_finish has it, which it costs. */
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[], int apart);
+
+/* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
+HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
+
+/* Predict samples first ... last - 1 in free run, and shrink them by their variances; first is 0, or where the last
+ * call ended. rows: (n, n_static), sample after sample. The row of the first of every apart samples, from first on,
+ * counts for their variances; apart = 0: shrinking stays as in the last prediction. A sample costs n_static + p and,
+ * for its variance, last multiply-adds, and each row that counts a quarter of hsep_solution_leverages. */
+HSEP_API void hsep_expert_predict(
+    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart);
+
+/* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
+ * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the
+ * noise, if it is known; else 0. */
+HSEP_API void hsep_expert_judge(
+    const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
+    hsep_word n, hsep_real given);
+
+#endif

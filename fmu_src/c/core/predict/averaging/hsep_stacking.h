@@ -1,0 +1,41 @@
+/* Stack of experts: the convex sum of their predictions that would have erred least so far; as
+ * predict/averaging/stacking.py,
+ * which has the formula. The remainder of the weights is the prediction 0, the physics model's. Plain data; reentrant.
+ */
+#ifndef HSEP_STACKING_H
+#define HSEP_STACKING_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_predict_constants.h"
+
+typedef struct {
+    hsep_real weights[HSEP_N_EXPERTS];               /* pi */
+    hsep_real gram[HSEP_N_EXPERTS * HSEP_N_EXPERTS]; /* m2, F' F so far */
+    hsep_real cross[HSEP_N_EXPERTS];                 /* m2, F' e so far */
+    hsep_real evidence[2];                           /* e' e so far, m2, and samples */
+} hsep_stack;
+
+#define HSEP_STACK_WORDS (HSEP_N_EXPERTS * (HSEP_N_EXPERTS + 2) + 2)
+
+HSEP_ASSERT_WORDS(hsep_stack, HSEP_STACK_WORDS);
+
+/* Begin without evidence. */
+HSEP_API void hsep_stack_init(hsep_stack *self);
+
+/* Update the weights with a measured window. products: (HSEP_N_EXPERTS + 1,) by as many, m2: the scalar products over
+ * it of the predictions and, last, of what was measured; n: its samples, > 0; least: least mean square that errors are
+ * judged by, m2. Constant cost. */
+HSEP_API void hsep_stack_update(
+    hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
+
+/* HSEP_COMMAND, if it has more of the weights than HSEP_LAGGED and HSEP_STATIC together, else HSEP_LAGGED. */
+HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self);
+
+/* Give an expert the evidence of another, as if it had predicted the same so far. */
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to);
+
+/* Forget an expert that predicts no more. */
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_word expert);
+
+#endif

@@ -1,0 +1,382 @@
+"""Plan on the averaged model, by Newton steps that follow the slope of its disturbances.
+
+``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
+friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
+of the linearised model (Gauss-Newton), and goes to its minimum, or less far if only that lowers the cost. The first
+samples of a plan follow the last plan, and the plan is made while they act. Steps, their lengths and the steps of the
+solver are limited, so that the work fits into these samples. Predictions are shrunk by their variance, so where the
+model knows nothing the plan is the physics model's.
+
+The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
+of the stack, and the shrinking by the variance, are held constant:
+
+``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
+
+A is ``arx_command``, linear and time-invariant: its features are increments and lags of the command. L and S are
+``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..base.signals import Array
+from ..predict.averaging.experts import ExpertPrediction, SolvedExpert
+from ..predict.averaging.features import N_FRICTION, N_LASTING, StaticFeatures, StaticState
+from ..predict.averaging.model import OF_COMMAND, TrustedForecast, TrustedModel, forecast_by, scales_of, solved
+from ..predict.averaging.stacking import STATIC
+from ..predict.window import ResidualWindow
+from .qp import Bounds, Tolerance, solve, solve_again
+from .splines import N_DECIDED, PlanCost, SplineBasis
+
+__all__ = ["TOLERANCE", "PlanModel", "TrustedPlanner", "is_better", "runs_away"]
+
+_OWN_REACH = 1e-3
+"""Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
+the friction's is the tangent."""
+
+
+_APART = 4
+"""Samples behind the window that share the variance of the first one's features."""
+
+
+class DisturbanceSlopes(NamedTuple):
+    """Slopes of the disturbances at given commands.
+
+    Attributes
+    ----------
+    friction : (n, 6) array, s/m
+        Of each friction with the commanded velocity.
+    stiffness, damping : (n,) array, m and m/s
+        Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
+    of_position : (n, n_disturbances − 8) array, 1/m
+        Of all others with ``x``.
+    of_velocity : (n, n_own) array, s/m
+        Of the user's own, the last ones, with the commanded velocity.
+    """
+
+    friction: Array
+    stiffness: Array
+    damping: Array
+    of_position: Array
+    of_velocity: Array
+
+    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
+        """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
+
+        Parameters
+        ----------
+        weights : (n_disturbances,) array
+        velocity : (n, m) array, m/s
+            Changes of the commanded velocity, each a column.
+        moved, moved_velocity : (n, m) array, m and m/s
+            Changes of the position, and of its velocity.
+        """
+        of_position = weights[N_FRICTION] * self.stiffness + self.of_position @ weights[N_LASTING:]
+        of_velocity = self.friction @ weights[:N_FRICTION]
+        if n_own := self.of_velocity.shape[1]:
+            of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
+        return np.asarray(
+            of_velocity[:, None] * velocity
+            + of_position[:, None] * moved
+            + (weights[N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
+        )
+
+
+class PlanModel:
+    """Trusted model with the weights of this instant, as a function of the commands of a preview.
+
+    Parameters
+    ----------
+    model : TrustedModel
+        Where the measurements end, which is the beginning of the preview unless they are late.
+    state : (n_state,) array
+        State of ``G_pb`` there.
+    late : (measurement_delay,) array, m
+        Commands between there and the preview, relative to the start.
+    start : float, m
+    x_d, path : (n,) array, m
+        Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
+        last plan; and unmodified commands.
+        Both relative to the start.
+
+    Attributes
+    ----------
+    scales : FeatureScales
+    of_rest : TrustedForecast
+        Prediction under ``x_d``, whose variances all others have.
+    """
+
+    def __init__(self, model: TrustedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
+        self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
+        self._state, self._late, self._start = state, late, start
+        window = self._window(x_d)
+        self.scales = scales_of(model, window, path)
+        self._solved = solved(model, self.scales)
+        counts = np.arange(len(late) + len(x_d))
+        behind = counts[len(late) + model.fixed.settings.Np :]
+        behind -= np.arange(len(behind)) % _APART
+        self.of_rest = forecast_by(model, self._solved, window, self.scales, counts=counts)
+
+    def _window(self, x_d: Array) -> ResidualWindow:
+        """Return the preview under commands ``x_d``, and what is late before it."""
+        command = np.concatenate((self._late, x_d))
+        x_pb, _ = self._discrete.forced_response(self._state, command)
+        return ResidualWindow(command, x_pb, self._start)
+
+    @property
+    def has_learned(self) -> bool:
+        """Whether it has learned how the drive's disturbances act."""
+        return STATIC in self._solved
+
+    def predict(self, x_d: Array) -> TrustedForecast:
+        """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
+        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self.of_rest.predictions)
+
+    def position(self, at: TrustedForecast) -> Array:
+        """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
+        return (at.window.x_pb + at.e_h)[len(self._late) :]
+
+    def slope(self, at: TrustedForecast, changes: Array, passed: Array, reach: float) -> Array:
+        """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
+
+        Parameters
+        ----------
+        at : TrustedForecast
+            Of :meth:`predict`, where the model is linearised.
+        changes : (n, m) array
+            Changes of the commands, each a column.
+        passed : (n, m) array
+            The changes filtered by ``G_pb``.
+        reach : float
+            Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale.
+        """
+        n_late, weights = len(self._late), self._model.learned.stack.weights.tolist()
+        over_all = slopes_of(self._static, self._model.run.static, at.window, at.x, self.scales.velocity, reach)
+        slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
+        total: Array = passed.copy()
+        for expert, one in self._solved.items():
+            if weights[expert] == 0.0:
+                continue
+            kept = weights[expert] * _left(at.predictions[expert])[n_late:, None]
+            if self._model.kind_of(expert) == OF_COMMAND:
+                acted = self._late_changes(changes)
+                total += kept * self._of_command(one, acted) + weights[expert] * (acted - passed)
+            else:
+                total += kept * self._of_disturbances(one, slopes, changes, passed)
+        return total
+
+    def _late_changes(self, changes: Array) -> Array:
+        """Return what changes of the commands are after the dead time, ``(n, m)``, m."""
+        d = min(self._model.fixed.command.dead_time, len(changes))
+        return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
+
+    def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
+        """Return the change of the command's residual with changes of the commands after the dead time, ``(n, m)``."""
+        increments = np.diff(acted, axis=0, prepend=0.0)
+        drive = lfilter(solved.solution.weights[1 : solved.n_static], [1.0], increments, axis=0)
+        return _recur(solved, drive)
+
+    def _of_disturbances(self, solved: SolvedExpert, slopes: DisturbanceSlopes, changes: Array, passed: Array) -> Array:
+        """Return the change of the physics model's residual by an expert with static features, ``(n, m)``."""
+        discrete = self._discrete
+        velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
+        moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
+        weights, first = solved.solution.weights[: solved.n_static], 2 + self._static.n_differences
+        linear, own, differences = np.split(weights[1:], [first - 1, first - 1 + self._static.n_disturbances])
+        disturbance = slopes.change(own, velocity, passed, moved)
+        disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
+        drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
+        difference = passed
+        for weight in linear:
+            drive = drive + weight * difference
+            difference = np.diff(difference, axis=0, prepend=0.0)
+        return _recur(solved, drive)
+
+
+def _recur(solved: SolvedExpert, drive: Array) -> Array:
+    """Return the free run ``e(k) = drive(k) + Σ_i w_e,i e(k−i)`` from rest, ``(n, m)``."""
+    if not len(solved.lag_weights):
+        return drive
+    return np.asarray(lfilter([1.0], np.concatenate(([1.0], -solved.lag_weights)), drive, axis=0))
+
+
+def slopes_of(
+    static: StaticFeatures, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float, reach: float
+) -> DisturbanceSlopes:
+    """Return the slopes of the disturbances of a window; other parameters as those of :meth:`StaticFeatures.rows`.
+
+    Parameters
+    ----------
+    reach : float
+        Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
+        0: the tangent.
+    """
+    x_d, x_pb, start = window
+    v_d, spread = static.velocity(state, x_d), static.spread(velocity_scale)
+    v, half = v_d[:, None], reach * velocity_scale
+    if half > 0.0:
+        friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
+    else:
+        friction = (1.0 - np.tanh(v / spread) ** 2) / spread
+    of_position = []
+    if static.period > 0.0:
+        angle, turns = static.angle(start + x), 2.0 * np.pi / static.period
+        of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
+    of_velocity = np.empty((len(x), 0))
+    if static.own:
+        step, half = velocity_scale * static.discrete.T_s, half or _OWN_REACH * velocity_scale
+        of_position.append(
+            (static.own_at(start + (x + step), v_d) - static.own_at(start + (x - step), v_d)) / (2.0 * step)
+        )
+        of_velocity = (static.own_at(start + x, v_d + half) - static.own_at(start + x, v_d - half)) / (2.0 * half)
+    damping = 2.0 * np.abs(static.damped_velocity(state, x_pb, x))
+    return DisturbanceSlopes(
+        friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
+    )
+
+
+def _left(prediction: ExpertPrediction) -> Array:
+    """Return what shrinking and bounds leave of a prediction, ``(n,)``."""
+    unshrunk = prediction.unshrunk
+    return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.kept.copy(), where=unshrunk != 0.0))
+
+
+_SOLVED = (5, 5, 3, 3)
+"""Solver steps at most, of the physics model's plan and of the programme of each Newton step: from the second one on a
+bounded one begins where the last one ended."""
+
+TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, _SOLVED[0])
+"""Of the solver: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
+small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
+within the bounds."""
+
+_REACHES = (0.1, 0.01, 0.0)
+"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+that changes nearby."""
+
+_LENGTHS = (1.0, 0.3)
+"""Lengths of a step that are tried, relative to the way to the minimum."""
+
+_GAIN, _LEAST_GAIN = 1e-3, 1e-9
+"""Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
+rounding tells apart are equal."""
+
+
+_AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
+"""A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
+model's plan by this share of a window, and may leave this RMS error then, relative to the largest change."""
+
+
+def runs_away(delta: Array, of_physics: Array, error: float, change_max: float) -> bool:
+    """Return whether a plan asks for a larger change than compensation is made for: its model is wrong then.
+
+    A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
+    fall into a second state with an error many times larger, and stays in it when compensation ends.
+
+    Parameters
+    ----------
+    delta, of_physics : (Np,) arrays, m
+        Changes of the command by the plan, and by the physics model's.
+    error : float, m
+        RMS error that the plan leaves, by its own model.
+    change_max : float, m
+        Largest change of the command.
+    """
+    shares = [float(np.mean(np.abs(change) > _AT_BOUND * change_max)) for change in (delta, of_physics)]
+    return error > _LEFT * change_max and shares[0] - shares[1] > _BOUND_SHARE
+
+
+def is_better(cost: float, other: float) -> bool:
+    """Return whether a plan costs less, m², than another; not if it is NaN."""
+    return cost < (1.0 - _LEAST_GAIN) * other
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Coefficients ``(3 + n_free,)``; prediction, position and third differences, ``(preview,)``, and cost, m²."""
+
+    coefficients: Array
+    prediction: TrustedForecast
+    x_h: Array
+    third: Array
+    cost: float
+
+
+class TrustedPlanner:
+    """Cost of the plans of one window on the trusted model.
+
+    Parameters
+    ----------
+    basis : SplineBasis
+    jerk_weight : float
+    model : PlanModel
+        Of the preview that the window begins.
+    x_d : (preview,) array, m
+        Commanded positions, relative to the start.
+    delta_before : (3,) array, m
+        Last three values of δ.
+    """
+
+    def __init__(
+        self, basis: SplineBasis, jerk_weight: float, model: PlanModel, x_d: Array, delta_before: Array
+    ) -> None:
+        self._basis, self._jerk_weight, self._model, self._x_d = basis, jerk_weight, model, x_d
+        self._third_before = np.diff(np.concatenate((delta_before, np.zeros(len(x_d)))), 3)
+
+    def cost(self, coefficients: Array) -> float:
+        """Return the cost of a plan, m²; not finite if its prediction overflows."""
+        return self._at(coefficients).cost
+
+    def plan(self, rest: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
+        """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
+
+        Parameters
+        ----------
+        rest : (3 + n_free,) array, m
+            Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
+        bounds : Bounds
+        n_pinned : int
+            Coefficients that the plan does not change.
+        passed : (preview, n_free) array
+            Free splines filtered by ``G_pb``.
+        """
+        splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
+        here, last = self._point(rest, self._model.of_rest), None
+        for reach, steps in zip(_REACHES, _SOLVED[1:], strict=True):
+            W = self._model.slope(here.prediction, splines, passed, reach)
+            at = here.coefficients[N_DECIDED:]
+            P = W.T @ W + self._jerk_weight * (third.T @ third)
+            target = self._x_d - here.x_h + W @ at
+            v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
+            cost, tolerance = PlanCost.regular(P, v), TOLERANCE._replace(steps=steps)
+            found = (
+                solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
+                if last is None
+                else solve_again(cost, bounds, rest[N_DECIDED:], n_pinned, at, last, tolerance)
+            )
+            if found is None:
+                break
+            last = found.ending
+            ends = (np.concatenate((rest[:N_DECIDED], at + length * (found.x - at))) for length in _LENGTHS)
+            best = next((end for end in map(self._at, ends) if is_better(end.cost, here.cost)), None)
+            if best is None:
+                break
+            gain, here = here.cost - best.cost, best
+            if gain < _GAIN * (gain + here.cost):
+                break
+        return here.coefficients, here.cost
+
+    def _at(self, coefficients: Array) -> _Point:
+        return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
+
+    def _point(self, coefficients: Array, prediction: TrustedForecast) -> _Point:
+        third = self._basis.third @ coefficients + self._third_before
+        x_h = self._model.position(prediction)
+        error = self._x_d - x_h
+        cost = float(error @ error) + self._jerk_weight * float(third @ third)
+        return _Point(coefficients, prediction, x_h, third, cost)

@@ -1,0 +1,263 @@
+"""Features of the experts: disturbances filtered by the physics model, and increments of the command.
+
+What the physics model misses acts where the command does, so ``e_pb = G_pb d(x, v)``. A static feature, one without
+lags, is ``G_pb`` applied to a candidate disturbance ``d``: friction ``tanh(v/v_i)`` over a spread of velocities
+``v_i``, stiffness ``x·|x|`` and damping ``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over
+it, as of cogging or a screw's pitch; and functions of the user's own. First differences of the features take up errors
+of ``G_pb`` in phase. As nothing here depends on the learned weights, no recursion can become unstable.
+
+The expert without a physics model, eq. (4) with ``G_pb = 1``, predicts the residual of the command,
+``e_0(k) = x(k) − x_d(k − d)`` with the dead time ``d``; its features are a constant and the increments
+``x_d(k−d−j) − x_d(k−d−j−1)``, ``j = 0 … p``, beside ``p`` lags of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.errors import SignalError
+from ...base.signals import Array
+from ...model.discrete import DiscreteModel
+from ..regression import lags
+from ..window import ResidualWindow
+from .constants import CONSTANTS
+
+__all__ = [
+    "LEAST_VELOCITY",
+    "N_FRICTION",
+    "N_LASTING",
+    "CommandFeatures",
+    "Disturbance",
+    "StaticFeatures",
+    "StaticState",
+]
+
+
+@dataclass(frozen=True)
+class CommandFeatures:
+    """Features of the command, over consecutive windows.
+
+    Attributes
+    ----------
+    dead_time : int
+        Of the physics model, in samples.
+    """
+
+    dead_time: int
+
+    @property
+    def p(self) -> int:
+        """Lags."""
+        return CONSTANTS.lags_of_command
+
+    @property
+    def n_before(self) -> int:
+        """Commands before a window that its features need."""
+        return self.dead_time + self.p + 1
+
+    @property
+    def shares(self) -> Array:
+        """Effects that features may have, ``(p + 2,)``, relative to the largest: an old increment explains less."""
+        return np.concatenate(([1.0], np.sqrt(CONSTANTS.last_lag ** (np.arange(self.p + 1) / self.p))))
+
+    def rows(self, before: Array, x_d: Array) -> Array:
+        """Return the features of a window, ``(n, p + 2)``: 1, and the increments.
+
+        Parameters
+        ----------
+        before : (n_before,) array, m
+            Commands before it, oldest first.
+        x_d : (n,) array, m
+        """
+        increments = np.diff(np.concatenate((before, x_d))[: self.p + 1 + len(x_d)])
+        return np.column_stack((np.ones(len(x_d)), lags(increments, self.p + 1)))
+
+    def late(self, before: Array, x_d: Array) -> Array:
+        """Return the commands ``d`` samples ago over a window, ``(n,)``, m; parameters as for :meth:`rows`."""
+        return np.concatenate((before, x_d))[self.p + 1 : self.p + 1 + len(x_d)]
+
+    def largest(self, step: float) -> Array:
+        """Return the largest magnitudes of the features, ``(p + 2,)``, for the largest increment ``step``, m."""
+        return np.concatenate(([1.0], np.full(self.p + 1, step)))
+
+
+Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
+"""Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
+``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
+
+N_FRICTION, N_LASTING, _N_PERIODIC = 6, 8, 2
+"""Disturbances by friction, with stiffness and damping, and what repeats with the position."""
+
+LEAST_VELOCITY = 1e-200
+"""Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
+
+_OWN_MAX = 1e100
+"""Magnitude that a disturbance of the user's own must not exceed."""
+
+_DIFFERENCES = 3
+"""Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticState:
+    """State of the features between two windows; positions relative to the start.
+
+    Attributes
+    ----------
+    filters : (n_state, n_disturbances) array
+        State of ``G_pb`` for each disturbance.
+    filtered : (n_disturbances,) array
+        Last filtered disturbances.
+    x_d : float, m
+        Last command.
+    x_pb : (4,) array, m
+        Last physics-based predictions, oldest first.
+    """
+
+    filters: Array
+    filtered: Array
+    x_d: float
+    x_pb: Array
+
+
+@dataclass(frozen=True)
+class StaticFeatures:
+    """Features without lags, over consecutive windows.
+
+    Attributes
+    ----------
+    discrete : DiscreteModel
+        ``G_pb``.
+    q : int
+        Largest lag of ``x_pb``, as that many differences, at most three.
+    period : float, m
+        Of a disturbance that repeats with the position; 0: none.
+    own : tuple of Disturbance
+        The user's own.
+    damping_of_motion : bool
+        Whether the position's own velocity is damped; else the velocity of ``x_pb``. Behind a compensator ``x_pb``
+        turns with every change of the command, and is far from the motion.
+    """
+
+    discrete: DiscreteModel
+    q: int
+    period: float = 0.0
+    own: tuple[Disturbance, ...] = ()
+    damping_of_motion: bool = False
+
+    @property
+    def n_differences(self) -> int:
+        """Differences of ``x_pb`` among the features."""
+        return min(self.q, _DIFFERENCES)
+
+    @property
+    def n_disturbances(self) -> int:
+        """Number of disturbances."""
+        return N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
+
+    @property
+    def n(self) -> int:
+        """Number of features."""
+        return 2 + self.n_differences + 2 * self.n_disturbances
+
+    @property
+    def shares(self) -> Array:
+        """Effects that features may have, ``(n,)``, relative to the largest."""
+        shares = np.ones(self.n)
+        shares[-self.n_disturbances :] = CONSTANTS.difference_share
+        return shares
+
+    def rest(self) -> StaticState:
+        """Return the state at rest."""
+        n = self.n_disturbances
+        return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1))
+
+    def peak_velocity(self, state: StaticState, x_d: Array) -> float:
+        """Return the largest magnitude of the commanded velocity over a window, m/s."""
+        return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
+
+    def spread(self, velocity_scale: float) -> Array:
+        """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
+        spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
+        return np.asarray((velocity_scale or 1.0) * spread)
+
+    def velocity(self, state: StaticState, x_d: Array) -> Array:
+        """Return the commanded velocity over a window, ``(n,)``, m/s."""
+        return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
+
+    def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
+        """Return the velocity of the damping over a window, ``(n,)``, m/s."""
+        v = np.diff(x_pb, prepend=state.x_pb[-1])
+        if self.damping_of_motion:
+            e = x - x_pb
+            v = v + np.diff(e, prepend=e[:1])
+        return np.asarray(v / self.discrete.T_s)
+
+    def angle(self, x: Array | float) -> Array:
+        """Return the angle within the period at a position, rad."""
+        return np.asarray(2.0 * np.pi / self.period * x)
+
+    def own_at(self, x: Array, v: Array) -> Array:
+        """Return the disturbances of the user's own at positions, m, and velocities, m/s, ``(n, n_own)``."""
+        found = np.empty((len(x), len(self.own)))
+        for i, disturbance in enumerate(self.own):
+            name = f"disturbances[{i}]"
+            try:
+                values = np.asarray(disturbance(x.copy(), v.copy()), dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise SignalError(f"{name} must return numbers for arrays x, m, and v, m/s: {error}") from error
+            if values.shape not in ((), x.shape):
+                raise SignalError(f"{name} must return a number for each of {len(x)} samples, got shape {values.shape}")
+            if not np.all(np.abs(values) <= _OWN_MAX):  # NaN too
+                raise SignalError(f"{name} must be finite and at most {_OWN_MAX:g} in magnitude")
+            found[:, i] = values
+        return found
+
+    def rows(
+        self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float
+    ) -> tuple[Array, StaticState]:
+        """Return the features of a window, ``(n, self.n)``, and the state after it.
+
+        Columns: 1; ``x_pb`` and its differences; the filtered disturbances; their first differences.
+
+        Parameters
+        ----------
+        state : StaticState
+        window : ResidualWindow
+        x : (n,) array, m
+            Position that the stiffness acts at, and whose velocity is damped with ``damping_of_motion``.
+        velocity_scale : float
+            Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
+
+        Raises
+        ------
+        SignalError
+            If a disturbance of the user's own does not return a finite number for each sample.
+        """
+        x_d, x_pb, start = window
+        first, v_d, v = 2 + self.n_differences, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
+        past = np.concatenate((state.x_pb, x_pb))
+        disturbances = np.empty((len(x_d), self.n_disturbances))
+        disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
+        disturbances[:, N_FRICTION] = x * np.abs(x)
+        disturbances[:, N_FRICTION + 1] = v * np.abs(v)
+        if self.period > 0.0:
+            angle, at_start = self.angle(start + x), self.angle(start + 0.0)
+            disturbances[:, N_LASTING] = np.sin(angle) - np.sin(at_start)
+            disturbances[:, N_LASTING + 1] = np.cos(angle) - np.cos(at_start)
+        if self.own:
+            at_rest = self.own_at(np.full(1, start), np.zeros(1))
+            disturbances[:, -len(self.own) :] = self.own_at(start + x, v_d) - at_rest
+        filtered, filters = self.discrete.forced_response(state.filters, disturbances)
+        rows = np.empty((len(x_d), self.n))
+        rows[:, 0] = 1.0
+        for i in range(self.n_differences + 1):
+            rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
+        rows[:, first : first + self.n_disturbances] = filtered
+        rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
+        return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())

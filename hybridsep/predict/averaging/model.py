@@ -1,0 +1,619 @@
+"""Online model averaging of the residual: its state, its forecast of a window, and its learning from the measurement.
+
+``e_pb = x − x_pb`` of a window is predicted by physics (0), hold (the last residual), by static features with lags and
+without, and by eq. (4) with ``G_pb = 1``, on the residual of the command itself, which saves a user whose physics model
+is poor. Their sum is weighted by their errors so far (:mod:`~hybridsep.predict.averaging.stacking`). Where the paper's
+regression has one bare penalty λ on every weight, here each weight has a prior from the effect that its feature may
+have, and λ is the least variance of the noise. Nothing has a scale of its own: results for positions in another unit
+are the same in that unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.records import FIXED, within
+from ...base.settings import PredictorSettings
+from ...base.signals import Array
+from ...model.discrete import DiscreteModel
+from ..regression import RidgeRegression, lags
+from ..window import FeatureScales, Forecast, ResidualWindow
+from .constants import CONSTANTS
+from .experts import ExpertErrors, ExpertPrediction, ResidualScale, SolvedExpert, solve
+from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
+from .gate import Reach, reached
+from .stacking import COMMAND, DOUBTING, HOLD, LAGGED, N_EXPERTS, N_JUDGED, STATIC, Stack
+from .warm_start import Evidence
+
+__all__ = [
+    "OF_COMMAND",
+    "OF_PHYSICS",
+    "Learned",
+    "Parameters",
+    "RunState",
+    "TrustedForecast",
+    "TrustedModel",
+    "begin_in_motion",
+    "forecast",
+    "forecast_by",
+    "init",
+    "learn",
+    "plan_ahead",
+    "restart",
+    "scales_of",
+    "solved",
+    "take_over",
+]
+
+OF_PHYSICS, OF_COMMAND, N_RESIDUALS = range(3)
+"""Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
+
+_AHEAD = 20
+"""Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
+penalties come from: a controller factors most of that solution in them."""
+
+_ROUNDING = 1e-6
+"""What rounding may have added to the sum of the stack's weights."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What does not change.
+
+    Attributes
+    ----------
+    settings : PredictorSettings
+        ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
+    static : StaticFeatures
+    command : CommandFeatures
+    """
+
+    settings: PredictorSettings
+    static: StaticFeatures
+    command: CommandFeatures
+
+
+@dataclass(frozen=True, eq=False)
+class RunState:
+    """What a run has been before the next window; positions relative to the start.
+
+    Attributes
+    ----------
+    static : StaticState
+    commands : (d + p_A + 1,) array, m
+        Last commands, oldest first, for the ``p_A`` lags of the command's expert.
+    past : pair of (p,) and (p_A,) array, m
+        Last residuals of the physics model, and of the command; newest first.
+    bridged : (max(p, p_A),) array of bool
+        Whether the last ones stand for samples without a measurement, oldest first.
+    reach : Reach
+    n_rejected : int
+        Measurements that were missing or not plausible.
+    """
+
+    static: StaticState
+    commands: Array
+    past: tuple[Array, Array]
+    bridged: NDArray[np.bool_]
+    reach: Reach
+    n_rejected: int
+
+    @classmethod
+    def init(cls, fixed: Parameters) -> RunState:
+        """Return the beginning of a run, at rest."""
+        p, command = fixed.settings.p, fixed.command
+        past, bridged = (np.zeros(p), np.zeros(command.p)), np.zeros(max(p, command.p), dtype=np.bool_)
+        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, Reach(), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What has been learned besides the rows: the numbers of a weights file, in this order, in the C core, too.
+
+    Attributes
+    ----------
+    velocity_scale : float, m/s
+        Of the friction features; 0 before any motion.
+    largest_step, fastest : float, m
+        Largest change from sample to sample, of the command and of the physics model.
+    scales : pair of ResidualScale
+        Sizes of the residuals, of the physics model and of the command.
+    errors : tuple of ExpertErrors
+        Of the experts from LAGGED on.
+    stack : Stack
+    largest : (n_static,) array
+        Largest magnitudes of the static features.
+    """
+
+    velocity_scale: float = field(metadata=within())
+    largest_step: float = field(metadata=within())
+    fastest: float = field(metadata=within())
+    scales: tuple[ResidualScale, ResidualScale] = field(metadata=within())
+    errors: tuple[ExpertErrors, ...] = field(metadata=within())
+    stack: Stack
+    largest: Array = field(metadata=within())
+
+    @classmethod
+    def init(cls, fixed: Parameters) -> Learned:
+        """Return that nothing has been learned."""
+        scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * N_JUDGED
+        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(fixed.static.n))
+
+    def errors_of(self, expert: int) -> ExpertErrors:
+        """Return what is known of the errors of an expert."""
+        return self.errors[expert - LAGGED]
+
+    def with_errors(self, changed: dict[int, ExpertErrors]) -> Learned:
+        """Return the same with other errors of some experts."""
+        errors = tuple(changed.get(LAGGED + i, one) for i, one in enumerate(self.errors))
+        return replace(self, errors=errors)
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the numbers, which are in range, fit each other."""
+        scale = self.velocity_scale
+        return (scale == 0.0 or scale >= LEAST_VELOCITY) and float(self.stack.weights.sum()) <= 1.0 + _ROUNDING
+
+
+@dataclass(frozen=True, eq=False)
+class TrustedModel:
+    """State of the model: what it has learned, and its run. It stays the physics model where it does not know better.
+
+    Attributes
+    ----------
+    fixed : Parameters
+    learned : Learned
+    evidence : pair of Evidence
+        Rows of the residuals of the physics model, and of the command.
+    noise : tuple of float, m²
+        Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
+    command_square : float, m²
+        Largest mean square of the command's residual, before the last sample of the last window; 0: none yet.
+    leading : int
+        Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
+    run : RunState
+    """
+
+    may_miss: ClassVar[bool] = True
+
+    fixed: Parameters = field(metadata=FIXED)
+    learned: Learned
+    evidence: tuple[Evidence, Evidence]
+    noise: tuple[float, ...] = field(metadata=within())
+    command_square: float = field(metadata=within())
+    leading: int
+    run: RunState
+
+    def kind_of(self, expert: int) -> int:
+        """Return OF_COMMAND if an expert predicts the residual of the command, else OF_PHYSICS."""
+        return OF_COMMAND if expert == COMMAND or (expert == DOUBTING and self.leading == COMMAND) else OF_PHYSICS
+
+    def noise_of(self, expert: int) -> float:
+        """Return the variance of the noise that an expert's penalties come from, m²; 0: none yet."""
+        return self.noise[expert - LAGGED]
+
+    @property
+    def early(self) -> int:
+        """Samples of a window after which the variances for the next one are taken."""
+        Np = self.fixed.settings.Np
+        return Np - min(Np // 2, _AHEAD)
+
+    def with_noise(self, learned: Learned) -> TrustedModel:
+        """Return the model with the variances of the noise that follow from what is learned so far."""
+        settings = self.fixed.settings
+
+        def noise(expert: int) -> float:
+            kind = self.kind_of(expert)
+            square = learned.scales[kind].largest_square
+            first = settings.noise_std**2 or CONSTANTS.first_noise * square
+            least = min(settings.lam, CONSTANTS.least_noise * square)
+            kept = CONSTANTS.less if expert == DOUBTING else 1.0
+            return learned.errors_of(expert).variance(self.evidence[kind].target_square(kept), first, least)
+
+        return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
+
+    @property
+    def doubts(self) -> bool:
+        """Whether what earlier runs have trained is doubted."""
+        return self.evidence[OF_PHYSICS].earlier.n_rows > 0.0
+
+    @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible."""
+        return self.run.n_rejected
+
+    @property
+    def last(self) -> float:
+        """Last residual that was accepted or bridged, m."""
+        return float(self.run.past[OF_PHYSICS][0])
+
+    @property
+    def regressions(self) -> tuple[RidgeRegression, ...]:
+        """Of all learned samples: of the physics model's residual, and of the command's."""
+        return tuple(one.all() for one in self.evidence)
+
+    @property
+    def lag_weights(self) -> Array:
+        """Weights of the lags from all learned samples, ``(p,)``."""
+        return self.regressions[OF_PHYSICS].weights[self.fixed.static.n :]
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the numbers, which are in range, fit each other."""
+        factors = all(part.is_sound for one in self.evidence for part in (one.this, one.earlier))
+        return factors and self.learned.is_sound and self.leading in (LAGGED, COMMAND)
+
+
+def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()) -> TrustedModel:
+    """Return the model at rest, with nothing learned.
+
+    Parameters
+    ----------
+    settings : PredictorSettings
+    discrete : DiscreteModel
+        ``G_pb``.
+    own : tuple of Disturbance
+        Of the user's own.
+    """
+    static = StaticFeatures(discrete, settings.q, settings.period, own)
+    fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
+    evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
+    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, 0.0, LAGGED, RunState.init(fixed))
+
+
+def restart(state: TrustedModel) -> TrustedModel:
+    """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
+    fixed, learned = state.fixed, state.learned
+    most = CONSTANTS.carried * fixed.settings.Np
+    of_physics, of_command = (one.begin_run(most) for one in state.evidence)
+    leading, stack, errors = learned.stack.leader, learned.stack.forget(DOUBTING), ExpertErrors()
+    if of_physics.earlier.n_rows > 0.0:
+        stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
+    learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
+    evidence = of_physics, of_command
+    begun = TrustedModel(fixed, learned, evidence, state.noise, 0.0, leading, RunState.init(fixed))
+    return begun.with_noise(learned)
+
+
+def plan_ahead(state: TrustedModel) -> TrustedModel:
+    """Return the model where a compensator decides the commands."""
+    return replace(state, fixed=replace(state.fixed, static=replace(state.fixed.static, damping_of_motion=True)))
+
+
+def take_over(state: TrustedModel, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> TrustedModel:
+    """Return the model with what another one has learned."""
+    both = zip(state.evidence, regressions, strict=True)
+    of_physics, of_command = (replace(one.forget(), this=rows) for one, rows in both)
+    return replace(state, learned=learned, evidence=(of_physics, of_command))
+
+
+_LEAST = 1e-150
+"""Magnitude of a feature that counts as 0."""
+
+
+@dataclass(frozen=True)
+class TrustedForecast(Forecast):
+    """Window predicted by the trusted model.
+
+    Attributes
+    ----------
+    x : (n,) array, m
+        Position that the stiffness acts at.
+    stacked : (N_EXPERTS, n) array, m
+        Predictions that are stacked; 0 where an expert knows nothing.
+    predictions : mapping
+        Of the experts that know something, by their places in the stack.
+    scales : FeatureScales
+    """
+
+    x: Array
+    stacked: Array
+    predictions: Mapping[int, ExpertPrediction]
+    scales: FeatureScales
+
+
+def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
+    """Return the scales of the features, with the next window's.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+    path : (m,) array, m, optional
+        Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
+    """
+    static, learned, settings = state.fixed.static, state.learned, state.fixed.settings
+    T_s = settings.T_s
+    before = learned.velocity_scale
+    peak = static.peak_velocity(state.run.static, window.x_d)
+    outgrown = peak > max(CONSTANTS.outgrown * before, LEAST_VELOCITY)
+    step = max(learned.largest_step, peak * T_s)
+    if path is not None and state.evidence[OF_PHYSICS].n_rows == 0.0:
+        peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
+        outgrown = peak > max(before, LEAST_VELOCITY)
+    velocity = peak if outgrown else before
+    rows, _ = static.rows(state.run.static, window, window.x_pb, velocity)
+    largest = np.zeros(static.n) if outgrown else learned.largest
+    command_step, command_square = step, learned.scales[OF_COMMAND].largest_square
+    if path is None and settings.Np > 1 and state.command_square > 0.0:
+        # A controller solves for the command's expert one sample before the window, as far as its commands are known.
+        known = window.x_d[: settings.measurement_delay + settings.Np - 1]
+        early = max(learned.largest_step, static.peak_velocity(state.run.static, known) * T_s)
+        if early > 0.0 or step == 0.0:
+            command_step, command_square = early, state.command_square
+    largest = np.maximum(largest, np.abs(rows).max(axis=0))
+    return FeatureScales(velocity, largest, step, command_step, command_square)
+
+
+def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
+    """Return an expert with the weights that follow from rows."""
+    settings, kind = state.fixed.settings, state.kind_of(expert)
+    if kind == OF_COMMAND:
+        command, square = state.fixed.command, scales.command_square
+        p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
+    else:
+        square = state.learned.scales[kind].largest_square
+        p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
+    effect = settings.effect or math.sqrt(square)
+    priors = effect * shares / np.maximum(largest, _LEAST)
+    return solve(rows, state.noise_of(expert), priors, p)
+
+
+def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
+    """Return the experts that know something, with their weights."""
+    found: dict[int, SolvedExpert] = {}
+    for kind, experts in ((OF_PHYSICS, (LAGGED, STATIC)), (OF_COMMAND, (COMMAND,))):
+        evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
+        if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
+            continue
+        if kind == OF_COMMAND or not outgrown:
+            rows = evidence.all()
+            found |= {expert: _solved(state, expert, rows, scales) for expert in experts if state.noise_of(expert)}
+            if state.doubts and state.leading == experts[0] and state.noise_of(DOUBTING):
+                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
+    return found
+
+
+def _growth(state: TrustedModel, scales: FeatureScales) -> float:
+    """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
+
+    What follows the command alone is linear in it: it may be larger than anything so far by as much.
+    """
+    before = state.learned.largest_step
+    if not (before > 0.0 and state.learned.stack.leader == COMMAND):
+        return 1.0
+    return min(scales.step / before, CONSTANTS.growth)
+
+
+def forecast_by(
+    state: TrustedModel,
+    experts: Mapping[int, SolvedExpert],
+    window: ResidualWindow,
+    scales: FeatureScales,
+    held: Mapping[int, ExpertPrediction] | None = None,
+    counts: NDArray[np.intp] | None = None,
+) -> TrustedForecast:
+    """Predict as :func:`forecast` by the experts of :func:`solved`.
+
+    Parameters
+    ----------
+    state, experts, window, scales
+    held : mapping, optional
+        Predictions whose shrinking is held.
+    counts : (n,) array, optional
+        As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
+    """
+    x_d, x_pb, _ = window
+    learned, command, run = state.learned, state.fixed.command, state.run
+    bound, growth = CONSTANTS.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
+
+    def predicted(expert: int, features: Array, counts: NDArray[np.intp] | None) -> ExpertPrediction:
+        kind = state.kind_of(expert)
+        scale = learned.scales[OF_COMMAND].grown(growth) if kind == OF_COMMAND else learned.scales[OF_PHYSICS]
+        most = CONSTANTS.bound_of_command * scale.largest if kind == OF_COMMAND else bound
+        shrunk = None if held is None else held.get(expert)
+        return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk, counts)
+
+    x, rows = x_pb, np.empty((len(x_d), 0))
+    if STATIC in experts:
+        # The stiffness acts at the position, which the physics model alone does not give well enough.
+        rows, _ = state.fixed.static.rows(run.static, window, x_pb, scales.velocity)
+        x = x_pb + predicted(STATIC, rows, None).e_h
+        rows, _ = state.fixed.static.rows(run.static, window, x, scales.velocity)
+    found: dict[int, ExpertPrediction] = {}
+    stacked = np.zeros((N_EXPERTS, len(x_d)))
+    stacked[HOLD] = min(max(state.last, -bound), bound)
+    for expert in experts:
+        if state.kind_of(expert) == OF_COMMAND:
+            found[expert] = predicted(expert, command.rows(run.commands, x_d), counts)
+            follows = command.late(run.commands, x_d) - x_pb
+            stacked[expert] = np.clip(found[expert].e_h + follows, -growth * bound, growth * bound)
+        else:
+            found[expert] = predicted(expert, rows, counts)
+            stacked[expert] = found[expert].e_h
+    weights = learned.stack.weights
+    e_h = weights @ stacked
+    second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
+    for expert, prediction in found.items():
+        second[expert] += prediction.variance
+    variance = np.maximum(weights @ second - e_h**2, 0.0)
+    return TrustedForecast(window, e_h, variance, x, stacked, found, scales)
+
+
+def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
+    """Predict the residual over the next window.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+    scales : FeatureScales, optional
+        By :func:`scales_of` from its commands if left out; a compensator takes its preview's.
+    """
+    scales = scales_of(state, window) if scales is None else scales
+    return forecast_by(state, solved(state, scales), window, scales)
+
+
+_BRIDGED = 3
+"""Lags of a row that may stand for samples without a measurement."""
+
+
+def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel:
+    """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    window : ResidualWindow
+        The first one, with the motion before it.
+    """
+    (x_d, x_pb, _), command, static = window, state.fixed.command, state.run.static
+    commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
+    positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
+    late = commands[-1 - command.dead_time :: -1][: command.p]
+    past = state.run.past[OF_PHYSICS], positions[: -command.p - 1 : -1] - late
+    static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
+    return replace(state, run=replace(state.run, static=static, commands=commands, past=past))
+
+
+def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
+    """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
+    learned, (velocity, largest, step, _, _) = state.learned, forecast.scales
+    of_physics, of_command = state.evidence
+    stack = learned.stack
+    if velocity != learned.velocity_scale:
+        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
+    learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
+    return replace(state, learned=learned, evidence=(of_physics, of_command))
+
+
+def _folded(
+    state: TrustedModel,
+    forecast: TrustedForecast,
+    rows: tuple[Array, Array],
+    e: tuple[Array, Array],
+    bridged: NDArray[np.bool_],
+) -> TrustedModel:
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
+
+    Variances of the noise for the next window are taken before the last rows, the size of the command's residual
+    before the last one.
+    """
+    settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
+    accepted = ~bridged[-n:]
+    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+
+    def taken(kind: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        past = state.run.past[kind]
+        p = len(past)
+        # Measured samples, as were all but a few of their lags
+        n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
+        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
+        return rows[kind], lagged, e[kind], accepted & (n_bridged <= _BRIDGED)
+
+    of_kind = taken(OF_PHYSICS), taken(OF_COMMAND)
+
+    def learned(evidence: Iterable[Evidence], part: slice) -> tuple[Evidence, Evidence]:
+        of_physics, of_command = (
+            one.learn(features[part][counts[part]], lagged[part][counts[part]], target[part][counts[part]])
+            for one, (features, lagged, target, counts) in zip(evidence, of_kind, strict=True)
+        )
+        return of_physics, of_command
+
+    state = replace(state, evidence=learned((one.discount(kept) for one in state.evidence), slice(early)))
+    state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
+    of_command, last = state.learned.scales[OF_COMMAND], settings.Np - 1
+    if accepted[:last].any():
+        of_command = of_command.follow(e[OF_COMMAND][:last][accepted[:last]])
+    evidence = learned(state.evidence, slice(early, n))
+    return replace(state, evidence=evidence, command_square=of_command.largest_square)
+
+
+def _judged_experts(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> Learned:
+    """Judge the experts, and the sizes of the residuals, by the first samples of their window."""
+    learned, given = state.learned, state.fixed.settings.noise_std**2
+    if not accepted.any():
+        return learned
+    errors = {
+        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, given)
+        for expert, one in forecast.predictions.items()
+    }
+    of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    return replace(learned.with_errors(errors), scales=(of_physics, of_command))
+
+
+def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
+    """Return residuals, interpolated where they are not accepted; ``last`` is before the first."""
+    known = np.flatnonzero(accepted)
+    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
+    return np.asarray(np.interp(np.arange(len(measured)), places, values))
+
+
+def _judged(
+    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> TrustedModel:
+    """Judge the experts and their stack by the measurement of their window."""
+    learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
+    n, late = len(accepted), settings.measurement_delay
+    published = accepted & (np.arange(n) >= late) if late < n else accepted
+    stack = learned.stack
+    if published.any():
+        predicted = forecast.stacked[:, :n][:, published]
+        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
+    learned = replace(learned, stack=stack)
+    if not (state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt):
+        return replace(state, learned=learned)
+    # All experts go on with this run alone, and are judged anew.
+    anew = {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(DOUBTING)}
+    learned = replace(learned.with_errors(anew), stack=Stack.init())
+    evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
+    return replace(state, learned=learned, evidence=evidence).with_noise(learned)
+
+
+def learn(
+    state: TrustedModel, forecast: TrustedForecast, x: Array, *, fold: bool = True
+) -> tuple[TrustedModel, NDArray[np.bool_]]:
+    """Learn from the measurement of a window.
+
+    Parameters
+    ----------
+    state : TrustedModel
+    forecast : TrustedForecast
+        Of that state.
+    x : (m,) array, m
+        Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
+    fold : bool
+        Whether they are learned; the next window starts from them in any case.
+
+    Returns
+    -------
+    TrustedModel, (m,) array of bool
+        Which samples are accepted.
+    """
+    m, fixed, run = len(x), state.fixed, state.run
+    window = ResidualWindow(forecast.window.x_d[:m], forecast.window.x_pb[:m], forecast.window.start)
+    fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
+    state = _with_scales(state, forecast, max(state.learned.fastest, fastest))
+    learned, measured = state.learned, x - window.x_pb
+    largest, T_s = learned.scales[OF_PHYSICS].largest, fixed.settings.T_s
+    accepted, reach = reached(run.reach, measured, largest, learned.fastest, T_s)
+    e = _bridged(state.last, measured, accepted)
+    e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
+    rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
+    bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
+    if fold:
+        of_command = fixed.command.rows(run.commands, window.x_d)
+        state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
+        state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
+    past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
+    n_rejected = run.n_rejected + m - int(accepted.sum())
+    commands = np.concatenate((run.commands, window.x_d))[m:]
+    return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], reach, n_rejected)), accepted

@@ -1,0 +1,286 @@
+"""Compensation with the trusted model: its slope, what a plan gains, and what it must survive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from compensator_cases import DRIVE_LIMITS, TS, beyond
+from trusted_cases import trusted_model
+
+from hybridsep import load_machine
+from hybridsep.base.errors import StateError
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.compensate import newton
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.newton import PlanModel, runs_away
+from hybridsep.compensate.splines import SplineBasis
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
+from hybridsep.machines.machine import Machine
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.predictor import HybridPredictor
+
+TRUSTED = PredictorSettings(Np=50, p=20)
+STAGE = load_machine("als25010_x")
+
+
+def compensator(
+    machine: Machine = STAGE, compensate: str = "hybrid", predictor: PredictorSettings = TRUSTED, **changes: object
+) -> SepCompensator:
+    settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate, **changes)  # type: ignore[arg-type]
+    return machine.new_compensator(settings, predictor=predictor)
+
+
+def moves() -> Array:
+    """Return one second of 7 mm moves, there and back."""
+    return rest_to_rest([0.0, 0.007, 0.0, 0.007], PAPER_LIMITS, TS, start_times=[0.05, 0.35, 0.65], duration=1.0)
+
+
+def run(sep: SepCompensator, machine: Machine = STAGE, **more: object) -> Run:
+    assert machine.plant is not None
+    return cosimulate(sep, machine.new_plant(), moves(), encoder=Encoder(machine.plant.noise_std, 0), **more)  # type: ignore[arg-type]
+
+
+@cache
+def by_physics() -> Run:
+    return run(compensator(compensate="physics"))
+
+
+@cache
+def cold(period: float = 0.0) -> tuple[Run, bytes]:
+    """Return the run of a compensator that learns the moves, and the compensator after it."""
+    sep = compensator(predictor=replace(TRUSTED, period=period))
+    found = run(sep)
+    sep.restart(0.0)
+    return found, sep.to_bytes()
+
+
+def learned(period: float = 0.0) -> bytes:
+    """Return a compensator that has learned the moves."""
+    return cold(period)[1]
+
+
+def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
+    """Return the model over commands of which the first ones are late."""
+    physics = sep.predictor.state.physics
+    return PlanModel(trusted_model(sep.predictor), physics, x_d[:late], 0.0, x_d[late:], x_d[late:])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.0, 2e-3])
+def test_the_slope_is_that_of_the_prediction(period: float) -> None:
+    sep = SepCompensator.from_bytes(learned(period))
+    x_d = moves()[:200]
+    model, basis = plan_model(sep, x_d), SplineBasis(200, 2)
+    changes = basis.values[:, 10:60:7]
+    passed = basis.filtered(sep.predictor.physics_operator(200)[0])[:, 7:57:7]
+    found = model.slope(model.predict(x_d), changes, passed, 0.0)
+    size = 1e-9
+
+    def x_h(command: Array) -> Array:
+        found = model.predict(command)
+        return np.asarray(found.window.x_pb + found.e_h)
+
+    for column, slope in zip(changes.T, found.T, strict=True):
+        ahead, behind = (x_h(x_d + sign * size * column) for sign in (1.0, -1.0))
+        # Shrinking and the second pass of the stiffness are held in the slope.
+        expected = (ahead - behind) / (2.0 * size)
+        assert np.max(np.abs(slope - expected)) < 0.05 * np.max(np.abs(expected))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [1, 30])
+def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The preview after them is the end of a longer one, whose first commands stay as they are."""
+    monkeypatch.setattr(newton, "_APART", 1)  # the window is another one, and what is behind it
+    sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
+    x_d, basis = moves()[: late + n], SplineBasis(n, 2)
+    whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
+    at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
+    np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])
+    changes = basis.values[:, 10:60:7]
+    passed = basis.filtered(sep.predictor.physics_operator(n)[0])[:, 7:57:7]
+    later = ((late, 0), (0, 0))
+    expected = whole.slope(of_whole, np.pad(changes, later), np.pad(passed, later), 0.01)
+    assert np.abs(expected[late:]).max() > 0.1
+    np.testing.assert_array_equal(expected[:late], 0.0)
+    np.testing.assert_allclose(model.slope(at, changes, passed, 0.01), expected[late:], rtol=0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_samples_behind_the_window_share_a_variance(monkeypatch: pytest.MonkeyPatch) -> None:
+    sep, x_d = SepCompensator.from_bytes(learned(2e-3)), moves()[:200]
+    Np = sep.predictor.settings.Np
+    shared = plan_model(sep, x_d).predict(x_d)
+    monkeypatch.setattr(newton, "_APART", 1)
+    own = plan_model(sep, x_d).predict(x_d)
+    np.testing.assert_array_equal(shared.e_h[: Np + 1], own.e_h[: Np + 1])
+    assert 0.0 < np.std(shared.e_h - own.e_h) < 0.1 * np.std(own.e_h)
+
+
+@pytest.mark.slow
+def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
+    """Sines of the position given by the user act as the period's own: plans with them are the same."""
+    turns = 2.0 * np.pi / 2e-3
+
+    def sine(x: Array, v: Array) -> Array:
+        return np.asarray(np.sin(turns * x))
+
+    def cosine(x: Array, v: Array) -> Array:
+        return np.asarray(np.cos(turns * x))
+
+    predictor = HybridPredictor(STAGE.model, TRUSTED, disturbances=(sine, cosine))
+    own = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS))
+    run(own)
+    own.restart(0.0)
+    known = SepCompensator.from_bytes(learned(2e-3))
+    x_d = moves()[:200]
+    plans = [sep.plan(x_d) for sep in (SepCompensator.from_bytes(own.to_bytes(), (sine, cosine)), known)]
+    assert np.abs(plans[1].x_dm - x_d[:50]).max() > 1e-6
+    np.testing.assert_allclose(plans[0].x_dm, plans[1].x_dm, rtol=0.0, atol=1e-9)
+    with pytest.raises(StateError, match="learned with 2 disturbances of the user's own, got 0"):
+        SepCompensator.from_bytes(own.to_bytes())
+
+
+def test_without_anything_learned_the_physics_model_plans() -> None:
+    x_d, none = np.concatenate((np.zeros(20), moves()[50:230])), compensator()
+    plans = [sep.plan(x_d) for sep in (none, compensator(compensate="physics"))]
+    assert plans[0].state is SepState.PHYSICS
+    np.testing.assert_array_equal(plans[0].x_dm, plans[1].x_dm)
+    assert compensator(compensate="off").plan(x_d).state is SepState.OFF
+
+
+@pytest.mark.slow
+def test_plans_follow_friction_that_follows_the_command() -> None:
+    physics, (first, sep) = by_physics(), cold()
+    warm = run(SepCompensator.from_bytes(sep), t_init=0.0)
+    assert warm.state.max() == SepState.HYBRID
+    assert first.tracking_rms < 0.6 * physics.tracking_rms
+    assert warm.tracking_rms < 0.2 * physics.tracking_rms
+    for found in (first, warm):
+        assert beyond(found.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6
+
+
+@pytest.mark.slow
+def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    x_d = moves()[:200]
+    expected = SepCompensator.from_bytes(learned())
+    expected.change(compensate="physics")
+    sep = SepCompensator.from_bytes(learned())
+    assert sep.plan(x_d).state is SepState.HYBRID
+    worse = np.full(3 + sep._basis.n_free, 1e-3)
+    for cost in (math.inf, math.nan):
+        monkeypatch.setattr("hybridsep.compensate.newton.TrustedPlanner.plan", lambda *_, cost=cost: (worse, cost))
+        plan = sep.plan(x_d)
+        assert plan.state is SepState.PHYSICS
+        np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)
+
+
+def no_faster(velocity: float) -> Callable[[int, float], float]:
+    """Return the sensor of a drive whose motor does not go beyond a velocity, m/s."""
+    last = 0.0
+
+    def sensed(k: int, x_meas: float) -> float:
+        nonlocal last
+        last += min(max(x_meas - last, -velocity * TS), velocity * TS)
+        return last
+
+    return sensed
+
+
+@pytest.mark.slow
+def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
+    sep = compensator(change_max=2e-4)
+    run(sep)
+    away = run(sep, sensor=no_faster(0.06), t_init=0.0)
+    first = int(np.argmax(away.state == SepState.PHYSICS))
+    assert 50 < first < 250
+    assert (away.state[:first] == SepState.HYBRID).all()
+    assert (away.state[first:] == SepState.PHYSICS).all()
+    restored = SepCompensator.from_bytes(sep.to_bytes())
+    for one in (sep, restored):
+        assert one.plan(np.full(200, 0.007)).state is SepState.PHYSICS
+    assert run(sep, t_init=0.0).state.max() == SepState.HYBRID  # another run
+
+
+@pytest.mark.slow
+def test_without_a_largest_change_no_plan_runs_away() -> None:
+    sep = compensator(change_max=None)
+    run(sep)
+    state = run(sep, sensor=no_faster(0.02), t_init=0.0).state
+    first = int(np.argmax(state == SepState.PHYSICS))  # its plan is better there
+    assert (state[first:] == SepState.HYBRID).any()
+
+
+@pytest.mark.parametrize(
+    ("at_bound", "of_physics", "error", "expected"),
+    [
+        (30, 0, 4e-5, True),
+        (20, 0, 4e-5, False),  # a fifth of the window
+        (60, 45, 4e-5, False),  # as long as the physics model's
+        (30, 0, 2e-5, False),  # it pays
+        (100, 0, math.nan, False),
+    ],
+)
+def test_a_plan_runs_away_at_its_bound(at_bound: int, of_physics: int, error: float, expected: bool) -> None:
+    delta, other = np.zeros(100), np.zeros(100)
+    delta[:at_bound], other[:of_physics] = -1e-4, 0.98e-4
+    assert runs_away(delta, other, error, 1e-4) is expected
+
+
+@pytest.mark.slow
+def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
+    def wrong(k: int, x_meas: float) -> float:
+        return x_meas + (1e-3 if k == 430 else 0.0)
+
+    sound, other = cold()[0], run(compensator(), sensor=wrong)
+    assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
+
+
+@pytest.mark.slow
+def test_missing_measurements_are_bridged() -> None:
+    def missing(k: int, x_meas: float) -> float:
+        return math.nan if 400 <= k < 460 or k % 97 == 0 else x_meas
+
+    physics, found = by_physics(), run(compensator(), sensor=missing)
+    assert np.isfinite(found.x_dm).all()
+    assert found.tracking_rms < 0.8 * physics.tracking_rms
+
+
+@pytest.mark.slow
+def test_a_restored_compensator_goes_on() -> None:
+    sep, x_d = SepCompensator.from_bytes(learned()), moves()
+    plan = sep.plan(x_d[:200])
+    restored = SepCompensator.from_bytes(sep.to_bytes())
+    for one in (sep, restored):
+        one.update(plan.x_h)
+    again = [one.plan(x_d[50:250]) for one in (sep, restored)]
+    assert again[0].state is SepState.HYBRID
+    assert np.abs(again[0].x_dm - again[0].x_d).max() > 1e-6
+    np.testing.assert_array_equal(again[0].x_dm, again[1].x_dm)
+
+
+@pytest.mark.slow
+def test_positions_in_another_unit_are_commanded_the_same() -> None:
+    def commands(unit: float) -> Array:
+        limits = Limits(*(unit * limit for limit in (0.1, 16.0, 5000.0)))
+        settings = CompensatorSettings(limits=limits, change_max=1e-3 * unit)
+        sep = SepCompensator(
+            HybridPredictor(STAGE.model, PredictorSettings(Np=50, p=20, lam=1e-12 * unit**2)), settings
+        )
+        x_d, found = np.concatenate((moves(), np.full(200, moves()[-1]))), []
+        for k in range(0, 1000, 50):
+            plan = sep.plan(unit * x_d[k : k + 200])
+            friction = 1e-5 * np.tanh(np.gradient(x_d[k : k + 50]) / 2e-6)
+            sep.update(plan.x_pb - unit * friction)
+            found.append(plan.x_dm / unit)
+        return np.concatenate(found)
+
+    np.testing.assert_allclose(commands(1e3), commands(1.0), rtol=0, atol=1e-8)

@@ -1,0 +1,180 @@
+"""Which measurements are believed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from trusted_cases import trusted_model
+
+from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.model.physics import ModalModel
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.gate import Reach, reached
+from hybridsep.predict.averaging.model import OF_COMMAND, OF_PHYSICS
+from hybridsep.predict.predictor import HybridPredictor
+
+Array = NDArray[np.float64]
+
+NP, T_S = 100, 1e-3
+
+
+def motion(n: int = 3000) -> tuple[Array, Array]:
+    """Return predicted and measured positions, m, of a drive that goes to and fro, with 1 µm of noise."""
+    t = 1e-3 * np.arange(n)
+    x_pb = 0.01 * (1.0 - np.cos(2.0 * np.pi * t))
+    lag = 5e-5 * np.sin(2.0 * np.pi * t) + 2e-5 * np.tanh(np.sin(2.0 * np.pi * t) / 0.01)
+    return x_pb, x_pb + lag + np.random.default_rng(1).normal(0.0, 1e-6, n)
+
+
+def believed(x: Array, x_pb: Array, *, scale: float = 1.0, Np: int = NP) -> NDArray[np.bool_]:
+    reach, before, fastest, largest, found = Reach(), 0.0, 0.0, 0.0, []
+    for i in range(0, len(x), Np):
+        window = slice(i, i + Np)
+        at, predicted = scale * x[window], scale * x_pb[window]
+        fastest = max(fastest, float(np.abs(np.diff(predicted, prepend=before)).max()))
+        one, reach = reached(reach, at - predicted, largest, fastest, T_S)
+        before, largest = predicted[-1], max(largest, float(np.abs(at - predicted)[one].max(initial=0.0)))
+        found.append(one)
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("resolution", [0.0, 1e-6, 1e-5, 1e-3])
+def test_sound_measurements_are_believed(resolution: float) -> None:
+    x_pb, x = motion()
+    assert believed(resolution * np.rint(x / resolution) if resolution else x, x_pb).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("step", [1e-12, 1e-8, 1e-7])
+def test_a_creep_far_below_the_noise_is_believed_soon(step: float, seed: int) -> None:
+    x_pb = step * np.arange(3000.0)
+    found = believed(x_pb + np.random.default_rng(seed).normal(0.0, 1e-6, 3000), x_pb)
+    assert (~found).sum() < 100
+
+
+def test_noise_is_believed_before_the_first_motion() -> None:
+    x = np.random.default_rng(2).normal(0.0, 1e-6, 10 * NP)
+    assert believed(x, np.zeros(10 * NP)).all()
+
+
+def test_a_poor_model_is_no_fault_of_the_sensor() -> None:
+    x_pb, _ = motion()
+    assert believed(np.concatenate((np.zeros(120), x_pb[:-120])), x_pb).all()  # which lags by more than a window
+    assert believed(-x_pb, x_pb).all()
+    assert believed(x_pb + 1e-3 * np.sin(0.5 * np.arange(3000)) * (np.arange(3000) > 700), x_pb).all()  # it rings
+
+
+@pytest.mark.parametrize("Np", [1, 7])
+def test_judgement_does_not_depend_on_the_windows(Np: int) -> None:
+    x_pb, x = motion()
+    x[1230:1290] = 0.0
+    assert believed(x, x_pb, Np=Np)[700:].tolist() == believed(x, x_pb)[700:].tolist()  # the fastest step is known then
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_judgement_does_not_depend_on_units(scale: float) -> None:
+    x_pb, x = motion()
+    x[1234] += 1e-3
+    assert believed(x, x_pb, scale=scale).tolist() == believed(x, x_pb).tolist()
+
+
+@pytest.mark.parametrize("height", [1e-3, -1.0, 1e2])
+def test_a_value_out_of_reach_is_missing_alone(height: float) -> None:
+    x_pb, x = motion()
+    places = [350, 1234, 1799, 1800, 2500]  # in motion, at the edges of a window, near a turn
+    x[places] += height
+    assert set(np.flatnonzero(~believed(x, x_pb)).tolist()) == {*places, 1801}  # as many follow as there were
+
+
+def test_a_wrong_reading_is_missing_though_the_axis_passes_by() -> None:
+    x_pb, x = motion()
+    x[600:1050] = x[750]
+    found = believed(x, x_pb)
+    assert not found[600:1050].any()
+    assert found[1500:].all()
+
+
+def test_another_level_is_believed_after_a_second() -> None:
+    x_pb, x = motion(4000)
+    x[1000:] += 1e-2
+    found = believed(x, x_pb)
+    assert found[:1000].all()
+    assert not found[1000:2000].any()
+    assert found[2000:].all()
+
+
+def test_what_is_missing_for_a_second_says_nothing_of_what_comes_then() -> None:
+    x_pb, x = motion(4000)
+    x[500:1500] = np.nan
+    x[1500:] += 1.0
+    assert believed(x, x_pb)[1500:].all()
+
+
+def test_an_axis_that_stands_is_believed() -> None:
+    x_pb, x = motion()
+    x[1230:1730] = x[1229]
+    assert believed(x, x_pb).all()
+
+
+def ringing(frequency: float) -> Array:
+    """Return measured positions, m: from rest a drive rings, of which the model knows nothing."""
+    n = 20 * NP
+    x = 1e-4 * np.sin(2.0 * np.pi * frequency * 1e-3 * np.arange(n)) * (np.arange(n) >= 5 * NP)
+    return np.asarray(x + np.random.default_rng(2).normal(0.0, 2e-7, n))
+
+
+def test_what_rings_is_learned() -> None:
+    x = ringing(20.0)
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0))
+    errors = []
+    for i in range(0, len(x), NP):
+        errors.append(x[i : i + NP] - predictor.predict(np.zeros(NP)).x_h)
+        predictor.update(x[i : i + NP])
+    assert rms(np.concatenate(errors[10:])) < 0.1 * rms(x[10 * NP :])
+
+
+def test_missing_samples_are_counted_and_bridged() -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    x_d = staircase()[:2000]
+    predictor = HybridPredictor(model, PredictorSettings(trust=True))
+    x_pb, _ = predictor.discrete.forced_response(predictor.discrete.rest(), x_d)
+    e_pb = 0.5 * np.diff(x_pb, prepend=0.0)  # a residual that a feature describes exactly
+    gaps = np.random.default_rng(3).random(2000) < 0.01
+    errors = []
+    for i in range(0, 2000, NP):
+        window = slice(i, i + NP)
+        errors.append(e_pb[window] - predictor.predict(x_d[window]).e_h)
+        predictor.update(np.where(gaps[window], np.nan, (x_pb + e_pb)[window]))
+    assert trusted_model(predictor).n_rejected == gaps.sum()
+    assert rms(np.concatenate(errors[10:])) < 0.05 * rms(e_pb[1000:])
+
+
+def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags() -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    predictor = HybridPredictor(model, PredictorSettings(trust=True, p=10))
+    x = staircase()[: 2 * NP]
+    for i in range(0, 2 * NP, NP):
+        predictor.predict(x[i : i + NP])
+        predictor.update(np.where(np.arange(NP) // 8 == 11, np.nan, x[i : i + NP]))  # 8 missing, 4 more before the end
+    learned = trusted_model(predictor)
+    # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
+    assert learned.evidence[OF_PHYSICS].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
+    assert learned.evidence[OF_COMMAND].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
+
+
+def test_without_trust_a_missing_sample_is_an_error() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False))
+    predictor.predict(np.zeros(NP))
+    with pytest.raises(SignalError, match="must be finite, got nan at sample 3"):
+        predictor.update(np.where(np.arange(NP) == 3, np.nan, 0.0))
+
+
+def test_infinite_measurements_stay_errors_with_trust() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=True))
+    predictor.predict(np.zeros(NP))
+    with pytest.raises(SignalError, match="must be finite, got inf at sample 3"):
+        predictor.update(np.where(np.arange(NP) == 3, np.inf, 0.0))
