@@ -38,7 +38,7 @@ from benchmarks.step_time.host import (
 )
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.evaluate.canvas import save_figure
+from hybridsep.evaluate.figures import save_figure
 from hybridsep.model.physics import ModalModel
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor

@@ -69,7 +69,7 @@ def backtest(
     from .tables import console, print_scores, print_without_first, print_written
 
     if figure is not None:
-        from ..evaluate.time_plots import prediction_figure
+        from ..evaluate.figures import prediction_figure
 
     axis_machine = load_machine(machine)
     saved = list(save or [])

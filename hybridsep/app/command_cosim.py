@@ -78,7 +78,7 @@ def cosim(
     from .tables import print_run, print_written
 
     if figure is not None:
-        from ..evaluate.time_plots import prediction_figure, tracking_figure
+        from ..evaluate.figures import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
     trajectory = trajectory or default_trajectory(machine)

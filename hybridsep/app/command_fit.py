@@ -13,7 +13,6 @@ from ..base.settings import DRIVE_LIMIT_ENTRIES
 from ..fmi.flavours import FMI_VERSIONS
 from .options import (
     KNOWN_ENTRIES,
-    FigurePagesOption,
     FmiOption,
     ForceOption,
     JsonOption,
@@ -49,7 +48,6 @@ def fit(
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,
     fmi: FmiOption = FMI_VERSIONS[0],
-    figure: FigurePagesOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -64,9 +62,9 @@ def fit(
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
     from .log_intake import different_logs, show
-    from .overwrite import FIT_FILES, PDF, Output, check_outputs
+    from .overwrite import FIT_FILES, Output, check_outputs
     from .progress import progress_bar
-    from .tables import console, print_json, print_written
+    from .tables import console, print_json
 
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(machine)
@@ -75,7 +73,7 @@ def fit(
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     outputs = [Output("--out", path, FIT_FILES) for path in files.values()]
-    check_outputs([*outputs, Output("--figure", figure, PDF)], inputs, force=force)
+    check_outputs(outputs, inputs, force=force)
     found = [
         read_log(
             path,
@@ -95,7 +93,7 @@ def fit(
     with progress_bar(as_json) as advance:
         options = FitOptions(Np, machine, known=known, drive_limits=limits)
         result = fit_logs(used, folder, options, advance, changes=changes(findings), fmi=fmi)
-        fit_report(result, used, findings).write(files["report"], figure)
+        fit_report(result, used, findings).write(files["report"])
     advice = recommendation(judged_by(result, used[0].shown))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in findings.items()}
@@ -105,7 +103,6 @@ def fit(
     _print_fit(result, used, findings)
     console.print(f"\n{advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
-    print_written(figure)
     again = _again(logs, out, Np, name, reading, known, fix=fix)
     console.print("\n".join(next_steps(result, files, again, fmi)), soft_wrap=True, highlight=False)
 

@@ -10,7 +10,6 @@ import typer
 from .options import (
     PREDICTOR_ENTRIES,
     AsIsOption,
-    FigurePagesOption,
     FixOption,
     ForceOption,
     LogArgument,
@@ -30,7 +29,6 @@ def report(
     log: LogArgument,
     machine: MachineOption,
     out: Annotated[Path | None, typer.Option(help="The HTML file; named after the log if left out.")] = None,
-    figure: FigurePagesOption = None,
     fmu: Annotated[Path | None, typer.Option(help="A HybridPredictor whose steps are timed with the log.")] = None,
     fix: FixOption = False,
     as_is: AsIsOption = False,
@@ -60,12 +58,12 @@ def report(
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
     from .log_intake import open_checked, reading_of
-    from .overwrite import PDF, REPORT, Output, check_outputs
+    from .overwrite import REPORT, Output, check_outputs
     from .progress import progress_bar
-    from .tables import console, print_written
+    from .tables import console
 
     page = out or Path(f"{machine_name(log)}_report.html")
-    outputs = (Output("--out", page, {".html": REPORT}), Output("--figure", figure, PDF))
+    outputs = (Output("--out", page, {".html": REPORT}),)
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
     if fmu is not None:
         check_controller(fmu, PREDICTOR)
@@ -98,9 +96,8 @@ def report(
     write_findings(written, {log.name: intake.findings})
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
-    written.write(page, figure)
+    written.write(page)
     for line in (partly_used(whole), recommendation(judged), words):
         if line:
             console.print(line)
     console.print(f"report: {page}", soft_wrap=True)
-    print_written(figure)

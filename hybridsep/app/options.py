@@ -29,7 +29,6 @@ __all__ = [
     "AsIsOption",
     "AxisOption",
     "CommandColumnOption",
-    "FigurePagesOption",
     "FixOption",
     "FlavourOption",
     "FmiOption",
@@ -127,9 +126,6 @@ AsIsOption = Annotated[bool, typer.Option("--as-is", help="Replay the log with t
 SavedOption = Annotated[
     Path | None,
     typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
-]
-FigurePagesOption = Annotated[
-    Path | None, typer.Option(help="PDF with the report's charts for print, a page each, one column wide.")
 ]
 
 TrajectoryOption = Annotated[

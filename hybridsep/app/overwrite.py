@@ -31,7 +31,6 @@ __all__ = [
     "FMU",
     "HAL_FILES",
     "MACHINE",
-    "PDF",
     "PNG",
     "REPORT",
     "RUN",
@@ -173,8 +172,7 @@ REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
 PNG = {".png": FIGURE}
-PDF = {".pdf": VECTOR_FIGURE}
-FIGURES = PNG | PDF | {".svg": VECTOR_FIGURE}
+FIGURES = PNG | {".pdf": VECTOR_FIGURE, ".svg": VECTOR_FIGURE}
 RUNS = {".csv": RUN, ".npz": RUN}
 
 BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY, ".html": REPORT}

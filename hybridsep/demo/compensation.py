@@ -25,7 +25,7 @@ TRAINING_SEED = 1000
 """Noise seed of the training run of a warm compensator; no case uses it."""
 
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
-"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.canvas.CASES`: value of ``compensate``."""
+"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
 
 Runs = dict[str, Run]
 

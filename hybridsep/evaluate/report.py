@@ -7,13 +7,160 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.output import written_text
-from .chart import Chart
-from .chart_pages import write_pages
-from .chart_script import DIGITS, chart_script, packed
+from ..base.signals import Indices
 
-__all__ = ["Report"]
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+__all__ = ["HOLD", "HYBRID", "PHYSICS", "Chart", "Line", "Report", "drawn_places"]
+
+PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
+"""Colours of the predictions, in all figures."""
+
+_COLUMNS = 600
+"""Columns of a chart, each with its extremes; the widest has 900 pixels."""
+
+_HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255
+"""Height of the only panel, and of one of several, px."""
+
+_FONT_SIZE = 13
+"""Size of all text of a chart, px."""
+
+_AXES: dict[str, Any] = {
+    "gridcolor": "#e8ecf0",
+    "zeroline": False,
+    "automargin": True,
+    "title": {"standoff": 8, "font": {"size": _FONT_SIZE}},
+}
+_LAYOUT: dict[str, Any] = {
+    "template": "none",
+    "margin": {"l": 10, "r": 10, "t": 30, "b": 10},
+    # at the chart's top, not the panel's: a change of height, as for print, does not move it
+    "legend": {"orientation": "h", "yref": "container", "yanchor": "top", "y": 1.0, "x": 0.0},
+    "font": {"family": "system-ui, sans-serif", "size": _FONT_SIZE, "color": "#1d2733"},
+    "hovermode": "x",
+}
+
+
+def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
+    """Return the indices at which lines are drawn: the extremes in each of so many columns of pixels.
+
+    Parameters
+    ----------
+    columns : int
+        Columns of pixels that the lines take.
+    *rows : (n,) array_like
+        Lines over one abscissa; unknown where NaN. A column without any known sample stays a gap.
+
+    Returns
+    -------
+    (m,) array
+        Ascending, the first and the last among them; all where there are at most two for each column.
+    """
+    lines = np.array(rows, dtype=np.float64)
+    n = lines.shape[1]
+    if n <= 2 * columns:
+        return np.arange(n)
+    begins = np.linspace(0, n, columns + 1).astype(np.intp)[:-1]
+    lowest, highest = (np.where(np.isnan(lines), unknown, lines) for unknown in (np.inf, -np.inf))
+    keep = [
+        begin + extreme(part, axis=1)
+        for values, extreme in ((lowest, np.argmin), (highest, np.argmax))
+        for begin, part in zip(begins, np.split(values, begins[1:], axis=1), strict=True)
+    ]
+    return np.unique(np.concatenate(([0, n - 1], *keep)))
+
+
+@dataclass(frozen=True)
+class Line:
+    """Line, band or row of points of a chart.
+
+    Attributes
+    ----------
+    name : str
+        In the legend; empty for none.
+    x, y : (n,) array_like
+        Of a long line the extremes of each stretch are drawn.
+    colour : str
+        ``#rrggbb``.
+    upper : (n,) array_like, optional
+        Upper edge of a band, ``y`` being the lower one.
+    points : bool
+        Whether points are drawn instead of a line.
+    panel : int
+        Panel, from 0, top first.
+    """
+
+    name: str
+    x: ArrayLike
+    y: ArrayLike
+    colour: str
+    upper: ArrayLike | None = None
+    points: bool = False
+    panel: int = 0
+
+    def draw(self, figure: Figure) -> None:
+        """Draw it into its panel."""
+        edges = (self.y,) if self.upper is None else (self.y, self.upper)
+        places = drawn_places(_COLUMNS, *edges)
+        x, *drawn = (np.asarray(values, dtype=np.float64)[places] for values in (self.x, *edges))
+        width = 1.3 if len(places) == np.size(self.y) else 1.0
+        styles: list[dict[str, Any]] = [{"mode": "lines", "line": {"color": self.colour, "width": width}}]
+        if self.points:
+            styles = [{"mode": "markers", "marker": {"color": self.colour, "size": 5}}]
+        elif self.upper is not None:
+            edge = {"mode": "lines", "line": {"width": 0, "color": self.colour}, "hoverinfo": "skip"}
+            red, green, blue = (int(self.colour[i : i + 2], 16) for i in (1, 3, 5))
+            styles = [edge, {**edge, "fill": "tonexty", "fillcolor": f"rgba({red}, {green}, {blue}, 0.18)"}]
+        for y, style in zip(drawn, styles, strict=True):
+            shown = bool(self.name) and style is styles[-1]
+            common = {"name": self.name, "legendgroup": self.name, "showlegend": shown}
+            figure.add_scatter(x=x, y=y, row=self.panel + 1, col=1, **common, **style)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Chart of one or more panels over a common abscissa.
+
+    Attributes
+    ----------
+    x_label : str
+    y_labels : tuple of str
+        One a panel.
+    lines : sequence of Line
+    caption : str
+    x_log, y_log : bool
+        Whether an axis is logarithmic.
+    """
+
+    x_label: str
+    y_labels: tuple[str, ...]
+    lines: Sequence[Line]
+    caption: str = ""
+    x_log: bool = False
+    y_log: bool = False
+
+    def figure(self) -> Figure:
+        """Return it as plotly's figure."""
+        from plotly.subplots import make_subplots
+
+        n = len(self.y_labels)
+        figure = make_subplots(rows=n, shared_xaxes=True, vertical_spacing=0.08)
+        for line in self.lines:
+            line.draw(figure)
+        figure.update_layout(_LAYOUT, height=_HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL)
+        for update, log in ((figure.update_xaxes, self.x_log), (figure.update_yaxes, self.y_log)):
+            update(_AXES | ({"type": "log", "dtick": 1} if log else {}))
+        figure.update_xaxes(title_text=self.x_label, row=n)
+        for i, label in enumerate(self.y_labels):
+            figure.update_yaxes(title_text=label, row=i + 1)
+        return figure
 
 
 @dataclass
@@ -23,14 +170,12 @@ class Report:
     Attributes
     ----------
     title, subtitle : str
-    charts : list of Chart
-        Those added so far.
     """
 
     title: str
     subtitle: str
-    charts: list[Chart] = field(default_factory=list)
-    _parts: list[str] = field(default_factory=list)
+    _parts: list[str] = field(default_factory=list, init=False)
+    _n_charts: int = field(default=0, init=False)
 
     def heading(self, text: str) -> None:
         """Begin a section."""
@@ -62,28 +207,24 @@ class Report:
 
     def chart(self, chart: Chart) -> None:
         """Add a chart."""
-        self.charts.append(chart)
-        name = f"chart{len(self.charts)}"
-        drawn = f'<div id="{name}" class="chart"></div>'
+        from plotly.io import to_html
+
+        self._n_charts += 1
+        drawn = to_html(
+            chart.figure(),
+            {"responsive": True, "displayModeBar": False},
+            full_html=False,
+            include_plotlyjs=self._n_charts == 1,
+            div_id=f"chart{self._n_charts}",
+        )
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f"<figure>{drawn}{caption}</figure>")
 
-    def write(self, path: str | Path, figures: str | Path | None = None) -> None:
-        """Write the HTML file, and its charts to a PDF, a page each, for print.
-
-        Parameters
-        ----------
-        path : str or Path
-        figures : str or Path, optional
-            The PDF.
-        """
+    def write(self, path: str | Path) -> None:
+        """Write the HTML file."""
         template = (Path(__file__).parent / "templates" / "report.html").read_text(encoding="utf-8")
-        values = {"title": html.escape(self.title), "subtitle": html.escape(self.subtitle)}
-        text, n_bytes = packed(chart_script(chart, f"chart{1 + i}") for i, chart in enumerate(self.charts))
         page = Template(template).substitute(
-            values, body="\n".join(self._parts), packed=text, n_bytes=n_bytes, digits=DIGITS
+            title=html.escape(self.title), subtitle=html.escape(self.subtitle), body="\n".join(self._parts)
         )
         with written_text(path) as file:
             file.write(page)
-        if figures is not None:
-            write_pages(self.charts, figures)

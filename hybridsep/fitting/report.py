@@ -9,9 +9,7 @@ from scipy.signal import welch
 
 from ..base.metrics import coverage, rms_ratio
 from ..base.signals import Array
-from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
-from ..evaluate.chart import Chart, Line
-from ..evaluate.report import Report
+from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..identify.operation import TOO_LITTLE
 from ..identify.shown import deviation_words, shown_estimates
 from ..intake.finding import Finding

@@ -21,7 +21,8 @@ from ..base.errors import ParameterError, SignalError
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array, as_measured, as_samples
-from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, finish_panels, save_figure
+from ..evaluate.figures import finish_panels, save_figure
+from ..evaluate.report import HOLD, HYBRID, PHYSICS
 from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
 from ..base.signals import Array
-from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
+from ..evaluate.figures import draw_line, finish_panels, legend_above, save_figure
+from ..evaluate.report import HOLD, HYBRID, PHYSICS
 from ..logs.units import Shown, shown_in
 from .model import IdentifiedModel
 

@@ -21,7 +21,7 @@ from hybridsep import HybridPredictor, ModalModel, build_fmu, load_machine
 from hybridsep.base import output
 from hybridsep.base.output import written_text, written_whole
 from hybridsep.cosim.run import save_columns
-from hybridsep.evaluate.canvas import save_figure
+from hybridsep.evaluate.figures import save_figure
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")
 OLD = b"what was there before"
@@ -141,9 +141,10 @@ WRITERS = {
 
 
 @pytest.fixture
-def full_disk(tmp_path: Path) -> Iterator[None]:
+def full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Let no file become longer than 500 bytes: the next write fails with EFBIG, as it does with ENOSPC when full."""
     resource = pytest.importorskip("resource")
+    monkeypatch.setattr("sys.dont_write_bytecode", True)  # a module's cut code would be imported ever after
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
     try:

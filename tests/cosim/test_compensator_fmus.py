@@ -18,8 +18,7 @@ from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSe
 from hybridsep.cosim.fmus import check_controller
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import COMPENSATOR, Run
-from hybridsep.evaluate.path_plots import contour_figure
-from hybridsep.evaluate.time_plots import tracking_figure
+from hybridsep.evaluate.figures import contour_figure, tracking_figure
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machines.machine import Machine
 from hybridsep.plants.encoder import Encoder

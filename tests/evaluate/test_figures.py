@@ -10,8 +10,7 @@ from drawn import cut_off, figures_drawn, hiding_legends
 
 from hybridsep.compensate.planning import SepState
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
-from hybridsep.evaluate.path_plots import contour_figure, spiral_figure
-from hybridsep.evaluate.time_plots import prediction_figure, tracking_figure
+from hybridsep.evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
 
 
 def made_run(kind: Kind, n: int, peak: int | None = None) -> Run:

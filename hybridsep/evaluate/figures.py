@@ -1,26 +1,113 @@
-"""Figures over time: prediction errors like the paper's Figs. 4 and 8, tracking errors and changes of the command."""
+"""Figures of runs, drawn without a display and written as PNG, PDF or SVG.
+
+Over time: prediction errors like the paper's Figs. 4 and 8, tracking errors and changes of the command. Along a planar
+path, both axes together: prediction errors and contour errors.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
 
 from ..base.metrics import rms
+from ..base.output import written_whole
 from ..base.signals import Array
 from ..compensate.planning import SepState
 from ..cosim.run import Run
 from ..logs.units import Shown, shown_in
-from .canvas import CASES, HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
+from .report import HOLD, HYBRID, PHYSICS, drawn_places
 
-__all__ = ["prediction_figure", "tracking_figure"]
+__all__ = [
+    "CASES",
+    "contour_figure",
+    "draw_line",
+    "finish_panels",
+    "legend_above",
+    "prediction_figure",
+    "save_figure",
+    "spiral_figure",
+    "tracking_figure",
+]
+
+_CREATOR = "hybridsep"
+"""Creator that a PDF or SVG names, by which it is known as ours."""
+
+CASES = {
+    "off": ("no compensation", HOLD),
+    "physics": ("physics model", PHYSICS),
+    "hybrid_cold": ("hybrid, cold", "#74b3e0"),
+    "hybrid_warm": ("hybrid, warm", HYBRID),
+    "hybrid": ("hybrid", HYBRID),
+}
+"""Compensated runs in the order of their expected error, largest first: key → label, colour."""
 
 _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
 """Shading of spans that a lesser model planned than others of the run."""
+
+
+_COLUMNS = 1000
+"""Columns of pixels of a panel as wide as the figure."""
+
+_THIN = 10
+"""Samples in a column of pixels above which a line is drawn thinner."""
+
+_PAD = 0.08
+"""Room between panels, and at the edges, inches."""
+
+
+def draw_line(axes: Axes, x: ArrayLike, y: ArrayLike, linewidth: float = 0.9, **style: Any) -> None:
+    """Draw a line; of a long one the extremes of each column of pixels, of a very long one thinner."""
+    x, y = np.asarray(x), np.asarray(y)
+    places = drawn_places(_COLUMNS, y)
+    axes.plot(x[places], y[places], linewidth=linewidth if len(y) <= _THIN * _COLUMNS else 0.6 * linewidth, **style)
+
+
+def legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
+    """Put a panel's legend above it, where it hides nothing; entries are the panel's if left out."""
+    if handles is None:
+        handles = axes.get_legend_handles_labels()[0]
+    axes.legend(
+        handles=handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+        ncols=max(len(handles), 1),
+        columnspacing=1.4,
+        frameon=False,
+    )
+
+
+def finish_panels(panels: Iterable[Axes]) -> None:
+    """Give panels over time a grid, and no frame above and on the right."""
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
+    """Write a figure to a PNG, or to a PDF or SVG where the name ends so; the same figure gives the same bytes."""
+    FigureCanvasAgg(figure)
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(w_pad=_PAD, h_pad=_PAD)
+    kind = Path(path).suffix.lower().removeprefix(".")
+    metadata = {"pdf": {"Creator": _CREATOR, "CreationDate": None}, "svg": {"Creator": _CREATOR, "Date": None}}.get(
+        kind
+    )
+    with written_whole(path) as file, rc_context({"svg.hashsalt": _CREATOR}):
+        figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
 
 
 def prediction_figure(run: Run, title: str, path: str | Path, shown: Shown | None = None) -> None:
@@ -92,7 +179,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     Parameters
     ----------
     runs : mapping
-        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Of one run alone,
+        Keys of :data:`~hybridsep.evaluate.figures.CASES` → runs over the same command. Of one run alone,
         the spans are shaded that a lesser model planned.
     title : str
         Heading.
@@ -152,3 +239,60 @@ def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
         if len(edges):
             patches.append(Patch(color=color, alpha=0.2, linewidth=0, label=label))
     return patches
+
+
+def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
+    """Draw each model's prediction error along the spiral, both axes together, to a PNG."""
+    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    figure.suptitle("Spiral: distance between the measured and the predicted point")
+    errors = [1e6 * np.hypot(x.x_meas - getattr(x, name), y.x_meas - getattr(y, name)) for name in ("x_pb", "x_h")]
+    limit = max(float(np.percentile(distance, 99)) for distance in errors)
+    for axes, distance, label in zip(panels, errors, ("physics-based model", "linear hybrid model"), strict=True):
+        points = _draw_path(axes, x, y, distance, limit, size=3)
+        axes.set_title(f"{label}, RMS {rms(distance):.1f} µm", fontsize=10)
+        axes.set_xlabel("X [mm]")
+    panels[0].set_ylabel("Y [mm]")
+    figure.colorbar(points, ax=panels, label="prediction error [µm]", extend="max")
+    save_figure(figure, path)
+
+
+def contour_figure(
+    runs: Mapping[str, tuple[Run, Run]], errors: Mapping[str, Array], title: str, path: str | Path
+) -> None:
+    """Draw the contour error along a planar path, one panel for each compensated run, to a PNG.
+
+    Parameters
+    ----------
+    runs : mapping
+        Keys of :data:`~hybridsep.evaluate.figures.CASES` → the runs of X and Y.
+    errors : mapping
+        The same keys → ``(n,)`` contour error, m; :func:`hybridsep.base.metrics.contour_error`.
+    title : str
+        Heading.
+    path : str or Path
+        The PNG.
+    """
+    rows = math.ceil(len(runs) / 2)
+    figure = Figure(figsize=(8.8, 3.8 * rows + 0.5), layout="constrained")
+    panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    figure.suptitle(title)
+    limit = 1e6 * max(float(np.percentile(error, 98)) for key, error in errors.items() if key != "off")
+    for axes, (key, (x, y)) in zip(panels.flat, runs.items(), strict=False):
+        micro = 1e6 * errors[key]
+        points = _draw_path(axes, x, y, micro, limit, size=5)
+        axes.set_title(f"{CASES[key][0]}: {rms(micro):.0f} µm RMS", fontsize=11)
+    for axes in panels[-1]:
+        axes.set_xlabel("X [mm]")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("Y [mm]")
+    figure.colorbar(points, ax=panels, label="contour error [µm]", extend="max", shrink=0.7)
+    save_figure(figure, path)
+
+
+def _draw_path(axes: Axes, x: Run, y: Run, error: Array, limit: float, *, size: float) -> PathCollection:
+    """Draw the commanded path, coloured by an error ``(n,)``, µm, from 0 to a limit."""
+    axes.set_aspect("equal")
+    return axes.scatter(
+        1e3 * x.x_d, 1e3 * y.x_d, c=error, s=size, cmap="viridis", vmin=0.0, vmax=limit, rasterized=True
+    )
