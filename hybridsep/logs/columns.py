@@ -1,4 +1,4 @@
-"""Choice of a log's columns: which are time, commanded and measured position, and in which units."""
+"""Choice of a log's columns: which are time, commanded and measured position, in which units, at which rates."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..base.errors import LogError, brief, listed
-from .source import Source
+from ..base.signals import Array
+from .source import ArraysSource, Channel, Source
 from .text_layout import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["COUNT", "ROLES", "Column", "choose_columns", "roles_of"]
+__all__ = ["COUNT", "Column", "channels", "choose_columns", "on_one_clock"]
 
 COUNT = "such as unit='0.1um' (--unit 0.1um)"
 """Example of the unit of a log in encoder counts, for messages."""
@@ -22,6 +25,14 @@ _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "
 
 ROLES = ("t", "x_d", "x")
 """Time, commanded and measured position."""
+
+_GAP = 1.5
+"""Intervals of the slower column between two samples of the faster one from which on the latter has a gap."""
+
+_SAME = 1e-6
+"""Largest difference of two channels' times, relative to their interval, at which they are the same: rounding."""
+
+_BLOCK = 10_000
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
@@ -129,17 +140,6 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     return None
 
 
-def roles_of(source: Source) -> dict[str, str]:
-    """Return the names of the columns that are read without a word of the user's, by role, as far as there are any."""
-    found = {}
-    for role in ROLES:
-        with suppress(LogError):  # there are several
-            name = _name(source, role, None)
-            if name is not None:
-                found[role] = name
-    return found
-
-
 def _only_clock(source: Source) -> str | None:
     """Return the only column of timestamps, whatever its name; None if there are none or several."""
     twins = {twin for one in source.twins.values() for twin in one}
@@ -217,3 +217,150 @@ def _position(source: Source, name: str, given: str | None) -> Column:
         )
     chosen = chosen or unit or position_unit(source.assumed_units.get(name, ""))
     return Column(name, chosen or POSITION_UNITS["m"], chosen is not None)
+
+
+def channels(source: Source) -> list[Channel]:
+    """Return a file's columns with what it states of them, and what reading it tells of what it does not.
+
+    Samples are counted, and the interval is the mean of the times, s, where a column is the time. What is read without
+    a word of the user's has a role.
+    """
+    roles = {}
+    for role in ROLES:
+        with suppress(LogError):  # there are several
+            roles[_name(source, role, None)] = role
+    t = next((name for name, role in roles.items() if role == "t"), None)
+    whole, clocks = isinstance(source, ArraysSource), {*source.times.values(), t}
+    extents: dict[str, tuple[int | None, float | None]] = {}
+
+    def extent(name: str) -> tuple[int | None, float | None]:
+        if name not in extents:
+            extents[name] = _extent(source, name, is_time=name in clocks)
+        return extents[name]
+
+    # The rows of a text are counted by one column for all
+    probe = t or next((name for name in source.names if not whole and extent(name)[0] is not None), "")
+    completed = []
+    for one in source.channels():
+        clock = source.times.get(one.name) or (one.name if one.name in clocks or whole else probe)
+        n, interval = extent(clock)
+        if interval is None and t is not None and extent(t)[0] == n:
+            interval = extent(t)[1]
+        completed.append(
+            Channel(
+                one.name,
+                unit=one.unit or stated_unit(one.name)[1],
+                role=one.role or roles.get(one.name, ""),
+                n_samples=n if one.n_samples is None else one.n_samples,
+                interval=interval if one.interval is None else one.interval,
+            )
+        )
+    return completed
+
+
+def _extent(source: Source, name: str, *, is_time: bool) -> tuple[int | None, float | None]:
+    """Return a column's samples, and of times the mean interval, s; None of a column that is not numbers."""
+    n, ends = 0, [0.0, 0.0]
+    try:
+        factor = _time(source, name).unit.factor if is_time else None
+        for block in source.blocks([name], _BLOCK):
+            (values,) = block.columns
+            ends = [float(values[0]) if n == 0 else ends[0], float(values[-1])]
+            n += len(values)
+    except LogError:
+        return None, None
+    return n, factor * (ends[1] - ends[0]) / (n - 1) if factor is not None and n > 1 else None
+
+
+# Rates of their own
+
+
+def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: bool) -> tuple[Source, dict[str, Column]]:
+    """Return a source whose columns can be read side by side, and the columns.
+
+    Where commanded and measured position have times of their own that differ, both are taken at the times of the one
+    that is sampled more slowly, between its first and last time in which there are both; the other is interpolated
+    linearly, and refused where it has a gap: nothing is invented between samples.
+
+    Parameters
+    ----------
+    source : Source
+    columns : mapping
+        By role.
+    resample : bool
+        Whether that is done; otherwise times that differ are refused.
+
+    Raises
+    ------
+    LogError
+        If the times differ and are not to be resampled, or cannot be.
+    """
+    chosen = dict(columns)
+    x_d, x = chosen["x_d"].name, chosen["x"].name
+    t_d, t_x = source.times.get(x_d), source.times.get(x)
+    if t_d is None or t_x is None or t_d == t_x or "t" not in chosen or chosen["t"].name != t_d:
+        return source, chosen
+    read = {x_d: _whole(source, t_d, x_d), x: _whole(source, t_x, x)}
+    intervals = {name: (t[-1] - t[0]) / max(len(t) - 1, 1) for name, (t, _) in read.items()}
+    (a, _), (b, _) = read.values()
+    if len(a) == len(b) and (np.abs(a - b) <= _SAME * min(np.abs(list(intervals.values())))).all():
+        return source, chosen
+    unit = chosen["t"].unit.factor
+    rates = ", ".join(
+        f"{brief(name)} has {len(t)} samples every {unit * intervals[name]:.6g} s" for name, (t, _) in read.items()
+    )
+    if not resample:
+        raise LogError(
+            f"{source.path}: columns are sampled at different times: {rates}; record them at one rate, or "
+            "resample=True (--resample) takes both at the times of the slower one"
+        )
+    slow, fast = sorted((x, x_d), key=lambda name: -intervals[name])
+    t, values = read[slow]
+    inside = (t >= max(a[0], b[0])) & (t <= min(a[-1], b[-1]))
+    t, values = t[inside], values[inside]
+    followed = _interpolated(source, source.times[fast], fast, read[fast], t, _GAP * intervals[slow])
+    chosen["t"] = Column(source.times[slow], chosen["t"].unit, True)
+    columns_read = {source.times[slow]: t, slow: values, fast: followed}
+    return _Resampled(source, columns_read, f"resampled onto the times of the slower column: {rates}"), chosen
+
+
+def _whole(source: Source, *names: str) -> tuple[Array, ...]:
+    """Return columns of the same times."""
+    blocks = [block.columns for block in source.blocks(names, _BLOCK)] or [[np.full(1, np.nan)] * len(names)]
+    return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
+
+
+def _interpolated(source: Source, t_name: str, name: str, samples: tuple[Array, ...], at: Array, gap: float) -> Array:
+    """Return a column at other times; LogError where its samples there are further apart than ``gap``."""
+    t, x = samples
+    if not (np.diff(t) > 0.0).all():
+        i = int(np.argmin(np.diff(t) > 0.0)) + 2
+        raise LogError(f"{source.path}, sample {i}: time {brief(t_name)} must increase to be resampled")
+    after = np.searchsorted(t, at)
+    apart = np.where(t[after] == at, 0.0, t[after] - t[np.maximum(after - 1, 0)])
+    if apart.max(initial=0.0) > gap:
+        i = int(np.argmax(apart > gap))
+        raise LogError(
+            f"{source.path}: column {brief(name)} has a gap of {apart[i]:.6g} at time {at[i]:.9g} and cannot be "
+            "resampled; record it without, or both columns at one rate"
+        )
+    return np.interp(at, t, x)
+
+
+class _Resampled(ArraysSource):
+    """Columns of a source at the times of one of them."""
+
+    def __init__(self, source: Source, columns: Mapping[str, Array], remark: str) -> None:
+        super().__init__(source.path)
+        self._columns = columns
+        self.names, self.units, self.roles = source.names, source.units, source.roles
+        self.remarks = [*source.remarks, remark]
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return False: it is no format of files."""
+        return False
+
+    def column(self, name: str) -> Array:
+        """Return a column."""
+        return self._columns[name]

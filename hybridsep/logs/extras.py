@@ -1,8 +1,7 @@
-"""Libraries of formats that come as extras, imported when a file of theirs is opened."""
+"""Libraries that read formats: those that come as extras, and what they raise of a damaged file."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -11,14 +10,14 @@ from typing import Any
 
 from ..base.errors import LogError, first_line
 
-__all__ = ["library", "quiet", "reading", "refusal"]
+__all__ = ["library", "reading"]
 
 _OWN = (TypeError, AttributeError, LookupError)
 """Errors whose messages tell of the library's own names."""
 
 
 def library(asked: Path | str, module: str, extra: str, format_: str) -> Any:
-    """Return a module that reads a format.
+    """Return a module that comes with an extra; LogError, which names the extra, if it is not installed.
 
     Parameters
     ----------
@@ -29,11 +28,6 @@ def library(asked: Path | str, module: str, extra: str, format_: str) -> Any:
         The extra that installs it.
     format_ : str
         The format's name.
-
-    Raises
-    ------
-    LogError
-        If it is not installed; the message names the extra.
     """
     try:
         return import_module(module)
@@ -43,44 +37,23 @@ def library(asked: Path | str, module: str, extra: str, format_: str) -> Any:
         ) from error
 
 
-def refusal(path: Path, format_: str, error: Exception, what: str = "") -> LogError:
-    """Return that ``what`` of a file, all of it if left out, is damaged or of another format, and why.
-
-    The reason is the type of the library's error, and its first line where that says something.
-    """
-    why = type(error).__name__ if isinstance(error, _OWN) else first_line(f"{type(error).__name__}: {error}")
-    subject = f"{what} is" if what else "is"
-    return LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}")
-
-
 @contextmanager
-def reading(
-    path: Path, format_: str, what: str = "", errors: tuple[type[Exception], ...] = (Exception,)
-) -> Iterator[None]:
-    """Turn what a library raises into the :func:`refusal` of a file: a damaged one may fail in every way there is."""
+def reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
+    """Turn what a library raises into a LogError on ``what`` of a file, all of it if left out, and why.
+
+    A damaged file may fail in every way there is.
+    """
     try:
         yield
     except (MemoryError, LogError):
         raise
-    except errors as error:
-        raise refusal(path, format_, error, what) from error
+    except Exception as error:
+        name = type(error).__name__ if type(error).__module__ == "builtins" else _qualified(type(error))
+        why = name if isinstance(error, _OWN) else first_line(f"{name}: {error}")
+        subject = f"{what} is" if what else "is"
+        raise LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}") from error
 
 
-@contextmanager
-def quiet(name: str) -> Iterator[None]:
-    """Keep a library from logging to standard error: what counts is in the error that it raises.
-
-    Parameters
-    ----------
-    name : str
-        With which the names of its loggers begin.
-    """
-    loggers = [logging.getLogger(one) for one in [*logging.root.manager.loggerDict] if one.startswith(name)]
-    before = [logger.disabled for logger in loggers]
-    for logger in loggers:
-        logger.disabled = True
-    try:
-        yield
-    finally:
-        for logger, disabled in zip(loggers, before, strict=True):
-            logger.disabled = disabled
+def _qualified(kind: type) -> str:
+    """Return an exception's name, with its module where it is called error, as zlib's and struct's are."""
+    return f"{kind.__module__}.{kind.__name__}" if kind.__name__ == "error" else kind.__name__

@@ -8,31 +8,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..base.errors import LogError
-from .arrow import ArrowSource
+from .arrays import MatSource, NpzSource, ParquetSource
 from .capture import CaptureSource
 from .halscope import HalscopeCsvSource, HalscopePairsSource
-from .hdf5 import Hdf5Source
-from .mat import MatSource
-from .mdf import MdfSource
-from .npz import NpzSource
-from .parquet import ParquetSource
 from .sinumerik import SinumerikSource
-from .source import Channel, Source
-from .tdms import TdmsSource
+from .source import Source
 from .text import TextSource
 from .twincat import TwinCatSource
-from .xlsx import XlsxSource
 
-__all__ = ["READERS", "channels", "open_source"]
+__all__ = ["READERS", "open_source"]
 
 READERS: tuple[type[Source], ...] = (
     NpzSource,
-    XlsxSource,
-    Hdf5Source,
-    MdfSource,
-    TdmsSource,
     ParquetSource,
-    ArrowSource,
     MatSource,
     CaptureSource,
     SinumerikSource,
@@ -49,11 +37,19 @@ _TEXT = (".csv", ".txt", ".log")
 """Ends of the names of texts, in which no reader but theirs can say what is damaged."""
 
 _SAVE = "save its columns t, x_d and x as CSV"
-_PANDAS = "pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
+_PANDAS = "import pandas; pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
+_HDF5 = """these three lines convert it:
+import h5py, numpy
+with h5py.File('{path}') as f:
+    numpy.savez('log.npz', t=f['t'][()].ravel(), x_d=f['x_d'][()].ravel(), x=f['x'][()].ravel())"""
+_PAGE = "docs/howto/recorders.md has three lines of Python that convert it"
 
 _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
+    ("HDF5, or MATLAB 7.3", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"), _HDF5),
+    ("ASAM MDF", (b"MDF     ", b"UnFinMF "), _PAGE),
+    ("NI TDMS", (b"TDSm",), _PAGE),
+    ("Arrow or Feather", (b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"), _PANDAS.format("feather")),
     ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
-    ("Feather of version 1", (b"FEA1",), _PANDAS.format("feather")),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
     (
@@ -71,7 +67,7 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("a sound file", (b"RIFF", b"fLaC"), _SAVE),
     ("PDF", (b"%PDF",), _SAVE),
     ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
-    ("a zip archive of another kind than .npz and .xlsx", (b"PK\x03\x04",), "unpack it"),
+    ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), f"{_SAVE} in Excel, or unpack it"),
 )
 """Formats without a reader: what they are, how they begin, how to convert them."""
 
@@ -94,11 +90,6 @@ def open_source(path: Path) -> Source:
         return _reader(path, head)(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
-
-
-def channels(path: Path) -> list[Channel]:
-    """Return the columns of a file with what it says of them; LogError as for :func:`open_source`."""
-    return open_source(path).channels()
 
 
 def _reader(path: Path, head: bytes) -> type[Source]:

@@ -12,10 +12,9 @@ import numpy as np
 from ..base.errors import LogError, brief
 from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
-from .columns import COUNT, Column, choose_columns
+from .columns import COUNT, Column, choose_columns, on_one_clock
 from .formats import open_source
 from .gaps import row_interval
-from .rates import on_one_clock
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
 from .units import POSITION_UNITS, UNIT_OPTIONS, Shown, position_unit, shown_of, stated_unit
@@ -138,12 +137,12 @@ class LogReader:
         if axis is not None:
             self._source.choose_axis(axis)
         chosen = choose_columns(self._source, columns, unit, time_needed=given is None)
+        self._may_miss = not uniform if may_miss is None else may_miss
+        self._source.measured, self._source.may_miss = chosen["x"].name, self._may_miss
         self._source, self._columns = on_one_clock(self._source, chosen, resample=resample)
         self.unit, self.file_unit = self._columns["x_d"].unit.si, self._columns["x_d"].unit.name
         self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
         self._uniform = uniform
-        self._may_miss = not uniform if may_miss is None else may_miss
-        self._source.measured, self._source.may_miss = self._columns["x"].name, self._may_miss
         self._check_twins()
         self.is_even = True
         self.n_samples, self.T_s = self._scan(given)
@@ -307,15 +306,15 @@ def open_log(
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
-    ``.mat``, HDF5 and JSON files are loaded whole, so that their size is limited by the memory; all others are
-    streamed. What a file is, its content tells.
+    Text, Parquet, TwinCAT's and halscope's files are streamed; of the others, columns are read whole. What a file is,
+    its content tells.
 
     Parameters
     ----------
     path : str or Path
-        Text (CSV, TSV; comma, semicolon, tab or blanks between columns; plain or in gzip), ``.npz``, ``.mat`` (version
-        7.3 with the extra ``hdf5``), Siemens Capture JSON, SINUMERIK trace XML, TwinCAT Scope's CSV, LinuxCNC halscope;
-        with extras MDF (``mdf``), TDMS (``tdms``), Parquet and Arrow (``parquet``), Excel (``xlsx``).
+        Text (CSV, TSV; comma, semicolon, tab or blanks between columns; plain or in gzip), ``.npz``, ``.mat`` up to
+        version 7, Parquet (with the extra ``parquet``), Siemens Capture JSON, SINUMERIK trace XML, TwinCAT Scope's CSV,
+        LinuxCNC halscope.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read

@@ -10,28 +10,116 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import chain
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, NoReturn
+from xml.parsers import expat
 
 import numpy as np
 
-from ..base.errors import LogError, brief, listed
+from ..base.errors import LogError, brief, first_line, listed
 from ..base.signals import Array
-from .sinumerik_xml import Record, Signal, TraceXml
-from .source import Block, Channel, Source, sample_number
+from .source import ArraysSource, Channel
+from .text_layout import is_number
 
 __all__ = ["SinumerikSource"]
 
 _ROOT = b"<traceSession"
 
+_ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")
+"""``/Nck/!SD/nckServoDataCmdPos2ndEnc64 [u1, 7]``: a variable of axis 7."""
+
 _COMMANDED = re.compile(r"cmdpos|despos", re.IGNORECASE)
 _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGNORECASE))
 """Names of the signals of positions, the measured ones by precedence."""
 
+_POINTS_MAX = 100_000_000
+"""Most samples of a signal: a day at 1 kHz. A damaged number must not be filled up with held values."""
 
-class SinumerikSource(Source):
+_NOT_A_NUMBER = 9.2188684e18
+"""Values above are the bits of a NaN, written as a whole number: there is none."""
+
+
+@dataclass
+class _Signal:
+    """Signal as it is declared: name and axis of its address, interval, s, samples, type of its unit; its values."""
+
+    name: str
+    axis: str
+    interval: float
+    n: int
+    kind: str
+    t: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+
+
+class _Trace:
+    """Signals of a file, by their attribute in the records, and the last time."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.signals: dict[str, _Signal] = {}
+        self.last = -math.inf
+        self._frames, self._within = 0, False
+        self._parser: Any = expat.ParserCreate()
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.StartDoctypeDeclHandler = lambda *_: self._refuse("a document type is not read")
+        try:
+            with path.open("rb") as file:
+                self._parser.ParseFile(file)
+        except (expat.ExpatError, LookupError) as error:
+            raise LogError(f"{path}: is truncated, damaged or not XML: {first_line(error)}") from error
+        if not self.signals:
+            raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise LogError(f"{self._path}, line {self._parser.CurrentLineNumber}: {what}")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        if tag == "dataFrame":
+            self._frames += 1
+            self._within = self._frames == 1
+        elif self._within and tag == "dataSignal":
+            self._declare(attributes)
+        elif self._within and tag == "rec":
+            self._record(attributes)
+
+    def _end(self, tag: str) -> None:
+        if tag == "dataFrame":
+            self._within = False
+
+    def _declare(self, given: dict[str, str]) -> None:
+        name = _ADDRESS.fullmatch(given.get("name", ""))
+        if not given.get("id") or name is None:
+            self._refuse(f"dataSignal must have an id and a name, got {brief(given)}")
+        interval, n = (self._number(given, key, "dataSignal") for key in ("interval", "datapointCount"))
+        if not 0.0 < interval < 1e6 or not 0 <= n <= _POINTS_MAX:
+            self._refuse(
+                f"dataSignal must have an interval above 0 s and at most {_POINTS_MAX} points, got {interval:g} s and "
+                f"{n:g}"
+            )
+        signal = _Signal(name["name"], name["axis"] or "", interval, int(n), given.get("unitsType", ""))
+        self.signals[given["id"]] = signal
+
+    def _record(self, given: dict[str, str]) -> None:
+        t = self._number(given, "time", "rec")
+        if not self.last <= t < 1e12:
+            self._refuse(f"time of rec must increase, got {t:.9g} s after {self.last:.9g} s")
+        self.last = t
+        for key in given:
+            if key in self.signals and (value := self._number(given, key, "rec")) <= _NOT_A_NUMBER:
+                self.signals[key].t.append(t)
+                self.signals[key].values.append(value)
+
+    def _number(self, given: dict[str, str], key: str, tag: str) -> float:
+        text = given.get(key, "")
+        if not is_number(text):
+            self._refuse(f"{key} of {tag} must be a number, got {brief(text) if text else 'nothing'}")
+        return float(text)
+
+
+class SinumerikSource(ArraysSource):
     """The signals of a trace, by the last part of their address and the axis: ``nckServoDataCmdPos2ndEnc64|7``.
 
     Without a choice, the first axis with a commanded and a measured position is read. Positions are in millimetres
@@ -43,27 +131,21 @@ class SinumerikSource(Source):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        trace, starts = TraceXml(path), dict[str, float]()
-        for records in trace.records():
-            for record in records:
-                for key in record.values:
-                    starts.setdefault(key, record.t)
-            if trace.signals and len(starts) >= len(trace.signals):
-                break
-        if not trace.signals:
-            raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
-        self._signals: dict[str, Signal] = {}
-        for signal in trace.signals:
+        trace = _Trace(path)
+        self._last = trace.last
+        self._signals: dict[str, _Signal] = {}
+        for signal in trace.signals.values():
             name = f"{signal.name}|{signal.axis}" if signal.axis else signal.name
             while name in self._signals:
                 name += "'"
             self._signals[name] = signal
-        self._clocks: dict[str, tuple[float, float]] = {}
+        clocks: dict[tuple[float, float], str] = {}  # of columns of times by first time and interval
         self.times = {
-            name: self._clock_of(starts[signal.id], signal.interval)
+            name: clocks.setdefault((signal.t[0], signal.interval), "time" if not clocks else f"time#{len(clocks) + 1}")
             for name, signal in self._signals.items()
-            if signal.id in starts
+            if signal.t
         }
+        self._clocks = {name: clock for clock, name in clocks.items()}
         self.names = [*self._signals, *self._clocks]
         self.units = dict.fromkeys(self._clocks, "s")
         self.assumed_units = {name: "mm" for name, signal in self._signals.items() if signal.kind == "posn"}
@@ -99,39 +181,19 @@ class SinumerikSource(Source):
         self.roles = {"x_d": x_d, "x": x}
         self.remarks = []
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        clocks = {self.times.get(name, name) for name in names}
-        if len(clocks) > 1 or not clocks <= set(self._clocks):
-            raise LogError(
-                f"{self.path}: columns {listed(list(names))} are sampled at different times, or have no values"
-            )
-        (clock,) = clocks
+    def column(self, name: str) -> Array:
+        """Return the times of a clock, or a signal's values, each held until the next one."""
+        clock = self.times.get(name, name)
+        if clock not in self._clocks:
+            raise LogError(f"{self.path}: column {brief(name)} has no values")
         start, interval = self._clocks[clock]
-        most = min(self._signals[name].n for name, own in self.times.items() if own == clock)
-        held = {name: _Held(self._signals[name].id) for name in names if name != clock}
-        done, last = 0, start
-        for records in chain(TraceXml(self.path).records(), [None]):
-            if records:
-                last = records[-1].t
-                for one in held.values():
-                    one.extend(records, start, interval)
-            # The sample of the last time may have further values only in the end
-            end = min(most, math.floor((last - start) / interval + 0.5) + (records is None))
-            for i in range(done, end, n):
-                k = np.arange(i, min(i + n, end), dtype=np.float64)
-                columns = [start + interval * k if name == clock else held[name].at(k) for name in names]
-                yield Block(columns, sample_number(i))
-            done = max(done, end)
-
-    def _clock_of(self, start: float, interval: float) -> str:
-        """Return the column of times with this first one and interval, a new one if there is none."""
-        for name, clock in self._clocks.items():
-            if clock == (start, interval):
-                return name
-        name = "time" if not self._clocks else f"time#{len(self._clocks) + 1}"
-        self._clocks[name] = (start, interval)
-        return name
+        most = min(self._signals[one].n for one, own in self.times.items() if own == clock)
+        k = np.arange(min(most, math.floor((self._last - start) / interval + 1.5)), dtype=np.float64)
+        if name == clock:
+            return start + interval * k
+        signal = self._signals[name]
+        written = np.rint((np.array(signal.t) - start) / interval)
+        return np.array(signal.values)[np.searchsorted(written, k, side="right") - 1]
 
     def _positions(self) -> dict[str, tuple[str, str]]:
         """Return commanded and measured position by axis."""
@@ -147,27 +209,4 @@ class SinumerikSource(Source):
             ]
             if there:
                 found[signal.axis] = (x_d, there[0])
-        return found
-
-
-class _Held:
-    """Values of a signal that are held until the next one, as far as they have been read."""
-
-    def __init__(self, key: str) -> None:
-        self._key = key
-        self._k, self._values = np.empty(0), np.empty(0)
-
-    def extend(self, records: Sequence[Record], start: float, interval: float) -> None:
-        """Take the values of further records."""
-        own = [(record.t, record.values[self._key]) for record in records if self._key in record.values]
-        if own:
-            t, values = np.array(own).T
-            self._k = np.concatenate([self._k, np.rint((t - start) / interval)])
-            self._values = np.concatenate([self._values, values])
-
-    def at(self, k: Array) -> Array:
-        """Return the samples of increasing numbers; earlier samples are forgotten."""
-        found: Array = self._values[np.searchsorted(self._k, k, side="right") - 1]
-        keep = max(int(np.searchsorted(self._k, k[-1], side="right")) - 1, 0)
-        self._k, self._values = self._k[keep:], self._values[keep:]
         return found

@@ -13,7 +13,17 @@ import numpy as np
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = ["NEEDS_TRUST", "Block", "Channel", "Source", "check_column", "check_lengths", "line_number", "sample_number"]
+__all__ = [
+    "NEEDS_TRUST",
+    "ArraysSource",
+    "Block",
+    "Channel",
+    "Source",
+    "check_column",
+    "check_lengths",
+    "line_number",
+    "sample_number",
+]
 
 
 NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
@@ -131,6 +141,21 @@ class Source(ABC):
     def choose_axis(self, axis: str) -> None:
         """Choose one of several axes by its name; LogError if the format holds a single one."""
         raise LogError(f"{self.path}: axis {brief(axis)} was named, but a {self.format} file holds columns: name those")
+
+
+class ArraysSource(Source):
+    """Columns that are read whole, so that their size is limited by the memory."""
+
+    @abstractmethod
+    def column(self, name: str) -> Array:
+        """Return a column's values."""
+
+    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
+        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+        columns = [self.column(name) for name in names]
+        check_lengths(self.path, {name: len(column) for name, column in zip(names, columns, strict=True)})
+        for i in range(0, len(columns[0]), n):
+            yield Block([column[i : i + n] for column in columns], sample_number(i))
 
 
 def sample_number(offset: int) -> Callable[[int], str]:

@@ -6,39 +6,38 @@ import json
 from pathlib import Path
 
 from command_line import Run
+from recorders import twincat_csv
 from staircase_data import commanded, measured
 
-from benchmarks.recorders import write_mdf
 from hybridsep.logs.log import read_log
 
 
 def recording(path: Path) -> Path:
     """Write a command at 1 kHz, and a position and a torque at 500 Hz."""
     x_d, x = commanded()[:4000], measured(0)[:4000]
-    t = [1e-3 * i for i in range(4000)]
-    slow = {"t": t[::2], "x": x[::2], "torque": x[::2]}
-    return write_mdf(path, [{"t": t, "x_d": x_d}, slow])
+    path.write_text(twincat_csv({"x_d": (1e-3, x_d), "x": (2e-3, x[::2]), "torque": (2e-3, x[::2])}))
+    return path
 
 
 def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
-    path = recording(tmp_path / "log.mf4")
+    path = recording(tmp_path / "log.csv")
     status, out, err = hybridsep("fit", path, "--list-channels")
     assert (status, err) == (0, "")
     rows = [line.split() for line in out.splitlines() if line.strip()]
-    assert ["x_d", "m", "4000", "0.001"] in rows
+    assert ["x_d", "m", "4000", "0.001", "commanded"] in rows
     assert ["torque", "m", "2000", "0.002"] in rows
     status, out, err = hybridsep("backtest", path, "-m", "spring_mass_damper", "--list-channels", "--json")
     assert (status, err) == (0, "")
     listed = {one["name"]: one for one in json.loads(out)[str(path)]}
-    assert listed["x"] == {"name": "x", "unit": "m", "role": "", "n_samples": 2000, "interval": 0.002}
-    assert [one.name for one in tmp_path.iterdir()] == ["log.mf4"]
-    status, out, err = hybridsep("fit", tmp_path / "none.mf4", "--list-channels")
+    assert listed["x"] == {"name": "x", "unit": "m", "role": "x", "n_samples": 2000, "interval": 0.002}
+    assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
+    status, out, err = hybridsep("fit", tmp_path / "none.csv", "--list-channels")
     assert (status, out) == (2, "")
     assert "there is no such file" in err
 
 
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:
-    path = recording(tmp_path / "log.mf4")
+    path = recording(tmp_path / "log.csv")
     replay = ("backtest", path, "-m", "spring_mass_damper", "--as-is", "--Np", "20", "--p", "5", "--json")
     status, _, err = hybridsep(*replay)
     assert status == 2

@@ -20,8 +20,7 @@ from hybridsep.logs.log import LogReader, open_log, read_log
 def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
     data = columns()
     log = read_log(write(tmp_path / f"log{suffix}", data))
-    # A workbook has 15 digits or 16, a scope its times in ms
-    rounding = 1e-15 if suffix in (".xlsx", ".scope") else 0.0
+    rounding = 1e-15 if suffix == ".scope" else 0.0  # which has its times in ms
     np.testing.assert_allclose(log.t, data["t"], rtol=rounding)
     np.testing.assert_allclose(log.x_d, data["x_d"], rtol=rounding)
     np.testing.assert_allclose(log.x_meas, data["x"], rtol=rounding)
@@ -169,11 +168,10 @@ def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("suffix", [".csv", ".npz"])
-def test_memory_does_not_grow_with_the_log(tmp_path: Path, suffix: str) -> None:
+def test_memory_does_not_grow_with_a_text(tmp_path: Path) -> None:
     peaks = []
     for n in (20_000, 160_000):
-        path = write(tmp_path / f"log{n}{suffix}", columns(n, 1e-5))
+        path = write(tmp_path / f"log{n}.csv", columns(n, 1e-5))
         tracemalloc.start()
         assert sum(len(x) for _, x in open_log(path).chunks(1000)) == n
         peaks.append(tracemalloc.get_traced_memory()[1])

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from log_files import capture, columns, write, write_csv
-from scipy import io
 
 from hybridsep.base.errors import LogError, first_line, listed
 from hybridsep.logs.log import read_log
@@ -54,13 +53,6 @@ def test_columns_that_are_there_are_counted(tmp_path: Path) -> None:
         read_log(path)
     with pytest.raises(LogError, match=rf"axis '{'y' * 59}… \(1002 characters\) was named"):
         read_log(write(tmp_path / "log.csv", columns()), axis="y" * 1000)
-
-
-def test_an_array_of_structs(tmp_path: Path) -> None:
-    structs = np.zeros(9, [("a", "f8"), ("b", "f8")])
-    io.savemat(tmp_path / "log.mat", {"t": np.arange(9.0), "x_d": np.arange(9.0), "x": structs})
-    with pytest.raises(LogError, match=r"column 'x' must be a full matrix, got structs"):
-        read_log(tmp_path / "log.mat")
 
 
 def test_cuts() -> None:

@@ -8,22 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
+from recorders import halscope_csv, halscope_pairs, trace_xml, twincat_csv, write_parquet
 from scipy import io
-
-from benchmarks.recorders import (
-    halscope_csv,
-    halscope_pairs,
-    trace_xml,
-    twincat_csv,
-    write_arrow,
-    write_mdf,
-    write_parquet,
-    write_tdms,
-    write_xlsx,
-)
 
 __all__ = ["EVERY_FORMAT", "FORMATS", "Columns", "capture", "columns", "write", "write_csv"]
 
@@ -58,10 +46,6 @@ def write(path: Path, data: Columns) -> Path:
         np.savez(path, **data)
     elif path.suffix == ".mat":
         io.savemat(path, data)
-    elif path.suffix == ".h5":
-        with h5py.File(path, "w") as file:
-            for name, values in data.items():
-                file[name] = values
     elif path.suffix == ".json":
         path.write_text(json.dumps(capture(data)))
     elif path.suffix in _RECORDERS:
@@ -86,11 +70,7 @@ def _positions(data: Columns) -> Columns:
 
 
 _RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
-    ".mf4": lambda path, data: write_mdf(path, [data]),
-    ".tdms": lambda path, data: write_tdms(path, _rated(data)),
     ".parquet": write_parquet,
-    ".arrow": write_arrow,
-    ".xlsx": write_xlsx,
     ".xml": lambda path, data: path.write_text(trace_xml(_traced(data), kind="none")),
     ".scope": lambda path, data: path.write_text(twincat_csv(_rated(data))),
     ".hal": lambda path, data: path.write_text(halscope_csv(_positions(data))),
@@ -99,4 +79,4 @@ _RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
 """Writers of recorders' formats."""
 
 FORMATS = pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
-EVERY_FORMAT = pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".npz", ".mat", ".h5", ".json", *_RECORDERS])
+EVERY_FORMAT = pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".npz", ".mat", ".json", *_RECORDERS])

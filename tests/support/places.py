@@ -9,3 +9,4 @@ ROOT = SUPPORT.parents[1]
 EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
 SO101 = ROOT.parent / "shared" / "data" / "so101"
+CASES = ROOT.parent / "shared" / "cases" / "logs"

@@ -1,92 +1,28 @@
-"""Logs as recorders write them: by the format's library, or after the maker's document where there is none.
+"""Logs as recorders write them: by the format's library, or after the maker's document.
 
 Samples of columns may have rates of their own: ``{"x_d": (T_s, values), …}``.
 """
 
 from __future__ import annotations
 
-import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import nptdms
-import numpy as np
-import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
-from asammdf import MDF, Signal
 
 from hybridsep.base.signals import Array
 
-__all__ = [
-    "halscope_csv",
-    "halscope_pairs",
-    "trace_xml",
-    "twincat_csv",
-    "write_arrow",
-    "write_mdf",
-    "write_parquet",
-    "write_tdms",
-    "write_xlsx",
-]
+__all__ = ["halscope_csv", "halscope_pairs", "trace_xml", "twincat_csv", "write_parquet"]
 
 Rated = Mapping[str, tuple[float, Array]]
 """Sampling interval, s, and values by column."""
 
 
-def write_mdf(path: Path, groups: Sequence[Mapping[str, Any]], version: str = "4.10", units: str = "m") -> Path:
-    """Write an MDF file; each group has its times as ``t``, whose name in the file is ``time``."""
-    with MDF(version=version) as file:
-        for group in groups:
-            t = np.asarray(group["t"], dtype=np.float64)
-            file.append([Signal(np.asarray(x), t, name=name, unit=units) for name, x in group.items() if name != "t"])
-        saved = file.save(path, overwrite=True, compression=2 if version >= "4" else 0)
-    return Path(saved).replace(path)
-
-
-def write_tdms(path: Path, channels: Rated, unit: str = "m", pieces: int = 2) -> Path:
-    """Write a TDMS file of waveforms in several segments."""
-    with nptdms.TdmsWriter(str(path)) as file:
-        for k in range(pieces):
-            file.write_segment(
-                [
-                    nptdms.ChannelObject(
-                        *("axis", name, np.array_split(values, pieces)[k]),
-                        properties={"wf_increment": T_s, "wf_start_offset": 0.0, "unit_string": unit},
-                    )
-                    for name, (T_s, values) in channels.items()
-                ]
-            )
-    return path
-
-
 def write_parquet(path: Path, data: Mapping[str, Any], rows: int = 20) -> Path:
     """Write a Parquet file in row groups."""
     pq.write_table(pa.table(dict(data)), path, row_group_size=rows)
-    return path
-
-
-def write_arrow(path: Path, data: Mapping[str, Any], *, stream: bool = False) -> Path:
-    """Write an Arrow file or stream in batches."""
-    table = pa.table(dict(data))
-    make = pa.ipc.new_stream if stream else pa.ipc.new_file
-    with make(path, table.schema) as writer:
-        writer.write_table(table, max_chunksize=20)
-    return path
-
-
-def write_xlsx(path: Path, data: Mapping[str, Sequence[Any]], *, title: str = "Log", first: str = "") -> Path:
-    """Write a workbook, below a row of text where ``first`` is given."""
-    book = openpyxl.Workbook()
-    sheet = book.active
-    sheet.title = title
-    if first:
-        sheet.append([first])
-    sheet.append(list(data))
-    for row in zip(*data.values(), strict=True):
-        sheet.append([x if isinstance(x, (str, datetime.datetime)) or x is None else float(x) for x in row])
-    book.save(path)
     return path
 
 

@@ -1,0 +1,184 @@
+"""Arrays: NumPy's ``.npz``, MATLAB's ``.mat``, Parquet; what they declare is compared with their size."""
+
+from __future__ import annotations
+
+import decimal
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from log_files import Columns, columns, write
+from places import CASES
+from recorders import write_parquet
+from scipy import io, sparse
+
+from hybridsep.base.errors import LogError
+from hybridsep.logs.log import read_log
+
+DATA = columns()
+X_D, X = DATA["x_d"], DATA["x"]
+HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (50,), }"
+
+
+# NumPy
+
+
+def with_member(path: Path, header: str, values: bytes = bytes(400)) -> Path:
+    """Write a log whose array ``x`` is this one."""
+    write(path, {name: values for name, values in DATA.items() if name != "x"})
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        length = len(header).to_bytes(2, "little")
+        archive.writestr("x.npy", b"\x93NUMPY\x01\x00" + length + header.encode("latin-1") + values)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (HEADER.replace("{", "("), "is truncated, damaged or not an array: "),
+        (HEADER.replace("'shape'", "'shale'"), "is truncated, damaged or not an array: "),
+        (HEADER.replace("(50,)", "(" * 3000 + ")" * 3000), "is truncated, damaged or not an array: "),
+        (HEADER.replace("'<f8'", "'<f7'"), "is truncated, damaged or not an array: "),
+        (HEADER.replace("'<f8'", "'|O'"), "must be numbers, got object"),
+        (HEADER.replace("'<f8'", "[('a', '<f8')]"), "must be numbers, got .*'a'"),
+        (" " * 20_000 + HEADER, "is truncated, damaged or not an array: "),
+        (HEADER.replace("(50,)", "(51,)"), "is truncated: 408 bytes were expected, got 400"),
+        (HEADER.replace("(50,)", "(10_000_000_000,)"), "is truncated: 80000000000 bytes were expected, got 400"),
+    ],
+)
+def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> None:
+    with pytest.raises(LogError, match=f"log.npz: column 'x' {message}") as caught:
+        read_log(with_member(tmp_path / "log.npz", header))
+    assert len(str(caught.value)) < 400
+
+
+def test_zeros_that_fill_the_memory(tmp_path: Path) -> None:
+    """Half a gigabyte of zeros in half a megabyte."""
+    header = HEADER.replace("(50,)", "(50_000_000,)")
+    path = with_member(tmp_path / "log.npz", header, bytes(400_000_000))
+    with pytest.raises(
+        LogError, match=r"declares 400000000 bytes of values in a file of \d{6}: is truncated, damaged or"
+    ):
+        read_log(path)
+
+
+def test_damaged_members_of_an_npz(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.npz", columns(500))
+    data = bytearray(path.read_bytes())
+    data[data.rindex(columns(500)["x"][400:].tobytes())] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(LogError, match="column 'x' is truncated, damaged or not an array: BadZipFile: Bad CRC-32"):
+        read_log(path)
+
+
+# MATLAB
+
+
+def test_version_4_of_matlab(tmp_path: Path) -> None:
+    io.savemat(tmp_path / "log.mat", columns(), format="4")
+    np.testing.assert_array_equal(read_log(tmp_path / "log.mat").x_d, columns()["x_d"])
+
+
+def test_structs(tmp_path: Path) -> None:
+    io.savemat(tmp_path / "log.mat", {"rec": columns(), "name": "axis"})
+    with pytest.raises(
+        LogError, match=r"columns 't', 'x_d', 'x' are missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'"
+    ):
+        read_log(tmp_path / "log.mat")
+    names = {role: f"rec.{role}" for role in ("t", "x_d", "x")}
+    assert len(read_log(tmp_path / "log.mat", columns=names).t) == 50
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (sparse.eye(5, format="csc"), r"must be a full matrix, got c(s[cr]|oo)_"),
+        (np.zeros(9, [("a", "f8"), ("b", "f8")]), "must be a full matrix, got structs"),
+    ],
+)
+def test_mat_that_is_not_a_plain_matrix(tmp_path: Path, value: object, message: str) -> None:
+    with pytest.raises(LogError, match=f"column 'x' {message}"):
+        read_log(write(tmp_path / "log.mat", columns() | {"x": value}))
+
+
+def test_another_librarys_error_is_named(tmp_path: Path) -> None:
+    """It was "error: Error -3", as zlib calls its exception error."""
+    log = tmp_path / "log.mat"
+    io.savemat(log, {"x": np.random.default_rng(0).normal(size=500)}, do_compression=True)
+    content = log.read_bytes()
+    log.write_bytes(content[:300] + bytes(200) + content[500:])
+    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB file: zlib\.error: Error -3"):
+        read_log(log)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"x": np.full(50, np.nan)}, r"sample 1 \(the first is 1\): column 'x' must be finite, got nan"),
+        ({"x": np.zeros(49)}, r"same number of samples, got: 'x_d' has 50, 'x' has 49"),
+        ({"x": np.zeros(50) * 1j}, r"column 'x' must be real, got complex numbers \(complex128\)"),
+        ({"x": np.zeros((25, 2))}, r"column 'x' must have shape \(n,\), \(n, 1\) or \(1, n\), got \(25, 2\)"),
+        ({"x": np.zeros((5, 5, 2))}, r"column 'x' must have shape .* got \(5, 5, 2\)"),
+        ({"x": np.array(["a"] * 50)}, r"column 'x' must be numbers, got <U1"),
+    ],
+)
+def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> None:
+    path = write(tmp_path / f"log{suffix}", columns() | bad)
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+# Parquet
+
+
+def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "log.parquet", columns())
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    message = r"log.parquet: is a Parquet file, which needs the extra parquet: pip install 'hybridsep\[parquet\]'$"
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:
+    stamps = pa.array(np.datetime64("2026-03-05T10:20:30", "ns") + np.arange(50) * np.timedelta64(10**6, "ns"))
+    cents = pa.array([decimal.Decimal(f"{x:.3f}") for x in X_D])
+    axis = pa.StructArray.from_arrays([cents, pa.array([None if i == 30 else x for i, x in enumerate(X)])], ["d", "m"])
+    path = write_parquet(tmp_path / "log", {"clock": stamps, "axis": axis, "note": pa.array(["ok"] * 50)})
+    names = {"x_d": "axis.d", "x": "axis.m"}
+    log = read_log(path, columns=names, uniform=False)
+    np.testing.assert_allclose(log.x_d, np.round(X_D, 3), atol=1e-15)
+    assert np.flatnonzero(np.isnan(log.x_meas)).tolist() == [30]
+    assert log.T_s == 1e-3
+    with pytest.raises(LogError, match=r"sample 31 .*: column 'axis\.m' must be finite, got nan; missing"):
+        read_log(path, columns=names)
+    with pytest.raises(LogError, match=r"column 'note' must be numbers, got string"):
+        read_log(path, columns={**names, "x": "note"})
+
+
+def test_units_in_the_metadata_of_fields(tmp_path: Path) -> None:
+    fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("x_d", "x")]
+    pq.write_table(pa.table([X_D, X], schema=pa.schema(fields)), tmp_path / "log")
+    assert read_log(tmp_path / "log", T_s=1e-3).file_unit == "mm"
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases/logs beside the repository")
+@pytest.mark.parametrize("name", ["dur_us", "time64"])
+def test_durations_and_times_of_day(name: str) -> None:
+    """The second passes midnight."""
+    log = read_log(CASES / f"{name}.parquet")
+    assert log.T_s == 1e-3
+    np.testing.assert_allclose(log.t, 1e-3 * np.arange(6000), atol=1e-9)
+
+
+def test_a_parquet_that_fills_the_memory(tmp_path: Path) -> None:
+    """A third of a gigabyte in a few kilobytes, as a value that repeats is written once."""
+    one = pa.array(np.zeros(1_000_000))
+    table = pa.table({name: pa.chunked_array([one] * 14) for name in ("t", "x_d", "x")})
+    pq.write_table(table, tmp_path / "log")
+    with pytest.raises(LogError, match=r"declares 336000000 bytes of values in a file of \d{4,6}: "):
+        read_log(tmp_path / "log")

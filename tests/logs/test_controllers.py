@@ -1,0 +1,378 @@
+"""Logs of controllers: Siemens Capture, SINUMERIK's trace, TwinCAT Scope, LinuxCNC's halscope; rates that differ."""
+
+from __future__ import annotations
+
+import json
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from log_files import capture, columns
+from places import RECORDINGS
+from recorders import halscope_csv, halscope_pairs, trace_xml, twincat_csv
+
+from hybridsep.base.errors import LogError
+from hybridsep.logs.columns import channels
+from hybridsep.logs.formats import open_source
+from hybridsep.logs.log import open_log, read_log
+
+T = np.arange(400) * 1e-3
+X_D = np.round(np.sin(7 * T), 6)
+X = np.round(0.9 * np.sin(7 * T - 0.02), 6)
+
+# SINUMERIK
+
+SIGNALS = {
+    "nckServoDataCmdPos2ndEnc64 [u1, 7]": (0.0, 1e-3, X_D),
+    "nckServoDataActPos2ndEnc64 [u1, 7]": (0.0, 1e-3, X),
+    "measPos1 [u1, 7]": (1e-3, 2e-3, X[1::2]),
+    "nckServoDataCmdPos2ndEnc64 [u1, 3]": (0.0, 1e-3, 2 * X_D),
+    "nckServoDataActPos2ndEnc64 [u1, 3]": (0.0, 1e-3, 2 * X),
+    "aaStat [u1, 3]": (1e-3, 4e-3, np.full(99, 4.0)),
+}
+
+
+def trace(path: Path, text: str = "") -> Path:
+    path.write_text(text or trace_xml(SIGNALS))
+    return path
+
+
+def test_a_trace(tmp_path: Path) -> None:
+    path = trace(tmp_path / "log")
+    log = read_log(path)
+    np.testing.assert_allclose(log.x_d, 1e-3 * X_D, rtol=1e-15)
+    np.testing.assert_allclose(log.x_meas, 1e-3 * X, rtol=1e-15)
+    np.testing.assert_allclose(log.t, T, rtol=1e-15)
+    assert log.remarks == ("axis 7 of 7, 3 is read; axis='…' (--axis) chooses another",)
+    np.testing.assert_allclose(read_log(path, axis="3").x_d, 2e-3 * X_D, rtol=1e-15)
+    assert read_log(path, unit="deg").unit == "rad"
+    listed = {one.name: (one.n_samples, one.interval, one.role) for one in channels(open_source(path))}
+    assert listed["measPos1|7"] == (200, 2e-3, "")
+    assert listed["nckServoDataActPos2ndEnc64|7"] == (400, 1e-3, "x")
+    with pytest.raises(LogError, match=r"axis 'X1' is missing; a commanded and a measured position are there for 7, 3"):
+        read_log(path, axis="X1")
+
+
+def test_values_of_a_trace_are_held(tmp_path: Path) -> None:
+    """A record that is not there, as nothing has changed, is a sample all the same."""
+    steps = np.repeat([0.0, 1.0, 1.5, 1.5], 100)
+    signals = {"nckServoDataCmdPos1 [u1, 1]": (0.0, 1e-3, steps), "nckServoDataActPos1 [u1, 1]": (0.0, 1e-3, steps)}
+    text = trace_xml(signals)
+    assert text.count("<rec") == 4
+    reader = open_log(trace(tmp_path / "log", text))
+    assert reader.n_samples == 400
+    np.testing.assert_array_equal(np.concatenate([x_d for x_d, _ in reader.chunks(7)]), 1e-3 * steps)
+
+
+def test_the_bits_of_a_nan_are_no_value(tmp_path: Path) -> None:
+    text = trace_xml(SIGNALS).replace(f'f2="{float(X[5])!r}"', 'f2="9218868437227405313"', 1)
+    log = read_log(trace(tmp_path / "log", text))
+    assert log.x_meas[5] == log.x_meas[4]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        (
+            '<rec time="0.005000"',
+            '<rec time="0.0009"',
+            r"line \d+: time of rec must increase, got 0.0009 s after 0.004",
+        ),
+        ('<rec time="0.005000"', '<rec time="x"', r"line \d+: time of rec must be a number, got 'x'"),
+        (
+            '<rec time="0.005000" f1="',
+            '<rec time="0.005000" f1="1,0',
+            r"line \d+: f1 of rec must be a number, got .1,0",
+        ),
+        ('interval="0.001000"', 'interval="0"', r"line 6: dataSignal must have an interval above 0 s and at most"),
+        (
+            'datapointCount="400"',
+            'datapointCount="1e18"',
+            r"line 6: .* at most 100000000 points, got 0.001 s and 1e\+18",
+        ),
+        ('id="f1"', 'id=""', "line 6: dataSignal must have an id and a name"),
+        ("<traceSession", "<!DOCTYPE a [<!ENTITY b 'c'>]><traceSession", "line 2: a document type is not read"),
+        ("</traceData>", "", r"is truncated, damaged or not XML: mismatched tag: line \d+"),
+        ('encoding="utf-8"', 'encoding="nonsense"', "is truncated, damaged or not XML: unknown encoding"),
+    ],
+)
+def test_damaged_traces(tmp_path: Path, before: str, after: str, message: str) -> None:
+    text = trace_xml(SIGNALS)
+    assert before in text
+    with pytest.raises(LogError, match=message):
+        read_log(trace(tmp_path / "log", text.replace(before, after, 1)))
+
+
+def test_a_trace_without_signals(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"no signals \(traceData, dataFrame, dataSignal\) were found"):
+        read_log(trace(tmp_path / "log", trace_xml(SIGNALS).replace("<dataSignal", "<other")))
+
+
+# TwinCAT Scope
+
+SCOPE = {"x_d": (1e-3, X_D), "x": (1e-3, X)}
+
+
+@pytest.mark.parametrize("mark", ["\t", ";", ","])
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("shared", [False, True])
+def test_kinds_of_exports(tmp_path: Path, mark: str, full: bool, shared: bool) -> None:
+    text = twincat_csv(SCOPE, mark=mark, full=full, shared=shared, unit="mm (Length)")
+    (tmp_path / "log").write_text(text, encoding="utf-8-sig")
+    log = read_log(tmp_path / "log")
+    np.testing.assert_allclose(log.x_d, 1e-3 * X_D, rtol=1e-15)
+    np.testing.assert_allclose(log.x_meas, 1e-3 * X, rtol=1e-15)
+    np.testing.assert_allclose(log.t, T, rtol=1e-15, atol=1e-15)
+    assert log.file_unit == "mm"
+    listed = {one.name: (one.interval, one.unit) for one in channels(open_source(tmp_path / "log"))}
+    assert listed["x"] == (1e-3, "mm")
+
+
+def test_channels_of_one_name(tmp_path: Path) -> None:
+    text = twincat_csv({"x_d": (1e-3, X_D), "x": (1e-3, X), "other": (1e-3, X)})
+    text = text.replace("Name\tother", "Name\tx", 1)
+    (tmp_path / "log").write_text(text)
+    assert [one.name for one in channels(open_source(tmp_path / "log")) if one.unit == "m"] == [
+        "x_d",
+        "MAIN.x",
+        "MAIN.other",
+    ]
+
+
+def test_slow_channels_that_are_filled(tmp_path: Path) -> None:
+    """The export repeats time and value of a slower channel in each line: "Fill with previous value"."""
+    lines = twincat_csv({"x_d": (1e-3, X_D), "x": (2e-3, X[::2]), "y": (2e-3, X[::2])}).splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("0,0\t"))
+    for k in reversed(range(400)):
+        fast, slow = lines[at + k].split("\t")[:2], lines[at + k // 2].split("\t")[2:6]
+        lines[at + k] = "\t".join([*fast, *slow])
+    (tmp_path / "log").write_text("\n".join(lines))
+    log = read_log(tmp_path / "log", columns={"x_d": "y"})
+    assert (len(log.t), log.T_s) == (200, 2e-3)
+    np.testing.assert_array_equal(log.x_meas, X[::2])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("\n5,0\t", "\n5.5.5\t", r"line 17: column 'time' must be a number, got '5\.5\.5'"),
+        ("\n5,0\t", "\nx\t", r"line 17: column 'time' must be a number, got 'x'"),
+        (f"\n5,0\t{str(X_D[5]).replace('.', ',')}", "\n5,0\t", "line 17: column 'x_d' must be a number, got nothing"),
+        ("\nName\tx_d", "\n" * 500 + "Name\tx_d", "a row of the channels' names was expected below the head, got none"),
+        ("Name\tx_d\tName\tx", "Name\tx_d\tx\ty\tz\tv", r"line 12: a column of times before each channel, .* expected"),
+    ],
+)
+def test_damaged_exports(tmp_path: Path, before: str, after: str, message: str) -> None:
+    text = twincat_csv(SCOPE)
+    assert before in text
+    (tmp_path / "log").write_text(text.replace(before, after, 1))
+    with pytest.raises(LogError, match=message):
+        read_log(tmp_path / "log")
+
+
+def test_an_export_without_times(tmp_path: Path) -> None:
+    head = "Name\tscope\nFile\tscope.csv\nStarttime of export\t1\n\nName\tx_d\tx\n\n"
+    (tmp_path / "log").write_text(head + "1\t2\n3\t4\n")
+    with pytest.raises(LogError, match=r"line 7: a column of times .* was expected; export with timelines \(All, or"):
+        read_log(tmp_path / "log")
+    (tmp_path / "log").write_text(head + "no\tnumbers\n")
+    with pytest.raises(LogError, match="numbers were expected below the channels' names, got none"):
+        read_log(tmp_path / "log")
+
+
+# Rates that differ
+
+
+def two_rates(path: Path, kind: str) -> Path:
+    """Write a command at 1 kHz, and a position at 500 Hz, of a trace from its second sample on."""
+    if kind == "twincat":
+        path.write_text(twincat_csv({"x_d": (1e-3, X_D), "x": (2e-3, X[::2])}))
+    else:
+        path.write_text(trace_xml({"CmdPos [u1, 1]": (0.0, 1e-3, X_D), "ActPos [u1, 1]": (2e-3, 2e-3, X[2::2])}))
+    return path
+
+
+@pytest.mark.parametrize(("kind", "skipped"), [("twincat", 0), ("sinumerik", 2)])
+def test_rates_that_differ(tmp_path: Path, kind: str, skipped: int) -> None:
+    path, unit = two_rates(tmp_path / "log", kind), "m" if kind == "sinumerik" else None
+    message = r"sampled at different times: '.*' has 400 samples every 0\.001 s, '.*' has \d+ .* every 0\.002 s"
+    with pytest.raises(LogError, match=message):
+        read_log(path, unit=unit)
+    log = read_log(path, unit=unit, resample=True)
+    assert log.T_s == 2e-3
+    assert any(remark.startswith("resampled onto the times of the slower column") for remark in log.remarks)
+    np.testing.assert_allclose(log.x_d, X_D[skipped::2], atol=1e-15)
+    np.testing.assert_allclose(log.x_meas, X[skipped::2], atol=1e-15)
+
+
+def with_times(path: Path, t_d: Any, x_d: Any, t: Any, x: Any) -> Path:
+    """Write an export with these times of the command and of the position."""
+    head, _, _ = twincat_csv({"x_d": (1e-3, x_d[:1]), "x": (1e-3, x[:1])}, mark=";").partition("\n0,0;")
+    columns = zip_longest(1e3 * t_d, x_d, 1e3 * t, x, fillvalue="")
+    path.write_text(
+        head + "\n" + "".join(";".join(map(str, row)).replace(".", ",") + "\n" for row in columns) + "EOF\n"
+    )
+    return path
+
+
+def test_a_faster_measurement_is_interpolated(tmp_path: Path) -> None:
+    late = T + 0.25e-3
+    log = read_log(with_times(tmp_path / "log", T[:100:2], X_D[:100:2], late, X), resample=True)
+    np.testing.assert_allclose(log.t, T[2:100:2], rtol=1e-12)  # nothing was measured before the first
+    np.testing.assert_allclose(log.x_meas, np.interp(T[2:100:2], late, X), rtol=1e-12)
+
+
+def test_gaps_are_not_bridged(tmp_path: Path) -> None:
+    fast = np.delete(np.arange(400), range(100, 110))
+    path = with_times(tmp_path / "log", T[fast], X_D[fast], T[::2], X[::2])
+    with pytest.raises(LogError, match=r"column 'x_d' has a gap of 0\.011 at time 0\.1 and cannot be resampled"):
+        read_log(path, resample=True)
+    back = T.copy()
+    back[200] = 0.0
+    with pytest.raises(LogError, match=r"time 'time' must increase to be resampled"):
+        read_log(with_times(path, back, X_D, T[::2], X[::2]), resample=True)
+
+
+# LinuxCNC halscope
+
+HAL = columns()
+JOINTS = {
+    "joint.0.pos-cmd": HAL["x_d"],
+    "joint.0.motor-pos-cmd": HAL["x_d"],
+    "joint.0.motor-pos-fb": HAL["x"],
+    "joint.1.pos-cmd": 2 * HAL["x_d"],
+    "joint.1.pos-fb": 2 * HAL["x"],
+}
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_joints_of_halscope(tmp_path: Path, old: bool) -> None:
+    text = halscope_pairs(JOINTS, 500_000, comma=True) if old else halscope_csv(JOINTS, 500_000)
+    (tmp_path / "log").write_text(text)
+    log = read_log(tmp_path / "log", unit="mm")
+    np.testing.assert_allclose(log.x_meas, 1e-3 * HAL["x"], rtol=1e-15)
+    assert (log.T_s, len(log.t)) == (5e-4, 50)
+    assert log.remarks[0].startswith("halscope states no unit")
+    assert log.remarks[1] == "joint.0 of joint.0, joint.1 is read; axis='…' (--axis) chooses another"
+    for name in ("1", "joint.1"):
+        np.testing.assert_allclose(read_log(tmp_path / "log", axis=name, unit="mm").x_d, 2e-3 * HAL["x_d"], rtol=1e-15)
+    with pytest.raises(LogError, match=r"axis 'joint\.7' is missing; .* are there for joint\.0, joint\.1"):
+        read_log(tmp_path / "log", axis="joint.7")
+    names = {"x_d": "joint.0.pos-cmd", "x": "joint.1.pos-fb"}
+    np.testing.assert_allclose(read_log(tmp_path / "log", columns=names, unit="mm").x_meas, 2e-3 * HAL["x"], rtol=1e-15)
+
+
+def test_channels_of_halscope_that_are_off(tmp_path: Path) -> None:
+    data = {"x_d": HAL["x_d"], "x": HAL["x"], "(null)": 0 * HAL["x"]}
+    (tmp_path / "log").write_text(halscope_pairs(data))
+    assert [one.name for one in channels(open_source(tmp_path / "log"))] == ["x_d", "x", "t"]
+
+
+@pytest.mark.parametrize(
+    ("old", "change", "message"),
+    [
+        (False, ("period is 1000000", "period is 0"), "line 1: the sampling period must be a positive number of ns"),
+        (True, ("period is 1000000", "period is -5"), "line 1: the sampling period .* got -5"),
+        (True, ("x_d", "y", 3), r"line 5: values of 'x_d', 'x' in turn were expected, got 'y "),
+        (True, ("+0.9", "+0.9.", 1), r"line \d+: column 'x' must be a number, got '\+0\.9\.|names and values in turn"),
+        (False, (";0.0\n", ";\n"), r"line 5: column 'x' must be a number, got nothing; missing"),
+        (False, ("x_d;x\n", "x_d;x;y\n"), r"line 5: 3 columns were expected as in line 2, got 2"),
+    ],
+)
+def test_damaged_halscope(tmp_path: Path, old: bool, change: tuple[Any, ...], message: str) -> None:
+    data = {"x_d": 0 * HAL["x_d"], "x": 0 * HAL["x"] + (0.9 if old else 0.0)}
+    text = halscope_pairs(data) if old else halscope_csv(data)
+    before, after, *which = change
+    at = -1
+    for _ in range(which[0] if which else 1):
+        at = text.index(before, at + 1)
+    (tmp_path / "log").write_text(text[:at] + after + text[at + len(before) :])
+    with pytest.raises(LogError, match=message):
+        read_log(tmp_path / "log")
+
+
+# Siemens Capture
+
+
+def recording() -> dict[str, Any]:
+    cycles = 7.0 + np.arange(50)
+    x, zero = np.sin(cycles / 5), np.zeros(50)
+    signals = {"CYCLE": cycles, "DES_POS|1": zero, "ENC_POS|1": zero, "DES_POS|4": x, "ENC_POS|4": 0.9 * x}
+    return capture(signals, ["Cycle", "X1", "X1", "C1", "C1"])
+
+
+def test_capture(tmp_path: Path) -> None:
+    path = tmp_path / "recording"
+    path.write_text(json.dumps(recording()))
+    log = read_log(path)
+    assert (log.T_s, log.unit, log.unit_stated, len(log.t)) == (0.002, "rad", True, 50)
+    np.testing.assert_allclose(log.x_d, np.radians(np.sin((7 + np.arange(50)) / 5)))
+    assert log.remarks == ("axis C1 of X1, C1 is read; axis='…' (--axis) chooses another",)
+    assert read_log(path, axis="x1").remarks == ()
+    assert (read_log(path, axis="1").unit, read_log(path, axis="1", unit="rad").unit) == ("m", "rad")
+    with pytest.raises(LogError, match=r"axis 'Y1' is missing; DES_POS and ENC_POS are there for X1 \(1\), C1 \(4\)"):
+        read_log(path, axis="Y1")
+    np.testing.assert_array_equal(read_log(path, columns={"x": "DES_POS|4"}).x_meas, log.x_d)
+
+
+def spoiled(what: str) -> str:
+    content = recording()
+    header, payload = content["Header"], content["Payload"]
+    match what:
+        case "cycle":
+            header["CycleTimeMs"] = 0
+        case "signals":
+            header["SignalListHFData"] = {}
+        case "signal":
+            del header["SignalListHFData"][2]["Axis"]
+        case "row":
+            payload[0]["HFData"][3] = [1.0]
+        case "value":
+            payload[3]["HFData"][4][1] = "1"
+        case "rows":
+            payload[3]["HFData"] = None
+        case "payload":
+            del content["Payload"]
+        case "lost":
+            del payload[0]["HFData"][7]
+        case "huge":
+            payload[0]["HFData"][0][0] = 10**400
+        case "nan":
+            payload[0]["HFData"][1][3] = float("nan")
+        case "deep":
+            return '{"SignalListHFData"' + ":[" * 100_000
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("cycle", "Header.CycleTimeMs must be a number of milliseconds above 0, got 0"),
+        ("signals", "Header.SignalListHFData must be a list, got dict"),
+        ("signal", r"Header\.SignalListHFData\[2\] must have a Name and an Axis, got {'Name'"),
+        ("row", r"Payload\[0\]\.HFData\[3\] must have 5 values, one a signal, got 1"),
+        ("value", r"Payload\[3\]\.HFData\[4\]\[1\] must be a number, got '1'"),
+        ("rows", r"Payload\[3\]\.HFData must be a list, got NoneType"),
+        ("payload", "Payload must be a list, got NoneType"),
+        ("lost", r"sample 8 .*uniform: .* got 0\.004 s; 1 sample may be lost"),
+        ("huge", "a value is no floating-point number"),
+        ("nan", r"sample 2 \(the first is 1\): column 'DES_POS\|4' must be finite, got nan"),
+        ("deep", "is truncated, damaged or not JSON"),
+    ],
+)
+def test_refused_captures(tmp_path: Path, what: str, message: str) -> None:
+    path = tmp_path / "recording.json"
+    path.write_text(spoiled(what))
+    with pytest.raises(LogError, match=rf"recording\.json.*{message}"):
+        read_log(path)
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/data/recordings beside the repository")
+@pytest.mark.parametrize(("axis", "file"), [(None, 1), ("X1", 1), ("2", 2)])
+def test_recorded_capture(axis: str | None, file: int) -> None:
+    log, same = read_log(RECORDINGS / "cnc_a_capture.json", axis=axis), read_log(RECORDINGS / f"cnc_a_axis{file}.csv")
+    np.testing.assert_allclose(log.x_d, same.x_d, atol=1e-12)
+    np.testing.assert_allclose(log.x_meas, same.x_meas, atol=1e-12)
+    np.testing.assert_allclose(log.t, same.t, atol=1e-12)
