@@ -88,7 +88,7 @@ def settings_header() -> str:
     """Return the C header of the settings of predictor and compensator."""
     lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("TRUST", TRUST_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
     return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are hsep_word. */
+ * Whole numbers, truth values and choices are hsep_word, those that may be negative hsep_signed. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
@@ -110,6 +110,12 @@ typedef struct {{
 typedef struct {{
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 }} hsep_compensator_settings;
+
+/* Samples by which the measurement is late; 0 where it comes a sample early. */
+static inline hsep_word hsep_late(const hsep_predictor_settings *settings)
+{{
+    return settings->measurement_delay > 0 ? (hsep_word)settings->measurement_delay : 0;
+}}
 
 #endif
 """
@@ -224,10 +230,14 @@ def _number(value: Any) -> str:
     return f"{'-' * (value < 0.0)}HSEP_{'TINY' if abs(value) < 1.0 else 'HUGE'}({abs(value)!r})"
 
 
+def _c_type(parameter: Parameter) -> str:
+    return "hsep_real" if parameter.kind is float else "hsep_signed" if parameter.minimum < 0 else "hsep_word"
+
+
 def _list(name: str, settings: Mapping[str, Parameter]) -> str:
     rows: list[str] = []
     for setting, parameter in settings.items():
-        kind = "hsep_real" if parameter.kind is float else "hsep_word"
+        kind = _c_type(parameter)
         unit = "" if parameter.unit == "1" else f", {parameter.unit}"
         items = ", ".join(f"{number} {item}" for number, item in enumerate(parameter.choices))
         meaning = parameter.description.replace("·", " ") + (f": {items}" if items else unit)
@@ -238,7 +248,7 @@ def _list(name: str, settings: Mapping[str, Parameter]) -> str:
 def _ranges(name: str, settings: Mapping[str, Parameter]) -> str:
     rows = []
     for setting, parameter in settings.items():
-        kind = "hsep_real" if parameter.kind is float else "hsep_word"
+        kind = _c_type(parameter)
         usual = 0.0 if parameter.default is None else parameter.to_fmi(parameter.default)
         automatic = parameter.minimum if parameter.automatic is None else parameter.automatic
         numbers = (usual, parameter.minimum, parameter.maximum, parameter.nonzero, automatic)

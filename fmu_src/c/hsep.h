@@ -83,7 +83,7 @@ typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_D
  * It is a look-ahead buffer between interpolator and drive. Sample k brings x_d_ahead, the command r(k) that the drive
  * is to have Np samples later, and x_meas, the position measured now; after it the outputs belong to sample k + 1, with
  * x_d(k) = r(k - Np). Until r(0) arrives at the drive, the drive is at rest at start. Where the measurement is late by
- * measurement_delay samples, x_meas = x(k - measurement_delay).
+ * measurement_delay samples, x_meas = x(k - measurement_delay); with -1 a sample early, and then held for one sample.
  */
 typedef struct hsep_predictor hsep_predictor;
 

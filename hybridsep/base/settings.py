@@ -174,7 +174,8 @@ class PredictorSettings(Settings):
         none.
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
-        A compensator's predictor needs trust for it.
+        A compensator's predictor needs trust for it. −1: it comes a sample early, as under a sequential co-simulation
+        master, and is held for one sample.
     """
 
     TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "period")
@@ -242,7 +243,9 @@ class PredictorSettings(Settings):
         nonzero=1e-9,
         learned=True,
     )
-    measurement_delay: int = whole(0, 0, 10_000, "whole samples by which the measured position is late")
+    measurement_delay: int = whole(
+        0, -1, 10_000, "whole samples by which the measured position is late; −1: early, under a sequential master"
+    )
 
     @property
     def warm_up(self) -> float:
@@ -250,12 +253,25 @@ class PredictorSettings(Settings):
         automatic = 0.0 if self.trust else 0.3
         return automatic if self.t_init < 0.0 else self.t_init
 
+    @property
+    def n_late(self) -> int:
+        """Samples that are not measured yet when a window begins: the ``measurement_delay`` where it is positive."""
+        return max(0, self.measurement_delay)
+
     def check_planning(self) -> None:
         """Raise ParameterError if no compensator can plan with these settings: a late measurement needs trust."""
-        if self.measurement_delay and not self.trust:
+        if self.n_late and not self.trust:
             raise ParameterError(
                 f"measurement_delay of a compensator must be 0 with trust = false, got {self.measurement_delay}: only "
                 "the model with trust plans from a late measurement"
+            )
+
+    def check_replay(self) -> None:
+        """Raise ParameterError if no log can be replayed with these settings: a log's measurements are never early."""
+        if self.measurement_delay < 0:
+            raise ParameterError(
+                f"measurement_delay must be 0 or more to replay a log, got {self.measurement_delay}, which is for FMUs "
+                "under a sequential co-simulation master; give --measurement_delay 0"
             )
 
     def _misfits(self) -> list[str]:

@@ -39,7 +39,7 @@ def expected_errors(
         has not arrived at its end are left out.
     """
     planner = SepCompensator(HybridPredictor(model, settings), compensator)
-    discrete, Np, late = model.discretise(settings.T_s, settings.input_hold), settings.Np, settings.measurement_delay
+    discrete, Np, late = model.discretise(settings.T_s, settings.input_hold), settings.Np, settings.n_late
     for i, (x_d, x) in enumerate(recordings):
         if i:
             planner.restart(float(x_d[0]))

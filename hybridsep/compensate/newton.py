@@ -96,7 +96,7 @@ class PlanModel:
         Where the measurements end, which is the beginning of the preview unless they are late.
     state : (n_state,) array
         State of ``G_pb`` there.
-    late : (measurement_delay,) array, m
+    late : (n_late,) array, m
         Commands between there and the preview, relative to the start.
     start : float, m
     x_d, path : (n,) array, m

@@ -47,11 +47,11 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     def _initialise(self, inputs: Mapping[str, float]) -> None:
         self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
 
-    def _samples(self, name: str) -> int:
+    def _samples(self, name: str, least: int = 0) -> int:
         """Return a number of samples reported by the FMU, checked."""
         value = self.fmu.get(name)
-        if not 0 <= value <= _SAMPLES_MAX:  # NaN too
-            raise FmuError(f"{self.name}: {name} must be 0 … {_SAMPLES_MAX} samples, got {brief(value)}")
+        if not least <= value <= _SAMPLES_MAX:  # NaN too
+            raise FmuError(f"{self.name}: {name} must be {least} … {_SAMPLES_MAX} samples, got {brief(value)}")
         return int(value)
 
     def _interval(self) -> float:
@@ -79,7 +79,7 @@ class FmuController(_OpenedFmu):
         fmu = self.fmu
         self._initialise({"x_d_ahead": start, "x_meas": start})
         self.delay, self.Np, self.T_s = self._samples(self.kind.delay), self._samples("Np"), self._interval()
-        self.late = self._samples("measurement_delay") if "measurement_delay" in fmu.variables else 0
+        self.late = self._samples("measurement_delay", -1) if "measurement_delay" in fmu.variables else 0
         self._get = fmu.reader([*self.kind.outputs, self.kind.state])
         self._step = fmu.real_stepper(["x_d_ahead", "x_meas"])
 

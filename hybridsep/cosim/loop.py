@@ -3,7 +3,8 @@
 The Jacobi wiring: at ``t_k`` the drive gets the command that the controller gives it, the controller gets ``x_meas``
 and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, so ``r`` is held at its end for as many
 samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
-measured arrives so many samples later; a run has it as it was measured.
+measured arrives so many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
+steps before the controller, as under a sequential (Gauss-Seidel) master.
 """
 
 from __future__ import annotations
@@ -112,17 +113,26 @@ def cosimulate(
             raise FmuError(f"{drive.name} has T_s = {drive.T_s:g} s, but {ahead.name} has {T_s:g} s; they must agree")
         kind, n = ahead.kind, len(command) + delay
         signals, state = np.empty((n, len(kind.outputs) + 2)), np.empty(n, dtype=np.int64)
-        on_the_way, every = deque([start] * ahead.late), max(1, n // 100)
-        for k in range(n):
+        on_the_way, every, early = deque([start] * max(0, ahead.late)), max(1, n // 100), ahead.late < 0
+
+        def measured(k: int) -> tuple[float, float]:
+            """Return the true and the measured position at sample ``k``, m."""
             if disturb is not None:
                 disturb(k - delay, drive.plant)
-            outputs, state[k] = ahead.outputs()
             x, x_meas = drive.outputs()
-            if sensor is not None:
-                x_meas = sensor(k - delay, x_meas)
+            return x, x_meas if sensor is None else sensor(k - delay, x_meas)
+
+        x, x_meas = measured(0)
+        for k in range(n):
+            outputs, state[k] = ahead.outputs()
             signals[k] = *outputs, x, x_meas
-            on_the_way.append(x_meas)
+            if not early:
+                on_the_way.append(x_meas)
             drive.step(k, outputs[0], T_s)
+            if k + 1 < n:
+                x, x_meas = measured(k + 1)
+            if early:
+                on_the_way.append(x_meas)
             ahead.step(k, float(command[min(k, len(command) - 1)]), on_the_way.popleft())
             if progress is not None and (k % every == 0 or k == n - 1):
                 progress(k + 1, n)

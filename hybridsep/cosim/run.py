@@ -104,7 +104,7 @@ class Run:
     n_rejected : int
         Measurements that were missing or not plausible, as far as the controller tells.
     measurement_delay : int
-        Samples by which measurements arrived late at the controller.
+        Samples by which measurements arrived late at the controller; −1: a sample early, and it held them.
     """
 
     kind: Kind
@@ -150,7 +150,7 @@ class Run:
     @property
     def x_hold(self) -> Array:
         """Hold baseline, ``(n,)``, m."""
-        return hold(self.x_pb, self.x_meas, self.active, self.Np, late=self.measurement_delay)
+        return hold(self.x_pb, self.x_meas, self.active, self.Np, late=max(0, self.measurement_delay))
 
     @property
     def change(self) -> Array:

@@ -298,6 +298,7 @@ def _checked(predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, Array
 
 def _measured(predictor: HybridPredictor, x: ArrayLike, name: str, length: int) -> Array:
     """Return measured positions, NaN where missing; SignalError if one is missing without trust."""
+    predictor.settings.check_replay()
     measured = as_measured(x, name, length)
     if not predictor.settings.trust and np.isnan(measured).any():
         i = int(np.argmax(np.isnan(measured)))

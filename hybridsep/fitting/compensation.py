@@ -103,7 +103,7 @@ def expected_tracking(
         except SignalError:
             found[model] = None
             continue
-        firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.measurement_delay]
+        firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
         parts = [np.concatenate([e[k:] for e, k in zip(one, firsts, strict=True)]) for one in zip(*both, strict=True)]
         without, with_it = (rms(part[~np.isnan(part)]) if len(part) else math.nan for part in parts)
         found |= {"none": without, model: with_it}

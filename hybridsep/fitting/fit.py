@@ -196,6 +196,7 @@ def fit(
             "samples or more"
         )
     default = replace(settings_for(Np, T_s, "zoh"), **options.known)
+    default.check_replay()
     compensates = bool(options.drive_limits)
     files = fit_files(out, options.name, compensator=compensates, fmi=fmi)
 
@@ -267,7 +268,7 @@ def _identified(
     progress: Callable[[float], object],
 ) -> dict[str, Any]:
     """Return the identification from the training samples, as plain values, in the units of the logs."""
-    training = [in_time(*one.training, settings.measurement_delay) for one in recordings if one.n_train > 1]
+    training = [in_time(*one.training, settings.n_late) for one in recordings if one.n_train > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_train, len(one.x)) for one in recordings), strict=True))
     log = "this log" if len(logs) == 1 else "these logs"
     rests = all(np.ptp(one.x_d) == 0 for one in recordings)

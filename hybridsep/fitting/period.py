@@ -48,7 +48,7 @@ def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: Pr
     settings : PredictorSettings
         Without a period.
     """
-    late = settings.measurement_delay
+    late = settings.n_late
     training = [in_time(*one.training, late) for one in recordings if one.n_train > late + 1]
     period = residual_period(training, model, settings.T_s, settings.input_hold) if training else 0.0
     if period == 0.0 or period > PredictorSettings.parameters()["period"].maximum:

@@ -129,7 +129,7 @@ def identified_plant(model: ModalModel, settings: PredictorSettings, recordings:
     except ParameterError as error:
         return {"entries": {}, "rms": None, "rms_pb": None, "reason": str(error)}
     discrete = model.discretise(settings.T_s, settings.input_hold)
-    pieces = [_Piece(discrete, one, settings.measurement_delay) for one in recordings if len(one.x_d) > 1]
+    pieces = [_Piece(discrete, one, settings.n_late) for one in recordings if len(one.x_d) > 1]
     alone = _Disturbed(model, 0.0, 0.0, PARAMETERS["v_friction"].default)
     candidates = [alone, *_refined(alone, settings, pieces)]
     errors = [_rms_of(settings, one, pieces, "choosing") for one in candidates]

@@ -323,7 +323,7 @@ def replay(
             )
         )
         done += len(recording.x)
-    return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.measurement_delay)
+    return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.n_late)
 
 
 @dataclass(frozen=True)
@@ -434,7 +434,7 @@ def replay_log(
         return LogReplay(scores, first[0], rows)
     log = opened if isinstance(opened, Log) else opened.read()
     found = backtest(predictor, log.x_d, log.x_meas, on_batch=on_batch)
-    delay = predictor.settings.measurement_delay
+    delay = predictor.settings.n_late
     judged = Replay((Recording(log.x_d, log.x_meas, 0),), (found,), predictor.Np, delay)
     judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)

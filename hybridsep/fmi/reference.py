@@ -118,7 +118,7 @@ def _look_ahead_run(
     least = _COMPENSATED_SAMPLES if compensates else _SAMPLES
     warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))
     n = min(max(least, 3 * settings.Np + warm_up), _SAMPLES_MAX)
-    on_the_way = deque([0.0] * settings.measurement_delay)
+    on_the_way = deque([0.0] * settings.n_late)
     rows: list[Row] = []
     for x_d_ahead in _command(machine, n + 1).tolist():
         outputs = model.outputs()

@@ -98,6 +98,8 @@ class LiveCore:
         controller.initialise(first.x_d)
         self.T_s, self.Np = controller.T_s, controller.Np
         self._ahead, self._late = first.ahead, controller.late
+        if self._late < 0:
+            raise FmuError(f"{controller.name}: measurement_delay must be 0 or more live; give --measurement_delay 0")
         self.delay = 0 if first.ahead else self.Np
         shares = {found[1]: name for name in controller.fmu.variables if (found := _SHARE.fullmatch(name))}
         self.experts = tuple(shares)

@@ -70,7 +70,8 @@ class LookAhead:
         warm_up = self.predictor.settings.warm_up if t_init is None else t_init
         check_position("the start value of x_d_ahead", start)
         self.start = start
-        late = self.predictor.settings.measurement_delay
+        late = self.predictor.settings.n_late
+        self._next = start  # where measurements come a sample early, that of the next sample
         self._first_scored = self._first_compared + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(4)
         self._residual = 0.0  # of the last sample measured, as published; 0 until one after the first fill is measured
@@ -173,7 +174,7 @@ class LookAhead:
         x_d_ahead : float, m
             ``r(k)``, the command for ``delay`` samples later.
         x_meas : float, m
-            ``x(k)``, the position measured now.
+            ``x(k)``, the position measured now; with a ``measurement_delay`` of −1 ``x(k + 1)``.
 
         Raises
         ------
@@ -182,6 +183,8 @@ class LookAhead:
             every later sample is refused, too.
         """
         self.check(x_d_ahead, x_meas)
+        if self.predictor.settings.measurement_delay < 0:
+            x_meas, self._next = self._next, x_meas
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
         if self.k >= self._first_compared and not math.isnan(x_meas):
             self._residual = float(x_meas - self._compared[1, self.k % self.Np])
@@ -218,6 +221,7 @@ class LookAhead:
         arrays = {
             "sums": self._sums,
             "residual": np.array([self._residual]),
+            "next": np.array([self._next]),
             "ahead": self._ahead,
             "measured": self._measured,
             "compared": self._compared,
@@ -252,12 +256,15 @@ class LookAhead:
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 4))
         look_ahead._residual = float(saved.array("residual", 1)[0])
-        late = look_ahead.predictor.settings.measurement_delay
+        late = look_ahead.predictor.settings.n_late
         look_ahead._compared = saved.array("compared", 4, late + Np)
         look_ahead._ahead = saved.array("ahead", look_ahead.delay)
         look_ahead._measured = saved.array("measured", Np, finite=not look_ahead.may_miss)
+        coming = saved.array("next", 1, finite=not look_ahead.may_miss)
+        look_ahead._next = float(coming[0])
         with saved.consistent():
             as_measured(look_ahead._measured, "measured")
+            as_measured(coming, "next")
         look_ahead.window = PublishedWindow(
             **{name: saved.array(name, Np) for name in PublishedWindow.SIGNALS},
             state=saved.whole("state"),
@@ -272,7 +279,7 @@ class LookAhead:
     @property
     def _first_compared(self) -> int:
         """First sample that is compared: with what was published behind the first fill, as it was measured."""
-        return self.delay + self.predictor.settings.measurement_delay
+        return self.delay + self.predictor.settings.n_late
 
     def _begin_window(self) -> None:
         """Plan the next window; if it diverges, outputs keep the last one and later samples are refused."""

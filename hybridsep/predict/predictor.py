@@ -53,7 +53,7 @@ class PredictorState:
         Initial position; None until it is known. All other positions are relative to it.
     physics : (n_state,) array, m
         State of ``G_pb`` behind the measured samples.
-    late : (measurement_delay,) array, m
+    late : (n_late,) array, m
         Commands that are predicted and not measured yet.
     residual : PaperModel or TrustedModel
     uncertainty : Uncertainty
@@ -121,7 +121,7 @@ class HybridPredictor:
             if not callable(one):
                 raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
         residual = residual_model.init(settings, self.discrete, self.disturbances)
-        late, uncertainty = np.zeros(settings.measurement_delay), Uncertainty.init(first_variance(settings))
+        late, uncertainty = np.zeros(settings.n_late), Uncertainty.init(first_variance(settings))
         self.state = PredictorState(0, 0, None, self.discrete.rest(), late, residual, uncertainty)
         self.restart(start, t_init=settings.warm_up)
 
@@ -137,7 +137,7 @@ class HybridPredictor:
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
         n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
-        residual, late = residual_model.restart(self.state.residual), np.zeros(self.settings.measurement_delay)
+        residual, late = residual_model.restart(self.state.residual), np.zeros(self.settings.n_late)
         physics = self.discrete.rest()
         self.state = PredictorState(0, n_init, rest, physics, late, residual, self.state.uncertainty)
         self.pending: PredictedWindow | None = None

@@ -100,7 +100,7 @@ def test_parameters_out_of_their_ranges_are_refused(kind: str) -> None:
         most, whole = parameter.maximum, parameter.kind is not float
         wrong = [most + 1 if whole else math.nextafter(most, math.inf)]
         if whole:
-            wrong += [parameter.minimum - 1] if parameter.minimum > 0 else [2**64 - 1]
+            wrong += [parameter.minimum - 1] if parameter.minimum else [2**64 - 1]
         else:
             beneath = math.nextafter(parameter.minimum, -math.inf)
             wrong += [math.nan, math.inf, -math.inf, beneath, *([0.5 * parameter.nonzero] if parameter.nonzero else [])]

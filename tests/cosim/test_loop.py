@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -59,6 +59,18 @@ def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> Non
     fmu = cosimulate(python_fmu("HybridPredictorPy"), MACHINE.new_plant(), R, controller_values=values)
     np.testing.assert_array_equal(fmu.x_h, run.x_h)
     assert fmu.measurement_delay == late
+
+
+@pytest.mark.parametrize("section", ["predictor", "compensator"])
+def test_a_drive_that_steps_first_makes_the_same_run(section: Literal["predictor", "compensator"]) -> None:
+    runs = []
+    for delay in (0, -1):
+        machine = MACHINE.changed(section, {"measurement_delay": delay})
+        made = machine.new_predictor() if section == "predictor" else machine.new_compensator()
+        runs.append(cosimulate(made, MACHINE.new_plant(), R))
+    for name in ("x_d", "x_dm", "x", "x_pb", "x_h", "state"):
+        np.testing.assert_array_equal(getattr(runs[1], name), getattr(runs[0], name), err_msg=name)
+    assert runs[1].summary() == runs[0].summary()
 
 
 @pytest.mark.slow

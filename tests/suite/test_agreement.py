@@ -8,15 +8,17 @@ agrees to the last bit, over the first third of each loop.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from driving import T_S, TIGHT, Loop, closed_loop, replay
+from driving import SHORT, T_S, TIGHT, Loop, closed_loop, replay
 from library_stream import PlantStream
 from staircase_data import commanded
 from stream import (
     COMPENSATOR,
+    LOOK_AHEADS,
     OUTPUTS,
     PLANTS,
     PREDICTOR,
@@ -260,6 +262,23 @@ def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamM
     delay = int(values["measurement_delay"])
     start = 0.1 if "spacing" in values else 0.0
     assert_agreement(new_stream, 800, values, 1e-9, start=start, delay=delay)
+
+
+def at_rest_first(k: int, x_meas: float, last: float) -> float:
+    return x_meas if k else last
+
+
+@on_all(LOOK_AHEADS)
+@pytest.mark.parametrize("trust", [True, False])
+def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker, trust: bool) -> None:
+    """As a sequential master carries it; the outputs are those of measurements in time, bit for bit."""
+    values: dict[str, Value] = SHORT[kind_of(new_stream.model)] | {"trust": trust}
+    loop = closed_loop(new_stream.model, 300, values, sensor=at_rest_first)
+    early = replace(loop, x=np.append(loop.x[1:], loop.x[-1]))
+    in_time, held = new_stream(), new_stream()
+    in_time.initialise(loop.values)
+    held.initialise({**loop.values, "measurement_delay": -1})
+    np.testing.assert_array_equal(replay(held, early), replay(in_time, loop))
 
 
 @pytest.mark.slow

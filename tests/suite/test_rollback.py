@@ -66,8 +66,9 @@ def test_rollback_is_exact(new_stream: StreamMaker) -> None:
 
 
 @on_adapters(LOOK_AHEADS)
-def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker) -> None:
-    assert_exact(new_stream, SHORT[new_stream.model])
+@pytest.mark.parametrize("measurement_delay", [0, -1])
+def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker, measurement_delay: int) -> None:
+    assert_exact(new_stream, SHORT[new_stream.model] | {"measurement_delay": measurement_delay})
 
 
 @on_adapters((PREDICTOR,))

@@ -15,6 +15,7 @@ import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
@@ -245,12 +246,17 @@ def load_tbb() -> None:
             ctypes.CDLL(str(library.locate()))
 
 
-def with_fmucontainer(system: ClosedSystem, folder: Path) -> Array:
-    """The fmu-manipulation-toolbox's container, an importer in C that is an FMU itself."""
+def with_fmucontainer(system: ClosedSystem, folder: Path, *, sequential: bool = False) -> Array:
+    """The fmu-manipulation-toolbox's container, an importer in C that is an FMU itself.
+
+    ``sequential``: Gauss-Seidel, the drive first, so that its measurement reaches the look-ahead a sample early.
+    """
     fmu_of = {name: f"{model}.fmu" for name, model in system.components.items()}
     description = {
         "name": "container.fmu",
-        "fmu": list(fmu_of.values()),
+        "fmu": list(fmu_of.values())[:: -1 if sequential else 1],
+        "sequential": sequential,
+        "start": [[fmu_of[system.look_ahead], "measurement_delay", -1]] if sequential else [],
         "link": [[fmu_of[a], output, fmu_of[b], name] for a, output, b, name in system.connections],
         "output": [[fmu_of[component], name, name] for component, name in system.observed],
         "step_size": STEP,
@@ -271,6 +277,10 @@ IMPORTERS: dict[str, tuple[Callable[[ClosedSystem, Path], Array], set[tuple[str,
     "fmpy SSP": (with_fmpy_ssp, None),
     "libcosim": (with_libcosim, _DESKTOP),  # libcosimpy 0.0.6 has wheels for these
     "ecos": (with_ecos, _DESKTOP),  # ecospy 0.7.2's wheel is for any platform, its libraries are for these
+    "fmucontainer -sequential": (
+        partial(with_fmucontainer, sequential=True),
+        _DESKTOP | {("Darwin", "arm64")},
+    ),
     "fmucontainer": (with_fmucontainer, _DESKTOP | {("Darwin", "arm64")}),  # likewise fmu-manipulation-toolbox 2.0's
 }
 """Importers: function that runs the system, and platforms with a library; None for all."""

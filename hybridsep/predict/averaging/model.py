@@ -343,7 +343,7 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     command_step, command_square = step, learned.scales[OF_COMMAND].largest_square
     if path is None and settings.Np > 1 and state.command_square > 0.0:
         # A controller solves for the command's expert one sample before the window, as far as its commands are known.
-        known = window.x_d[: settings.measurement_delay + settings.Np - 1]
+        known = window.x_d[: settings.n_late + settings.Np - 1]
         early = max(learned.largest_step, static.peak_velocity(state.run.static, known) * T_s)
         if early > 0.0 or step == 0.0:
             command_step, command_square = early, state.command_square
@@ -562,7 +562,7 @@ def _judged(
 ) -> TrustedModel:
     """Judge the experts and their stack by the measurement of their window."""
     learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
-    n, late = len(accepted), settings.measurement_delay
+    n, late = len(accepted), settings.n_late
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     stack = learned.stack
     if published.any():

@@ -36,12 +36,12 @@ HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert)
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)parameters->settings->measurement_delay;
+    const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)hsep_late(parameters->settings);
     const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings->p;
     const hsep_real filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->n;
-    self->preview = self->n - parameters->settings->measurement_delay;
+    self->preview = self->n - hsep_late(parameters->settings);
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_LINEARISED_EXPERTS);

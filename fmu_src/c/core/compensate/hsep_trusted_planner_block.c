@@ -16,7 +16,7 @@ static hsep_real trusted_planner_lay_out(
     const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;
-    self->late = parameters->settings->measurement_delay;
+    self->late = hsep_late(parameters->settings);
     self->p = parameters->settings->p;
     self->Np = planner->Np;
     self->n = n;

@@ -91,7 +91,7 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
     if (settings->preview < predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END) {
         return "preview";
     }
-    return predictor->measurement_delay != 0 && !parameters->trust.trust ? "measurement_delay" : NULL;
+    return predictor->measurement_delay > 0 && !parameters->trust.trust ? "measurement_delay" : NULL;
 }
 
 /* Warm-up, s. */

@@ -15,7 +15,7 @@
     RANGE(hsep_real, T_s, 0.001, 1e-05, 1.0, 0.0, 1e-05, 1) \
     RANGE(hsep_real, t_init, -1.0, 0.0, 1000000.0, 0.0, -1.0, 0) \
     RANGE(hsep_word, input_hold, 0.0, 0.0, 1.0, 0.0, 0.0, 1) \
-    RANGE(hsep_word, measurement_delay, 0.0, 0.0, 10000.0, 0.0, 0.0, 0) \
+    RANGE(hsep_signed, measurement_delay, 0.0, -1.0, 10000.0, 0.0, -1.0, 0) \
     RANGE(hsep_word, dead_time, 0.0, 0.0, 100000.0, 0.0, 0.0, 1)
 
 #define HSEP_TRUST_RANGES(RANGE) \

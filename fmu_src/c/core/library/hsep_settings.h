@@ -1,5 +1,5 @@
 /* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are hsep_word. */
+ * Whole numbers, truth values and choices are hsep_word, those that may be negative hsep_signed. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
@@ -21,8 +21,8 @@
     SETTING(hsep_real, t_init) \
     /* how the command x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
     SETTING(hsep_word, input_hold) \
-    /* whole samples by which the measured position is late */ \
-    SETTING(hsep_word, measurement_delay) \
+    /* whole samples by which the measured position is late; −1: early, under a sequential master */ \
+    SETTING(hsep_signed, measurement_delay) \
     /* whole samples of dead time in the physics model */ \
     SETTING(hsep_word, dead_time)
 
@@ -73,5 +73,11 @@ typedef struct {
 typedef struct {
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 } hsep_compensator_settings;
+
+/* Samples by which the measurement is late; 0 where it comes a sample early. */
+static inline hsep_word hsep_late(const hsep_predictor_settings *settings)
+{
+    return settings->measurement_delay > 0 ? (hsep_word)settings->measurement_delay : 0;
+}
 
 #endif

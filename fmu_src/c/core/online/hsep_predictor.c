@@ -24,9 +24,11 @@ static int predictor_settled(hsep_predictor *self)
     return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
 }
 
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured)
 {
+    const hsep_real x_meas = self->early ? self->next : measured;
     const hsep_word i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
+    self->next = measured;
     /* x_meas was measured late samples ago. */
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];

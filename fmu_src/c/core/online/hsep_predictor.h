@@ -7,6 +7,7 @@
  *
  * Where the measurement is late by some samples, x_meas = x(k - late): the late samples before a window, which are not
  * measured yet, are predicted with it: n = Np + late samples. The first Np of these are learned when the window ends.
+ * A measurement that comes a sample early, x_meas = x(k + 1), is held for one sample.
  *
  * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
@@ -56,6 +57,8 @@ struct hsep_predictor {
     hsep_real sum_hold;             /* m2, the same if the last residual measured before each window were held */
     hsep_real residual;   /* m, of the last sample measured, as published; 0 before any behind the first fill */
     hsep_real held;       /* m, that before the window */
+    hsep_word early;      /* whether measurements come a sample early */
+    hsep_real next;       /* m, then the measurement of the next sample; NaN if it is missing */
     hsep_word divergence; /* hsep_divergence of the first window that diverged; latched */
     /* Offsets in words from the beginning of the struct */
     hsep_word ahead;    /* (preview,) m, ring of the commands that came last */
@@ -73,7 +76,7 @@ struct hsep_predictor {
     hsep_word motion; /* the motion before the run; with trust, alone */
 };
 
-HSEP_ASSERT_WORDS(hsep_predictor, 33);
+HSEP_ASSERT_WORDS(hsep_predictor, 35);
 
 HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */

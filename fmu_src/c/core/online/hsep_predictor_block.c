@@ -29,7 +29,7 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .trust = &parameters->trust,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .n = parameters->preview + parameters->settings.measurement_delay,
+        .n = parameters->preview + hsep_late(&parameters->settings),
         .planned = parameters->planned};
 }
 
@@ -49,12 +49,13 @@ static hsep_word predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
-    const hsep_real late = (hsep_real)parameters->settings.measurement_delay, n = Np + late;
+    const hsep_real late = (hsep_real)hsep_late(&parameters->settings), n = Np + late;
     const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
     hsep_real end = HSEP_WORDS(hsep_predictor);
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     self->Np = parameters->settings.Np;
-    self->late = parameters->settings.measurement_delay;
+    self->late = hsep_late(&parameters->settings);
+    self->early = parameters->settings.measurement_delay < 0;
     self->n = self->Np + self->late;
     self->preview = parameters->preview;
     self->p = parameters->settings.p;
@@ -87,7 +88,7 @@ HSEP_API void hsep_predictor_block_init(
 {
     memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
     (void)predictor_lay_out(self, parameters);
-    self->start = start;
+    self->start = self->next = start;
     self->n_published = self->n_physics = self->Np;            /* the first fill is not predicted */
     for (hsep_word i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
         hsep_at(self, 0)[i] = start;
@@ -121,7 +122,9 @@ HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
     const hsep_real residuals[2] = {got.residual, got.held};
-    sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX);
+    const int missing = isnan(got.next) && parameters->trust.trust;
+    sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX) &&
+            (missing || hsep_within(&got.next, 1, HSEP_PREDICTION_MAX));
     for (int i = 0; i < 4; i++) {
         sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
     }

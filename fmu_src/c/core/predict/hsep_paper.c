@@ -16,7 +16,7 @@ static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *
     hsep_real end = HSEP_WORDS(hsep_paper);
     self->p = settings->p;
     self->q = settings->q;
-    self->n = settings->Np + settings->measurement_delay;
+    self->n = settings->Np + hsep_late(settings);
     self->features = 2 + settings->q + settings->p;
     self->weights = hsep_take(&end, (hsep_real)self->features);
     self->regression = hsep_take_block(&end, hsep_regression_size(self->features));

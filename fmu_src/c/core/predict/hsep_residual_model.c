@@ -23,7 +23,7 @@ static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual
 {
     hsep_real end = HSEP_WORDS(hsep_residual_model);
     self->Np = parameters->settings->Np;
-    self->late = parameters->settings->measurement_delay;
+    self->late = hsep_late(parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
     self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));

@@ -51,7 +51,7 @@ static hsep_real trusted_lay_out(hsep_trusted *self, const hsep_residual_paramet
     self->n = parameters->n;
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
-    self->late = settings->measurement_delay;
+    self->late = hsep_late(settings);
     self->early = self->Np - (self->Np / 2 < HSEP_AVERAGING_AHEAD ? self->Np / 2 : HSEP_AVERAGING_AHEAD);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
