@@ -137,7 +137,7 @@ def _jobs_of(
     fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
 ) -> list[Job]:
     """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
-    from ..fmi.archive import fmu_names
+    from ..fmi.archive import fmu_name, fmu_names
     from ..fmi.libraries import check_available
     from ..machines.machine import load_machine, machine_names
 
@@ -162,7 +162,8 @@ def _jobs_of(
         raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
     if flavour == "native":
         check_available(targets or ("host",))
-    return [job for job in jobs if not fmus or job[1] in fmus]
+    # with both versions a name stands for its twin of FMI 3.0, too
+    return [job for job in jobs if not fmus or {job[1], fmu_name(job[2], job[0].name, flavour)} & set(fmus)]
 
 
 def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:

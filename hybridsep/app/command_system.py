@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..base.data_files import DEFAULT_MACHINE
+from ..base.settings import PARAMETERS, check
 from .options import (
     TRAJECTORIES,
     ForceOption,
@@ -26,9 +27,12 @@ __all__ = ["system"]
 def system(
     machine: MachineOption = DEFAULT_MACHINE,
     compensate: Annotated[
-        bool,
-        typer.Option("--compensate", help="A SepCompensator modifies the command; else a HybridPredictor predicts."),
-    ] = False,
+        str | None,
+        typer.Option(
+            help=f"{PARAMETERS['compensate'].help}. A SepCompensator modifies the command; if left out, a "
+            "HybridPredictor only predicts."
+        ),
+    ] = None,
     trajectory: TrajectoryOption = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
@@ -56,6 +60,8 @@ def system(
     from .tables import console, print_json
 
     axis = load_machine(machine)
+    if compensate is not None:
+        check("compensate", compensate, label="--compensate")
     trajectory = trajectory or default_trajectory(machine)
     out = out or Path(f"{axis.name}.ssp")
     check_system(axis, compensate=compensate, ssp=ssp)

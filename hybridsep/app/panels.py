@@ -50,7 +50,10 @@ EXAMPLES = {
         "hybridsep cosim -m my_axis/machine.toml --compensate hybrid",
         "hybridsep cosim --trajectory moves.csv --compensate off --figure run.png",
     ),
-    "system": ("hybridsep system -m my_axis/machine.toml --compensate", "hybridsep system --ssp 2 --target host"),
+    "system": (
+        "hybridsep system -m my_axis/machine.toml --compensate hybrid",
+        "hybridsep system --ssp 2 --target host",
+    ),
     "backtest": (
         "hybridsep backtest my_axis.csv -m my_axis/machine.toml",
         "hybridsep backtest my_axis.csv -m my_axis/machine.toml --figure errors.png --save trained.state",

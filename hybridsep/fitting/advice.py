@@ -222,7 +222,7 @@ def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> l
             f"cosim -m {file} --compensate off",
             f"cosim -m {file} --compensate hybrid{warm}",
         )
-        step("the same as one file for tools that read SSP", f"system -m {file} --compensate{warm}")
+        step("the same as one file for tools that read SSP", f"system -m {file} --compensate hybrid{warm}")
     else:
         step("prediction, on the identified model: to try with, results are optimistic", f"cosim -m {file}")
         step("the same as one file for tools that read SSP", f"system -m {file}")

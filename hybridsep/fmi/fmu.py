@@ -58,14 +58,23 @@ class Fmu:
         trained: HybridPredictor | None = None,
         origin: Mapping[str, Any] | None = None,
         windows: bool = True,
+        rest: float = 0.0,
     ) -> Fmu:
         """Return an FMU of a machine; arguments as the attributes, and as :func:`table_of`."""
-        table = table_of(machine, model, name, samples=samples is not None, warm=trained is not None, windows=windows)
+        built_in = {"samples": samples is not None, "warm": trained is not None}
+        table = table_of(machine, model, name, **built_in, windows=windows, rest=rest)
         return cls(machine, table, fmi, samples, trained, origin)
 
 
 def table_of(
-    machine: Machine, model: str, name: str, *, samples: bool = False, warm: bool = False, windows: bool = True
+    machine: Machine,
+    model: str,
+    name: str,
+    *,
+    samples: bool = False,
+    warm: bool = False,
+    windows: bool = True,
+    rest: float = 0.0,
 ) -> FmuTable:
     """Return the table of a machine's FMU.
 
@@ -82,13 +91,15 @@ def table_of(
         Whether a look-ahead starts with trained weights, and so without a warm-up.
     windows : bool
         Whether a HybridPredictor shows the samples of its window.
+    rest : float, m
+        Position where the axis is at rest.
     """
     parameters, modes = _starts(machine, model)
     if samples:
         parameters["trajectory"] = SAMPLES_TRAJECTORY
     if warm:
         parameters["t_init"] = 0.0
-    return FmuTable(model, name, parameters, modes, machine.unit, windows or model != "HybridPredictor")
+    return FmuTable(model, name, parameters, modes, machine.unit, windows or model != "HybridPredictor", rest)
 
 
 def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[str, float], ...]]:

@@ -38,6 +38,8 @@ class FmuTable:
         Of positions.
     windows : bool
         Whether a HybridPredictor shows the samples of its window.
+    rest : float, m
+        Start value of the positions that enter: where the axis is at rest.
     """
 
     model: str
@@ -46,15 +48,16 @@ class FmuTable:
     modes: tuple[Mapping[str, float], ...] = ()
     unit: str = "m"
     windows: bool = True
+    rest: float = 0.0
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> FmuTable:
         """Return the table that :meth:`as_json` wrote."""
-        more = {key: content[key] for key in ("unit", "windows") if key in content}
+        more = {key: content[key] for key in ("unit", "windows", "rest") if key in content}
         return cls(content["model"], content["name"], content["parameters"], tuple(content["modes"]), **more)
 
     def as_json(self) -> dict[str, object]:
-        """Return plain values; unit and windows where they are not the usual ones."""
+        """Return plain values; unit, windows and rest where they are not the usual ones."""
         content: dict[str, object] = {
             "model": self.model,
             "name": self.name,
@@ -63,6 +66,8 @@ class FmuTable:
         }
         if not self.windows:
             content["windows"] = False
+        if self.rest != 0.0:
+            content["rest"] = self.rest
         return {**content, "unit": self.unit} if self.is_angular else content
 
     @property
@@ -81,6 +86,9 @@ class FmuTable:
         table = MODELS[self.model](self.parameters, self.modes)
         if not self.windows:
             table = [variable for variable in table if variable.causality != "local"]
+        table = [
+            replace(variable, start=self.rest) if variable.causality == "input" else variable for variable in table
+        ]
         return tuple(map(_angular, table) if self.is_angular else table)
 
     @cached_property

@@ -104,16 +104,14 @@ def build_description(name: str, fmi: str = FMI_VERSIONS[0]) -> bytes:
     name : str
         Model identifier.
     fmi : {"2", "3"}
-        Version of FMI; 3.0's headers put the identifier before the functions' names unless a definition says not to.
+        Version of FMI, whose headers put the identifier before the functions' names unless a definition says not to.
     """
     root = template("buildDescription.xml")
     root[0].set("modelIdentifier", name)
-    if fmi == "3":
-        meaning = (
-            "for a shared library: the FMI functions have their plain names; left out to link FMUs into one program"
-        )
-        attributes = {"name": "FMI3_OVERRIDE_FUNCTION_PREFIX", "value": "1", "optional": "true"}
-        ET.SubElement(root[0][0], "PreprocessorDefinition", attributes, description=meaning)
+    meaning = "for a shared library: the FMI functions have their plain names; left out to link FMUs into one program"
+    plain = {"2": ("FMI2_FUNCTION_PREFIX", ""), "3": ("FMI3_OVERRIDE_FUNCTION_PREFIX", "1")}[fmi]
+    attributes = dict(zip(("name", "value"), plain, strict=True)) | {"optional": "true", "description": meaning}
+    ET.SubElement(root[0][0], "PreprocessorDefinition", attributes)
     return document(root)
 
 

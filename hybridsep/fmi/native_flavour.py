@@ -46,12 +46,12 @@ _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 _DEPENDENCIES = """\
 What a platform must have besides the FMU:
 
-Linux, x86-64 and ARM64   the C library and libm, glibc 2.17 or newer
+Linux, x86-64 and ARM64   the C library with libm and libdl, glibc 2.17 or newer
 Windows, 64 and 32 bit    the Universal C Runtime: part of Windows 10 and newer, an update of older ones (KB2999226)
 macOS, both kinds         macOS 11 or newer
 
 It starts no other program, opens no connection, and reads no file but its own resources.
-Elsewhere compile sources/all.c (documentation/index.html), which needs a C99 compiler and libm.
+Elsewhere compile sources/all.c (documentation/index.html), which needs a C99 compiler, libm and on Linux libdl.
 """
 _RUNTIME_LICENSES = """\
 Binaries that Zig compiled have parts of its run-time library:

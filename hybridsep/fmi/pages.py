@@ -26,8 +26,8 @@ _PLAIN_NAMES = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_P
 _REFERENCE_NOTE = """\
 The reference experiment of {name}, in extra/org.fmi-standard.fmi-ls-ref:
 
-fmi-ls-manifest.xml   the files with their roles and checksums (FMI-LS-REF 1.0.0-alpha.1)
-reference.exp         times, inputs and outputs (the Modelica Association's format of experiments)
+fmi-ls-manifest.xml   the files with their roles (FMI-LS-REF 1.0.0-beta.1)
+reference.exp         times, inputs and outputs (MA-HS-Experiments, the Modelica Association's format)
 {inputs}{name}_ref.csv   outputs at every communication point
 {name}_ref.opt   the times again, as FMI's cross-check had them
 

@@ -1,14 +1,13 @@
 """Reference experiment of an FMU as FMI's layered standard LS-REF has it: ``extra/org.fmi-standard.fmi-ls-ref/``.
 
-The manifest names the files beside the model and what each is for, as fmi-ls-ref 1.0.0-alpha.1 has it. The experiment
-is one of the Modelica Association's format of experiments (ma-hs-experiments), to which fmi-ls-ref leaves it: times,
-inputs and expected outputs. Neither is released yet; both are written as their schemas are.
+The manifest names the files beside the model and what each is for, as fmi-ls-ref 1.0.0-beta.1 has it. The experiment
+is one of the Modelica Association's format of experiments (MA-HS-Experiments), to which fmi-ls-ref leaves it: times,
+inputs and expected outputs. Both are written as their schemas are.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
 from xml.etree import ElementTree as ET
 
@@ -27,7 +26,7 @@ AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}
 _LAYER = "http://fmi-standard.org/fmi-ls-manifest"
 _NAMED = {
     "name": "org.fmi-standard.fmi-ls-ref",
-    "version": "1.0.0-alpha.1",
+    "version": "1.0.0-beta.1",
     "description": "Layered Standard providing information on related files included in an FMU.",
 }
 _ELSEWHERE = {
@@ -66,22 +65,16 @@ def experiment(name: str, model: str, options: Mapping[str, float], *, inputs: b
     return document(root)
 
 
-def manifest(files: Mapping[str, bytes]) -> bytes:
-    """Return the manifest of an FMU.
-
-    Parameters
-    ----------
-    files : mapping
-        Archive name → content, of the whole archive but the manifest.
-    """
+def manifest(files: Collection[str]) -> bytes:
+    """Return the manifest of an FMU with files of these archive names."""
     ET.register_namespace("fmi-ls", _LAYER)
     root = ET.Element("fmiReferences", {f"{{{_LAYER}}}fmi-ls-{key}": text for key, text in _NAMED.items()})
     for file in sorted(files):
         place = PurePosixPath(file)
         if str(place.parent) == RELATED_FOLDER:
-            _add(root, files[file], place.name, *_own(place.name))
+            _add(root, place.name, *_own(place.name))
         elif file in _ELSEWHERE:
-            _add(root, files[file], f"../{place.parent.name}/{place.name}", *_ELSEWHERE[file])
+            _add(root, f"../{place.parent.name}/{place.name}", *_ELSEWHERE[file])
     return document(root)
 
 
@@ -96,7 +89,5 @@ def _own(file: str) -> tuple[str, str, str]:
     return "text/plain", "configuration", "times of the reference experiment, as FMI's cross-check had them"
 
 
-def _add(root: ET.Element, content: bytes, source: str, kind: str, role: str, description: str) -> None:
-    attributes = {"type": kind, "source": source, "role": role, "description": description}
-    checksum = {"checksum": hashlib.sha3_256(content).hexdigest(), "checksumType": "SHA3-256"}
-    ET.SubElement(root, "Related", attributes | checksum)
+def _add(root: ET.Element, source: str, kind: str, role: str, description: str) -> None:
+    ET.SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": description})

@@ -23,13 +23,13 @@ from .warm_start import load_trained
 __all__ = ["build_system", "check_system"]
 
 
-def check_system(machine: Machine, *, compensate: bool, ssp: str = SSP_VERSIONS[0]) -> None:
+def check_system(machine: Machine, *, compensate: str | None, ssp: str = SSP_VERSIONS[0]) -> None:
     """Check the version of SSP, and that a machine has a plant and, to compensate, drive limits; FmuError if not."""
     if ssp not in SSP_VERSIONS:
         raise FmuError(f"the version of SSP must be one of {', '.join(SSP_VERSIONS)}, got {ssp!r}")
     if machine.plant is None:
         raise FmuError(f"machine {machine.name} has no [plant] section, which a system needs for its drive")
-    if compensate and machine.drive_limits is None:
+    if compensate is not None and machine.drive_limits is None:
         raise FmuError(f"machine {machine.name} has no [drive_limits], which a compensator must keep; add them")
 
 
@@ -38,7 +38,7 @@ def build_system(
     path: str | Path,
     command: ArrayLike,
     *,
-    compensate: bool = False,
+    compensate: str | None = None,
     targets: Sequence[str] | None = None,
     weights: str | Path | None = None,
     ssp: str = SSP_VERSIONS[0],
@@ -53,9 +53,10 @@ def build_system(
     path : str or Path
         The archive.
     command : (n,) array_like, m
-        Commanded positions at the machine's ``T_s``, which the system's ReferenceTrajectory plays.
-    compensate : bool
-        Whether a SepCompensator modifies the command; else a HybridPredictor only predicts.
+        Commanded positions at the machine's ``T_s``, which the system's ReferenceTrajectory plays; all FMUs start at
+        the first of them.
+    compensate : {"off", "physics", "hybrid"}, optional
+        Best model with which a SepCompensator modifies the command; if left out a HybridPredictor only predicts.
     targets, weights
         As in :func:`hybridsep.fmi.archive.build_fmu`, for the look-ahead.
     ssp : {"1", "2"}
@@ -75,9 +76,12 @@ def build_system(
     check_system(machine, compensate=compensate, ssp=ssp)
     fmi = FMI_VERSIONS[SSP_VERSIONS.index(ssp)]
     samples = as_samples(command, "command")
+    as_samples(samples[:1], "command", 1)
     model, look_ahead, sent = (
-        ("SepCompensator", "compensator", "x_dm") if compensate else ("HybridPredictor", "predictor", "x_d")
+        ("HybridPredictor", "predictor", "x_d") if compensate is None else ("SepCompensator", "compensator", "x_dm")
     )
+    if compensate is not None:
+        machine = machine.changed("compensator", {"compensate": compensate})
     parts = {"reference": "ReferenceTrajectory", look_ahead: model, "drive": "FeedDrive"}
     content: dict[str, bytes] = {}
     components, sets = [], {}
@@ -87,7 +91,8 @@ def build_system(
         trained = load_trained(weights, machine, kind) if weights is not None and part == look_ahead else None
         played = samples if part == "reference" else None
         # windows are no connectors, and thousands of errors of one importer's
-        fmu = Fmu.of(machine, kind, name, fmi=fmi, samples=played, trained=trained, windows=False)
+        rest = float(samples[0])
+        fmu = Fmu.of(machine, kind, name, fmi=fmi, samples=played, trained=trained, windows=False, rest=rest)
         content[f"resources/{name}.fmu"] = archived(native_flavour.files(fmu, targets=targets))
         components.append(Component(part, f"{name}.fmu", _variables(fmu)))
         sets[part] = f"{machine.name}_{part}.ssv"
@@ -98,7 +103,7 @@ def build_system(
         ("drive", "x_meas", look_ahead, "x_meas"),
     ]
     starts = {variable.name: variable.start for variable in components[1].variables}
-    delay = int(starts["preview" if compensate else "Np"] or 0)
+    delay = int(starts["Np" if compensate is None else "preview"] or 0)
     stop_time = round((len(samples) - 1 + delay) * machine.T_s, 9)
     structure = system_structure(machine.name, components, connections, sets, machine.T_s, stop_time, ssp)
     with written_whole(path) as file:

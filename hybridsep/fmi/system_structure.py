@@ -98,11 +98,12 @@ def system_structure(
     for connection in connections:
         _add_connection(wires, components, connection)
     master = {"description": "oms-ma", "stepSize": T_s, "absoluteTolerance": 1e-4, "relativeTolerance": 1e-4}
-    annotation = _add(_add(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
-    _add(_add(_add(annotation, "oms:Annotations"), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)
+    _add(_add(_omsimulator(system), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)
     connectors = [variable for component in components for variable in component.connectors]
     _add_units(_add(root, "ssd:Units"), connectors)
-    _add(root, "ssd:DefaultExperiment", startTime=0.0, stopTime=stop_time)
+    experiment = _add(root, "ssd:DefaultExperiment", startTime=0.0, stopTime=stop_time)
+    result = {"resultFile": f"{name}_res.mat", "loggingInterval": 0.0, "bufferSize": 10, "signalFilter": ".*"}
+    _add(_omsimulator(experiment), "oms:SimulationInformation", **result)
     return _document(root)
 
 
@@ -124,6 +125,12 @@ def _root(prefix: str, tag: str, name: str, ssp: str) -> ET.Element:
     for namespace, uri in _NAMESPACES.items():
         ET.register_namespace(namespace, uri)
     return ET.Element(_tag(f"{prefix}:{tag}"), version=f"{ssp}.0", name=name)
+
+
+def _omsimulator(parent: ET.Element) -> ET.Element:
+    """Add OMSimulator's annotation, which it needs of a system and of the default experiment."""
+    annotation = _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
+    return _add(annotation, "oms:Annotations")
 
 
 def _tag(name: str) -> str:

@@ -17,13 +17,14 @@ import pytest
 from command_line import Run
 from importers_closed_system import exists_here
 
-from hybridsep import load_machine, staircase
+from hybridsep import FmuInstance, load_machine, staircase
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.system import build_system
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSV = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
+OMS = "{https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd}"
 SCHEMAS = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
 
 
@@ -32,7 +33,7 @@ def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     name, _, compensated = request.param.partition(" ")
     machine, path = load_machine(name), tmp_path_factory.mktemp("system") / "axis.ssp"
     command = staircase(machine.T_s)[:2000]
-    return build_system(machine, path, command, compensate=bool(compensated), targets=("host",))
+    return build_system(machine, path, command, compensate="hybrid" if compensated else None, targets=("host",))
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -88,16 +89,60 @@ def test_the_picture_is_tidy(archive: Path) -> None:
             assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
 
 
+@pytest.mark.parametrize("compensate", [None, "physics", "hybrid"])
+def test_every_fmu_starts_where_the_trajectory_does(tmp_path: Path, compensate: str | None) -> None:
+    """Its start values alone do, in a tool that carries nothing before the first step."""
+    machine, shift, command = load_machine("spring_mass_damper"), 0.11, staircase()[:400]
+    sent, runs = ("x_dm" if compensate else "x_d"), []
+    for place in (0.0, shift):
+        path = build_system(
+            machine, tmp_path / f"{place}.ssp", command + place, compensate=compensate, targets=("host",)
+        )
+        fmus = {}
+        for name, data in content(path).items():
+            if name.endswith(".fmu"):
+                (tmp_path / Path(name).name).write_bytes(data)
+                fmus[Path(name).stem] = FmuInstance(tmp_path / Path(name).name)
+        reference, look_ahead, drive = (
+            next(fmu for name, fmu in fmus.items() if name.startswith(kind)) for kind in ("Ref", ("Hyb", "Sep"), "Feed")
+        )
+        rows = []
+        for fmu in fmus.values():
+            fmu.initialise()
+        if compensate:
+            assert look_ahead.get("compensate") == ["off", "physics", "hybrid"].index(compensate)
+        for k in range(500):
+            rows.append([look_ahead.get(sent) - place, drive.get("x") - place])
+            for sink, name, source, output in (
+                (look_ahead, "x_d_ahead", reference, "r"),
+                (look_ahead, "x_meas", drive, "x_meas"),
+                (drive, "x_d", look_ahead, sent),
+            ):
+                sink.set(name, source.get(output))
+            for fmu in fmus.values():
+                fmu.step(k * machine.T_s, machine.T_s)
+        for fmu in fmus.values():
+            fmu.close()
+        runs.append(np.array(rows))
+    np.testing.assert_allclose(runs[1], runs[0], rtol=0, atol=1e-9)
+    assert np.abs(np.diff(runs[1], axis=0)).max() < 1e-3  # nothing jumps
+
+
 @pytest.mark.slow
 def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
     """It refuses a file for one tag that it does not know, as ``ssd:SystemGeometry``, however legal."""
-    (system,) = etree.fromstring(content(archive)["SystemStructure.ssd"]).iter(f"{SSD}System")
+    root = etree.fromstring(content(archive)["SystemStructure.ssd"])
+    (system,), (experiment,) = root.iter(f"{SSD}System"), root.iter(f"{SSD}DefaultExperiment")
     tags = [element.tag.removeprefix(SSD) for element in system]
     assert tags == ["Elements", "Connections", "Annotations"]
     for component in system.iter(f"{SSD}Component"):
         assert {part.tag.removeprefix(SSD) for part in component} == {
             *("Connectors", "ElementGeometry", "ParameterBindings")
         }
+    for annotated, told in ((system, "FixedStepMaster"), (experiment, None)):
+        (information,) = annotated.find(f"{SSD}Annotations").iter(f"{OMS}SimulationInformation")
+        assert [child.tag.removeprefix(OMS) for child in information] == ([told] if told else [])
+    assert information.get("resultFile").endswith("_res.mat")
 
 
 @pytest.mark.slow
@@ -105,7 +150,9 @@ def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:
     """SSP 2.0 has the namespaces of 1.0; without its version and the types of FMI 3.0 it is the same document."""
     machine, command = load_machine("spring_mass_damper"), staircase()[:100]
     old, new = (
-        content(build_system(machine, tmp_path / f"{ssp}.ssp", command, targets=("host",), compensate=True, ssp=ssp))
+        content(
+            build_system(machine, tmp_path / f"{ssp}.ssp", command, targets=("host",), compensate="hybrid", ssp=ssp)
+        )
         for ssp in ("1", "2")
     )
     names = {name: name.replace(".fmu", "Fmi3.fmu") for name in old}
@@ -161,7 +208,7 @@ print("ends", *observer.last_real_values(drive, [places["x"], places["x_meas"]])
 @pytest.mark.slow
 def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "axis.ssp"
-    arguments = ("system", "--machine", "als25010_x", "--compensate", "--target", "host", "--out", path)
+    arguments = ("system", "--machine", "als25010_x", "--compensate", "hybrid", "--target", "host", "--out", path)
     status, out, err = hybridsep(*arguments)
     assert (status, out.split()[0]) == (0, str(path)), err
     structure = content(path)["SystemStructure.ssd"].decode()
@@ -178,6 +225,7 @@ def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     [
         (("--machine", "emps"), "machine emps has no [plant] section, which a system needs for its drive"),
         (("--out", "axis.zip"), "--out must end in .ssp"),
+        (("--compensate", "best"), "--compensate must be one of off, physics, hybrid, got 'best'"),
         (("--ssp", "3"), "the version of SSP must be one of 1, 2, got '3'"),
         (("--trajectory", "nothing.csv"), "nothing.csv"),
     ],

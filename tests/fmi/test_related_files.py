@@ -49,10 +49,10 @@ def test_the_rules_find_damages(fmus: BuiltFmus) -> None:
     manifest, exp = f"{FOLDER}/fmi-ls-manifest.xml", f"{FOLDER}/reference.exp"
     damages: list[tuple[str, bytes, bytes]] = [
         (manifest, b"fmi-ls-ref", b"fmi-ls-bus"),
-        (manifest, b"1.0.0-alpha.1", b"1.0.0"),
+        (manifest, b"1.0.0-beta.1", b"1.0.0"),
         (manifest, b'role="result"', b'role="outputs"'),
         (manifest, b'source="FeedDrive_ref.csv"', b'source="ref.csv"'),
-        (manifest, b'checksum="', b'checksum="0'),
+        (manifest, b'role="result"', b'checksum="00" role="result"'),
         (manifest, b"Related", b"Experiment"),
         (exp, b"TransientSimulation", b"Transient"),
         (exp, b'<Stimuli source="FeedDrive_in.csv"', b'<Stimuli source="in.csv"'),

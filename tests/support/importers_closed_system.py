@@ -160,7 +160,8 @@ def system_structure(system: ClosedSystem, folder: Path) -> Path:
     """Write the system as one file and return its path; ``command.npy`` of the folder is played, or the staircase."""
     given = folder / "command.npy"
     command = np.load(given) if given.exists() else staircase()
-    machine, compensate = load_machine("spring_mass_damper"), system.look_ahead == "compensator"
+    machine = load_machine("spring_mass_damper")
+    compensate = "hybrid" if system.look_ahead == "compensator" else None
     return build_system(machine, folder / "staircase.ssp", command, compensate=compensate, targets=("host",))
 
 
