@@ -27,7 +27,6 @@ RECORD = FOLDER / "pictures.json"
 DIGITS = 4
 """Significant digits of the figures that are kept."""
 
-LIVE_SECONDS = 30.0
 REPORT_SIZE = (1000, 900)
 
 Figures = dict[str, float]
@@ -106,20 +105,10 @@ def identified(folder: Path, chromium: str) -> Made:
     return {"identify_log.png": folder / "identify_log.png"}, {}
 
 
-def watched(folder: Path, chromium: str) -> Made:
-    """Make the picture of the live view."""
-    from benchmarks import live
-
-    options = ["--seconds", str(LIVE_SECONDS), "--out", str(folder), "--chromium", chromium]
-    run(folder, "-m", live.__name__, *options)
-    return {"live.png": folder / "live_desk_light.png"}, {}
-
-
 MAKERS: dict[tuple[str, ...], Callable[[Path, str], Made]] = {
     ("staircase.png", "staircase_compensated.png", "spiral_y.png", "spiral_contour.png"): demonstration,
     ("fit_report.png", "tune.png"): fitted,
     ("identify_log.png",): identified,
-    ("live.png",): watched,
 }
 
 

@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 
 import pytest
+from built_once import BuiltFmus
 from command_line import Run
 from quick_fits import without_other_settings, without_other_windows, without_python_fmus
 
@@ -24,3 +25,9 @@ def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     without_python_fmus(monkeypatch)
     without_other_windows(monkeypatch)
     without_other_settings(monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> BuiltFmus:
+    """Any FMU of any machine by name, built once a session."""
+    return BuiltFmus(tmp_path_factory.mktemp("fmus"))

@@ -21,7 +21,6 @@ from .command_hal import hal
 from .command_header import header
 from .command_identify import identify
 from .command_init import init
-from .command_live import live
 from .command_report import report
 from .command_system import system
 from .command_tune import tune
@@ -30,7 +29,7 @@ from .panels import EXAMPLES, PanelledCommand
 
 __all__ = ["app", "main"]
 
-PLUG_INS = ("modal",)
+PLUG_INS = ("live", "modal")
 """Commands that this repository has as plug-ins, in ``plugins``."""
 
 
@@ -86,7 +85,6 @@ for _command in (
     header,
     backtest,
     report,
-    live,
     fleet,
     example_log,
 ):

@@ -12,7 +12,7 @@ from places import ROOT
 DATED = ROOT / "docs" / "experiments"
 """Pages that tell of the code at their commit: names of files on them may have gone."""
 TOP = tuple(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"))
-PAGES = (*TOP, *sorted((ROOT / "docs").rglob("*.md")))
+PAGES = (*TOP, *sorted((ROOT / "plugins").glob("*/README.md")), *sorted((ROOT / "docs").rglob("*.md")))
 FOLDERS = (
     ".",
     "hybridsep",
@@ -28,6 +28,9 @@ ELSEWHERE = {
     "my_axis.toml",
     "machine.toml",
     "tuned.toml",
+    "stage.toml",
+    "swept.toml",
+    "printer.toml",
     "my_axis/machine.toml",
     "x/machine.toml",
     "y/machine.toml",
@@ -71,7 +74,7 @@ def test_files_on_the_page_exist(page: Path) -> None:
     names = set(FILE.findall(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))) - ELSEWHERE
     known = {
         path.name
-        for folder in ("hybridsep", "fmu_src", "integrations", "tests", "benchmarks")
+        for folder in ("hybridsep", "fmu_src", "integrations", "tests", "plugins", "benchmarks")
         for path in files_in(folder)
     }
     for name in names:

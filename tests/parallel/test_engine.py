@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
 import pytest
 from fleet_stubs import squared
-from live_runs import until
 
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.parallel.engine import Done, Engine, cluster, joblib_engine
@@ -87,3 +87,11 @@ def test_engines_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(LogError, match=r"needs the extra fleet: pip install 'hybridsep\[fleet\]'"), cluster(1):
         pass
+
+
+def until(true: Callable[[], object], most: float = 20.0) -> None:
+    """Wait until something is true."""
+    end = time.monotonic() + most
+    while not true():
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.005)
