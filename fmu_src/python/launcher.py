@@ -5,14 +5,27 @@ With the importer's logging off pythonfmu passes on no message; the reason goes 
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import logging
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from pythonfmu import Fmi2Slave
 
 # The binary runs this file for each instance, and gives up a reference to its names that it does not hold.
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+
+# On Linux it gives up the interpreter in a destructor of C++ and again in one of the library, which counts down in
+# memory that is free by then: the importer's heap is corrupted at its exit. What was given up before, both leave alone.
+if sys.platform == "linux":
+    for binary in (Path(__file__).parents[1] / "binaries" / "linux64").glob("*.so"):
+        with suppress(OSError):  # the importer has loaded a copy from elsewhere
+            library = ctypes.CDLL(str(binary), mode=os.RTLD_NOW | os.RTLD_NOLOAD)
+            atexit.register(library.finalizePythonInterpreter)
 
 try:
     import scipy.linalg  # noqa: F401 - the library loads it where it computes: too late to refuse

@@ -42,6 +42,7 @@ Python   3.10 or newer, whose libpython the process has loaded, on Linux x86-64 
 NumPy    1.24 or newer
 SciPy    1.11 or newer
 
+Its binary for Linux needs glibc 2.32 and the libstdc++ of GCC 12 (GLIBCXX_3.4.30), as in Debian 12 and Ubuntu 22.04.
 pythonfmu {} and the part of hybridsep that the FMU needs are in its resources. In a tool that is no Python itself the
 interpreter is found by the usual means: on Linux LD_PRELOAD with the path of libpython, PYTHONHOME, PYTHONPATH.
 """

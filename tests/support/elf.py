@@ -16,9 +16,10 @@ _COMMON = 0xFFF2
 
 @dataclass(frozen=True)
 class Symbol:
-    """One symbol: whether the file defines it, whether it is seen from outside, and whether it can be written to."""
+    """One symbol: its place, whether the file defines it, whether it is seen from outside and can be written to."""
 
     name: str
+    value: int
     defined: bool
     exported: bool
     writable: bool
@@ -38,10 +39,10 @@ def symbols(path: Path, *, dynamic: bool = False) -> list[Symbol]:
             continue
         names = content[sections[link][4] :]
         for at in range(offset + _SYMBOL.size, offset + length, _SYMBOL.size):
-            name, info, _, index, _, _ = _SYMBOL.unpack_from(content, at)
+            name, info, _, index, value, _ = _SYMBOL.unpack_from(content, at)
             if info & 15 in _SECTION_OR_FILE:
                 continue
             writable = index == _COMMON or (0 < index < count and bool(sections[index][2] & _WRITABLE))
             text = names[name : names.index(b"\0", name)].decode()
-            found.append(Symbol(text, defined=index != 0, exported=info >> 4 != 0, writable=writable))
+            found.append(Symbol(text, value, defined=index != 0, exported=info >> 4 != 0, writable=writable))
     return found

@@ -7,7 +7,6 @@ Some of them end the process, so each has one of its own; nothing is imported he
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 from collections.abc import Callable
@@ -221,4 +220,3 @@ if __name__ == "__main__":
     call = CAUGHT.get(case) or KILLING[case][1]
     call(Importer(Path(folder)))
     print("survived", flush=True)
-    os._exit(0)  # pythonfmu's library would corrupt the heap while the process exits
