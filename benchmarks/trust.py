@@ -28,7 +28,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.evaluate.lag import fitted_lag
+from hybridsep.evaluate.peers import fitted_lag
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import Machine
 from hybridsep.machines.paper import paper_machine

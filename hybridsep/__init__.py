@@ -87,7 +87,7 @@ _MODULES = {
     "PredictorSettings": "base.settings",
     "Run": "cosim.run",
     "SepCompensator": "compensate.compensator",
-    "SepState": "compensate.plan",
+    "SepState": "compensate.planning",
     "backtest": "evaluate.backtest",
     "backtest_stream": "evaluate.backtest",
     "build_fmu": "fmi.archive",

@@ -66,7 +66,7 @@ def identify(
     from ..fitting.advice import partly_used
     from ..identify.figures import operation_figure
     from ..identify.operation import identify_operation
-    from ..identify.segments import in_time
+    from ..identify.output_error import in_time
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
@@ -106,7 +106,7 @@ def identify(
 
 def _write_machine(found: IdentifiedModel, name: str, recording: str, entries: Mapping[str, Any], out: Path) -> None:
     """Write the machine file, with the deviations and findings as comments."""
-    from ..identify.shown import deviation_words
+    from ..identify.model import deviation_words
     from ..machines.seal import sealed
     from ..machines.text import machine_text
 
@@ -125,7 +125,7 @@ def _print_identified(found: IdentifiedModel, title: str, shown: Shown) -> None:
     from rich import box
     from rich.table import Table
 
-    from ..identify.shown import deviation_words, shown_estimates
+    from ..identify.model import deviation_words, shown_estimates
     from .tables import console
 
     table = Table(

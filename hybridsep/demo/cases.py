@@ -11,9 +11,8 @@ import numpy as np
 from ..base.metrics import largest, rms
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
-from ..evaluate.backtest import backtest
+from ..evaluate.backtest import backtest, replayed_run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
-from ..evaluate.replayed import replayed_run
 from ..evaluate.verdict import verdict_of
 from ..fmi.builds import build_pair
 from ..fmi.flavours import FMI_VERSIONS

@@ -11,13 +11,190 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtrcon
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter, lfiltic
 
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from .arx import ArxRun, MinimumNorm
-from .lag import fitted_lag
 
-__all__ = ["ARX_LAGS", "FROZEN", "LAG_HOLD", "REFITTED", "Peer", "Piece", "predict_peers"]
+__all__ = [
+    "ARX_LAGS",
+    "FROZEN",
+    "LAG_HOLD",
+    "REFITTED",
+    "ArxRun",
+    "FirstOrderLag",
+    "MinimumNorm",
+    "Peer",
+    "Piece",
+    "fitted_lag",
+    "predict_peers",
+]
+
+DEAD_TIME_MAX = 20
+"""Largest dead time, samples, that is tried."""
+
+TIME_CONSTANTS = (0.05, 1e4)
+"""Least and largest time constant that are tried, samples."""
+
+
+@dataclass(frozen=True)
+class FirstOrderLag:
+    """Lag ``1/(τs + 1)`` behind a dead time, over a zero-order hold.
+
+    Attributes
+    ----------
+    tau : float
+        Time constant, samples.
+    dead_time : int
+        Whole samples.
+    """
+
+    tau: float
+    dead_time: int
+
+    def position(self, x_d: Array) -> Array:
+        """Return the position under a command ``(n,)``, m, from rest at the first one."""
+        u = x_d - x_d[0]
+        pole = math.exp(-1.0 / self.tau)
+        delayed = np.concatenate((np.zeros(self.dead_time), u))[: len(u)]
+        return np.asarray(x_d[0] + lfilter([0.0, 1.0 - pole], [1.0, -pole], delayed))
+
+
+def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
+    """Return the lag that fits recordings best.
+
+    Parameters
+    ----------
+    recordings : sequence of two (n,) arrays, m
+        Commanded and measured positions, sampled alike; measured ones are NaN where missing.
+    """
+    known = [~np.isnan(x) for _, x in recordings]
+
+    def misfit(log_tau: float, dead_time: int) -> float:
+        lag = FirstOrderLag(math.exp(log_tau), dead_time)
+        errors = [(x - lag.position(x_d))[at] for (x_d, x), at in zip(recordings, known, strict=True)]
+        return float(sum(error @ error for error in errors))
+
+    bounds = [math.log(samples) for samples in TIME_CONSTANTS]
+    fits = [
+        (minimize_scalar(misfit, bounds=bounds, args=(dead_time,), method="bounded"), dead_time)
+        for dead_time in range(DEAD_TIME_MAX + 1)
+    ]
+    best, dead_time = min(fits, key=lambda fit: float(fit[0].fun))
+    return FirstOrderLag(math.exp(best.x), dead_time)
+
+
+_BLOCK = 4096
+"""Rows that are factorised at once."""
+
+
+class MinimumNorm:
+    """Minimum-norm least squares of rows that arrive in blocks; what is kept, a triangular factor, does not grow.
+
+    Parameters
+    ----------
+    n_columns : int
+        Regressors.
+    """
+
+    def __init__(self, n_columns: int) -> None:
+        self._n_columns = n_columns
+        self._R, self._n_rows = np.zeros((0, n_columns + 1)), 0
+
+    def add(self, rows: Array) -> None:
+        """Add rows of regressors, the target in the last column, ``(m, n_columns + 1)``."""
+        for i in range(0, len(rows), _BLOCK):
+            self._R = np.asarray(np.linalg.qr(np.concatenate((self._R, rows[i : i + _BLOCK])), mode="r"))
+        self._n_rows += len(rows)
+
+    def solution(self) -> Array:
+        """Return the coefficients, ``(n_columns,)``, of :func:`numpy.linalg.lstsq` with its default cut-off."""
+        n = self._n_columns
+        R, z = self._R[:n, :n], self._R[:n, n]
+        cutoff = np.finfo(np.float64).eps * max(self._n_rows, n)
+        if len(R) == n and dtrcon(R)[0] > n * cutoff:  # nothing to cut off: κ₂ ≤ n κ₁
+            return np.asarray(solve_triangular(R, z))
+        return np.asarray(np.linalg.lstsq(R, z, rcond=cutoff)[0])
+
+
+class ArxRun:
+    """Columns of a log without a gap, as an ARX model of ``n`` lags sees them.
+
+    ``y(k) = Σ a_i y(k−i) + Σ b_j [x_d(k−j) − x_d(k−j−1)] + c`` with ``y = x − x_d``, ``i = 1 … n``, ``j = 0 … n``:
+    free runs of minimum-norm least squares, what is missing before them bridged by free runs as well.
+
+    Parameters
+    ----------
+    x_d, x : (n_samples,) array, m
+        Commanded and measured positions, the latter NaN where missing.
+    n : int
+        Lags.
+    delay : int
+        Samples by which the measurements are late: ``x(k)`` is the position at ``k − delay``.
+    """
+
+    def __init__(self, x_d: Array, x: Array, n: int, delay: int = 0) -> None:
+        self.n = n
+        self._delay = delay
+        late = np.concatenate((x[delay:], np.full(min(delay, len(x)), np.nan)))
+        self._y = late - x_d
+        self._steps = np.diff(x_d, prepend=x_d[0])
+        self._filled = np.concatenate((np.zeros(n), self._y))  # at rest before the first sample
+        self._n_filled = 0
+
+    def rows(self, first: int, last: int) -> Array:
+        """Return the rows of samples ``first`` to ``last``, the last one not included, all of whose lags are known.
+
+        Returns
+        -------
+        (m, 2 n + 3) array
+            ``y(k−1) … y(k−n)``, increments ``k … k−n`` of the command, 1, and the target ``y(k)``.
+        """
+        n, first, last = self.n, max(first, self.n + 1), min(last, len(self._y))
+        if last <= first:
+            return np.empty((0, 2 * n + 3))
+        y, steps = (sliding_window_view(one, n + 1)[first - n : last - n, ::-1] for one in (self._y, self._steps))
+        found = np.column_stack((y[:, 1:], steps, np.ones(last - first), y[:, 0]))
+        return np.asarray(found[~np.isnan(found).any(axis=1)])
+
+    def predict(self, w: Array, begin: int, end: int) -> Array:
+        """Return the prediction of ``x − x_d`` at samples ``begin`` to ``end``, made when ``begin`` is commanded.
+
+        It is one free run from the last sample that is measured then.
+
+        Parameters
+        ----------
+        w : (2 n + 2,) array
+            Coefficients.
+        begin, end : int
+            Samples; ``begin`` never falls from call to call.
+        """
+        known = max(begin - self._delay, 0)
+        self._bridge(w, known)
+        return self._free_run(w, known, end)[begin - known :]
+
+    def _bridge(self, w: Array, end: int) -> None:
+        """Fill what is missing before ``end`` by free runs from what was measured before."""
+        missing = np.isnan(self._y[self._n_filled : end])
+        edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)) + self._n_filled
+        for first, last in edges.reshape(-1, 2).tolist():
+            self._filled[self.n + first : self.n + last] = self._free_run(w, first, last)
+        self._n_filled = max(self._n_filled, end)
+
+    def _free_run(self, w: Array, begin: int, end: int) -> Array:
+        n = self.n
+        a, b, c = w[:n], w[n:-1], w[-1]
+        steps = self._steps[max(begin - n, 0) : end]
+        forced = np.convolve(np.pad(steps, (end - begin + n - len(steps), 0)), b, "valid") + c
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges is seen by its size
+            denominator = np.concatenate(([1.0], -a))
+            before = lfiltic([1.0], denominator, self._filled[begin : begin + n][::-1])
+            return np.asarray(lfilter([1.0], denominator, forced, zi=before)[0])
+
 
 ARX_LAGS = (20, 40)
 """Lags of the ARX models."""

@@ -28,7 +28,7 @@ from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
 from ..fmi.libraries import check_available, has_native
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
-from ..identify.segments import in_time
+from ..identify.output_error import in_time
 from ..logs.log import Log
 from ..logs.units import Shown
 from ..machines.machine import Machine

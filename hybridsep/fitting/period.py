@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.metrics import rms
 from ..base.settings import PredictorSettings
+from ..identify.output_error import in_time
 from ..identify.periodic import residual_period
-from ..identify.segments import in_time
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, replay

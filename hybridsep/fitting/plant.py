@@ -19,7 +19,7 @@ from ..base.errors import ParameterError
 from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..base.signals import Array
-from ..identify.segments import in_time
+from ..identify.output_error import in_time
 from ..intake.relation import noise_std
 from ..intake.samples import resolution
 from ..logs.units import Shown

@@ -13,10 +13,8 @@ from ..base.errors import SignalError
 from ..base.metrics import largest, rms
 from ..base.signals import Array, Indices
 from ..cosim.run import Run
-from ..evaluate.backtest import Backtest, Batch, backtest, backtest_stream
+from ..evaluate.backtest import Backtest, Batch, Scores, backtest, backtest_stream, replayed_run
 from ..evaluate.peers import Peer, Piece, predict_peers
-from ..evaluate.replayed import replayed_run
-from ..evaluate.scores import Scores
 from ..evaluate.verdict import Tally, Verdict
 from ..logs.log import Log, LogReader
 from ..predict.predictor import HybridPredictor
@@ -370,7 +368,7 @@ class LogReplay:
     def summary(self) -> dict[str, float | int | str]:
         """Return the figures of the replay and of the ARX models by name.
 
-        ``rms_arx20_um``, ``max_arx20_um``, … are as :meth:`~hybridsep.evaluate.scores.Scores.summary` has the others,
+        ``rms_arx20_um``, ``max_arx20_um``, … are as :meth:`~hybridsep.evaluate.backtest.Scores.summary` has the others,
         and ``"diverged"`` of one that did.
         """
         found: dict[str, float | int | str] = dict(self.scores.summary())

@@ -10,8 +10,8 @@ from scipy.signal import welch
 from ..base.metrics import coverage, rms_ratio
 from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
+from ..identify.model import deviation_words, shown_estimates
 from ..identify.operation import TOO_LITTLE
-from ..identify.shown import deviation_words, shown_estimates
 from ..intake.finding import Finding
 from ..intake.repair import changes
 from ..logs.log import Log

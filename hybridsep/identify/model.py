@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..logs.units import Shown
 from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
-__all__ = ["Alternative", "IdentifiedModel", "machine_of"]
+__all__ = ["Alternative", "IdentifiedModel", "deviation_words", "machine_of", "shown_estimates"]
 
 
 @dataclass(frozen=True)
@@ -139,3 +140,15 @@ def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title:
         "input_hold": input_hold,
     }
     return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
+
+
+def deviation_words(std: float, sign: str = "") -> str:
+    """Return a standard deviation as text; "fixed" for a parameter that was not estimated."""
+    return f"{sign}{std:.2g}" if std > 0 else "fixed"
+
+
+def shown_estimates(parameters: Iterable[Mapping[str, Any]], shown: Shown) -> Iterator[tuple[str, float, float, str]]:
+    """Yield name, value, standard deviation and unit of parameters; positions in the units of their log."""
+    for one in parameters:
+        factor, unit = shown.error(abs(one["value"])) if one["unit"] in ("m", "rad") else (1.0, str(one["unit"]))
+        yield str(one["name"]), factor * one["value"], factor * one["std"], unit

@@ -16,14 +16,12 @@ from ..intake.gain import runs_against
 from ..intake.motion import starts_in_motion
 from ..logs.units import Shown, shown_in
 from ..model.physics import ModalModel
-from .delay import delay_finding
 from .model import Alternative, IdentifiedModel
-from .output_error import Delay, Fit, fit_structure, simulated
+from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
 from .search import fit_near
-from .segments import Segment, as_segments, motion_split
 from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
-from .uncertainty import estimates
+from .uncertainty import delay_finding, estimates
 
 __all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "TOO_LITTLE", "identify_operation", "unit_gain_model"]
 

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ..base.signals import Array
-from .output_error import Delay, Fit, fit_structure
-from .segments import Segment
+from .output_error import Delay, Fit, Segment, fit_structure
 from .structure import DECAY_MIN, SLOWEST, Structure
 
 __all__ = ["fit_delay", "fit_near"]

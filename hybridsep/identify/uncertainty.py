@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array, Indices
-from .output_error import Fit, affine, without
-from .responses import free_responses, responses, sections_of
-from .segments import Segment, delayed
+from .output_error import Fit, Segment, affine, delayed, without
+from .structure import free_responses, responses, sections_of
 
-__all__ = ["Estimate", "estimates", "full_covariance"]
+__all__ = ["Estimate", "delay_finding", "estimates", "full_covariance", "total_delay"]
 
 BATCHES = 30
 """Batches of the residual: enough for a variance, and each long beside a servo's memory."""
@@ -183,3 +182,47 @@ def _differences(function: Callable[[Array], Array], point: Array) -> Array:
     return np.column_stack(
         [(function(point + step) - function(point - step)) / (2 * step.sum()) for step in np.diag(steps)]
     )
+
+
+APART = 0.5
+"""Deviation of the whole delay, relative to the dead time's, below which lag and dead time cannot be told apart."""
+
+
+def total_delay(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Estimate, float]:
+    """Return the delay behind a constant velocity, ``−G'(0)/G(0)``, and the dead time's deviation, both in s.
+
+    Parameters
+    ----------
+    fit : Fit
+        Fitted to the segments.
+    segments : sequence of Segment
+    T_s : float, s
+    """
+    covariance = full_covariance(fit, segments, T_s)[:-1, :-1]  # the offset delays nothing
+    n_theta = len(fit.theta)
+    point = np.concatenate((fit.theta, fit.linear, [fit.delay.halves / 2]))
+
+    def delay(parameters: Array) -> float:
+        modes = fit.structure.modes(parameters[:n_theta], parameters[n_theta:-1], T_s)
+        gain = sum(mode.alpha / mode.omega**2 for mode in modes)
+        # G(s) = Σ (α + β s)/(ω² + 2ζω s + …) = Σ α/ω² − s Σ (2ζα/ω³ − β/ω²) + …
+        lag = sum(2 * mode.zeta * mode.alpha / mode.omega**3 - mode.beta / mode.omega**2 for mode in modes)
+        return float(lag / gain + parameters[-1] * T_s)
+
+    slope = _differences(lambda parameters: np.array([delay(parameters)]), point)[0]
+    variance = float(slope @ covariance @ slope)
+    found = Estimate("delay", delay(point), float(np.sqrt(max(variance, 0.0))), "s")
+    return found, float(T_s * np.sqrt(max(covariance[-1, -1], 0.0)))
+
+
+def delay_finding(fit: Fit, segments: Sequence[Segment], T_s: float) -> list[str]:
+    """Return the finding that lag and dead time cannot be told apart, if they cannot."""
+    if fit.structure.order == 0:
+        return []
+    delay, std = total_delay(fit, segments, T_s)
+    if std < T_s or delay.std > APART * std:
+        return []
+    return [
+        f"lag and dead time cannot be told apart (dead time ± {std / T_s:.2g} samples, the others' deviations are "
+        f"those with it as chosen); together they delay by {1e3 * delay.value:.4g} ± {1e3 * delay.std:.2g} ms"
+    ]

@@ -13,8 +13,8 @@ from identification_cases import T_S, measured
 from hybridsep import PAPER_LIMITS, HybridPredictor, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import read_description
+from hybridsep.identify.output_error import in_time
 from hybridsep.identify.periodic import residual_period
-from hybridsep.identify.segments import in_time
 
 AXIS = ModalModel([Mode(35.0, 0.4, (70 * np.pi) ** 2)])
 PITCH, LATE = 0.01, 5

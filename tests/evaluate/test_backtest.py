@@ -18,8 +18,7 @@ from properties import examples
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream
-from hybridsep.evaluate.replayed import replayed_run
+from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream, replayed_run
 from hybridsep.logs.log import Log, open_log, read_log
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor

@@ -9,9 +9,18 @@ from places import RECORDINGS
 from scipy.signal import lfilter
 
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.arx import ArxRun, MinimumNorm
-from hybridsep.evaluate.lag import FirstOrderLag, fitted_lag
-from hybridsep.evaluate.peers import FROZEN, LAG_HOLD, REFITTED, Peer, Piece, predict_peers
+from hybridsep.evaluate.peers import (
+    FROZEN,
+    LAG_HOLD,
+    REFITTED,
+    ArxRun,
+    FirstOrderLag,
+    MinimumNorm,
+    Peer,
+    Piece,
+    fitted_lag,
+    predict_peers,
+)
 
 NP = 25
 

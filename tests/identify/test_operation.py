@@ -15,11 +15,10 @@ from scipy.signal import chirp
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
-from hybridsep.identify.cancelling import slow_parts
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
-from hybridsep.identify.output_error import Delay, fit_structure, without
-from hybridsep.identify.segments import as_segments
+from hybridsep.identify.output_error import Delay, as_segments, fit_structure, without
+from hybridsep.identify.selection import slow_parts
 from hybridsep.identify.structure import Structure, lag_mode
 from hybridsep.identify.uncertainty import estimates
 
