@@ -64,7 +64,7 @@ def backtest(
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from .log_intake import CHECKED_MAX, open_checked, reading_of
-    from .overwrite import BATCH_COLUMNS, BATCHES, FIGURES, RUNS, STATE, Output, check_outputs
+    from .outputs import FIGURES, RUNS, check_outputs
     from .progress import progress_bar
     from .tables import console, print_scores, print_without_first, print_written
 
@@ -75,8 +75,11 @@ def backtest(
     saved = list(save or [])
     predictor = warm_predictor(axis_machine.changed("predictor", parameters), weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
-    outputs = [Output("--out", out, BATCHES), Output("--figure", figure, FIGURES)]
-    outputs += [Output("--save", path, {".state": STATE, **RUNS}) for path in saved]
+    outputs = [
+        ("--out", out, ()),
+        ("--figure", figure, FIGURES),
+        *(("--save", path, (".state", *RUNS)) for path in saved),
+    ]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
@@ -97,7 +100,7 @@ def backtest(
         predictor.save(path)
     if out is not None:
         with written_text(out) as file:
-            csv.writer(file).writerows([BATCH_COLUMNS, *replayed.batches])
+            csv.writer(file).writerows([("t", "rms_pb", "rms_hold", "rms_h"), *replayed.batches])
     if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
         console.print(line)
     if replayed.judged is None and not as_json:

@@ -87,7 +87,7 @@ def build(
     from ..fmi.libraries import library_paths, missing
     from ..fmi.twincat import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
-    from .overwrite import FMU, TWINCAT, Output, check_outputs
+    from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
@@ -105,8 +105,8 @@ def build(
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [
-            *(Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs),
-            *([Output("--out", out / CONFIGURATION_FILE, TWINCAT)] if controller else []),
+            *(("--out", out / f"{name}.fmu", ()) for _, name, _, _ in jobs),
+            *([("--out", out / CONFIGURATION_FILE, ())] if controller else []),
         ],
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,

@@ -73,7 +73,7 @@ def cosim(
     from ..cosim.pairing import check_pair, default_trajectory, read_command, values_to_build
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
-    from .overwrite import PNG, RUNS, Output, check_outputs
+    from .outputs import RUNS, check_outputs
     from .progress import progress_bar
     from .tables import print_run, print_written
 
@@ -82,7 +82,7 @@ def cosim(
 
     axis = load_machine(machine)
     trajectory = trajectory or default_trajectory(machine)
-    outputs = (Output("--out", out, RUNS), Output("--figure", figure, PNG))
+    outputs = (("--out", out, RUNS), ("--figure", figure, (".png",)))
     if compensate is not None:
         check("compensate", compensate, label="--compensate")
     model = "HybridPredictor" if compensate is None else "SepCompensator"

@@ -37,13 +37,13 @@ def demo(
     from ..demo.demo import demo_files, processor_time
     from ..fmi.builds import default_flavour
     from .log_intake import show
-    from .overwrite import BY_ENDING, Output, check_outputs
+    from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_compensation, print_json, print_predictions
 
     flavour = flavour or default_flavour()
     files = demo_files(out, flavour, full=full, emps=emps is not None, fmi=fmi)
-    check_outputs((Output("--out", path, BY_ENDING) for path in files), {"recording": emps}, force=force)
+    check_outputs((("--out", path, ()) for path in files), {"recording": emps}, force=force)
     if emps is not None:
         read_recorded(emps)  # a refusal comes before any announcement
     if not as_json:

@@ -21,8 +21,8 @@ def example_log(
     20 s of a simulated axis at 1 kHz, in mm.
     """
     from ..logs.example import write_example
-    from .overwrite import EXAMPLE_LOG, Output, check_outputs
+    from .outputs import check_outputs
 
-    check_outputs([Output("--out", out, {".csv": EXAMPLE_LOG, ".gz": EXAMPLE_LOG})], {}, force=force)
+    check_outputs([("--out", out, (".csv", ".gz"))], {}, force=force)
     write_example(out)
     typer.echo(out)

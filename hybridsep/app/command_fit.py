@@ -62,7 +62,7 @@ def fit(
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
     from .log_intake import different_logs, show
-    from .overwrite import FIT_FILES, Output, check_outputs
+    from .outputs import check_outputs, keep_written, written_before
     from .progress import progress_bar
     from .tables import console, print_json
 
@@ -72,8 +72,8 @@ def fit(
     files = fit_files(folder, machine, compensator=bool(limits), fmi=fmi)
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
-    outputs = [Output("--out", path, FIT_FILES) for path in files.values()]
-    check_outputs(outputs, inputs, force=force)
+    outputs = [("--out", path, ()) for path in files.values()]
+    check_outputs(outputs, inputs, force=force, ours=written_before(files["results"], logs))
     found = [
         read_log(
             path,
@@ -94,6 +94,7 @@ def fit(
         options = FitOptions(Np, machine, known=known, drive_limits=limits)
         result = fit_logs(used, folder, options, advance, changes=changes(findings), fmi=fmi)
         fit_report(result, used, findings).write(files["report"])
+    keep_written(files["results"], logs, files.values())
     advice = recommendation(judged_by(result, used[0].shown))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in findings.items()}

@@ -32,13 +32,12 @@ def hal(
     ``loadrt hsep axes=`` takes.
     """
     from ..base.errors import ParameterError
-    from ..base.new_folders import make_folder
     from ..base.output import written_whole
     from ..fmi.hal import COMPONENTS, axis_files, component_files
     from ..fmi.warm_start import load_trained
     from ..fmi.weights import WEIGHTS_FILE
     from ..machines.machine import load_machine
-    from .overwrite import HAL_FILES, Output, check_outputs
+    from .outputs import check_outputs
 
     model = "HybridPredictor" if predictor else "SepCompensator"
     axes = [load_machine(source) for source in machine]
@@ -54,14 +53,13 @@ def hal(
         files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
     # of an earlier call: the axis would start with them
     stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
-    written = [path for path in files if path.parent.name != f"{component}_sources"]
+    changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
     check_outputs(
-        [Output("--out", path, HAL_FILES) for path in (*written, *stale)],
+        [("--out", path, ()) for path in (*changed, *stale)],
         {"saved predictor": weights},
         force=force,
     )
     for path, content in files.items():
-        make_folder(path.parent)
         with written_whole(path) as file:
             file.write(content)
     if not predictor:

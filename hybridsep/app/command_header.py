@@ -31,7 +31,7 @@ def header(
     from ..fmi.axis_header import axis_header
     from ..fmi.warm_start import load_trained
     from ..machines.machine import load_machine, machine_path
-    from .overwrite import AXIS_HEADER, Output, check_outputs
+    from .outputs import check_outputs
 
     axis = load_machine(machine)
     model = "HybridPredictor" if predictor else "SepCompensator"
@@ -39,7 +39,7 @@ def header(
     text = axis_header(axis, model, trained)
     path = Path(f"{axis.name}.h") if out is None else out
     inputs = {f"machine file {machine}": machine_path(machine), "saved predictor": weights}
-    check_outputs([Output("--out", path, AXIS_HEADER)], inputs, force=force)
+    check_outputs([("--out", path, (".h",))], inputs, force=force)
     if not predictor:
         warn_of_estimates([axis])
     with written_text(path) as file:

@@ -71,11 +71,11 @@ def identify(
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
     from .log_intake import show
-    from .overwrite import MACHINE, PNG, Output, check_outputs
+    from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
 
-    outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, PNG))
+    outputs = (("--out", out, (".toml",)), ("--figure", figure, (".png",)))
     machine = checked_name(name) if name else machine_name(out or recording)
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
@@ -107,7 +107,6 @@ def identify(
 def _write_machine(found: IdentifiedModel, name: str, recording: str, entries: Mapping[str, Any], out: Path) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..identify.model import deviation_words
-    from ..machines.seal import sealed
     from ..machines.text import machine_text
 
     deviations = [
@@ -117,7 +116,7 @@ def _write_machine(found: IdentifiedModel, name: str, recording: str, entries: M
     comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
     machine = found.machine(name, f"Axis identified from {recording}", **entries)
     with written_text(out) as file:
-        file.write(sealed(machine_text(machine, comments), "identify"))
+        file.write(machine_text(machine, comments))
 
 
 def _print_identified(found: IdentifiedModel, title: str, shown: Shown) -> None:

@@ -73,15 +73,14 @@ def init(
     from ..fmi.libraries import check_available
     from ..identify.model import machine_of
     from ..machines.machine import load_machine
-    from ..machines.seal import sealed
     from ..machines.text import machine_text
     from ..model.physics import ModalModel
-    from .overwrite import FMU, MACHINE, Output, check_outputs
+    from .outputs import check_outputs
 
     versions = () if fmi is None else versions_of(fmi, FLAVOURS[0])
     if versions:
         check_available(("host",))
-    check_outputs([Output("OUT", out, {".toml": MACHINE})], {}, force=force)
+    check_outputs([("OUT", out, (".toml",))], {}, force=force)
     name = str(_asked("--name", name, "name of the machine", out.stem))
     T_s = float(_asked("--T_s", T_s, "sampling interval [s]", 1e-3))
     if from_tf is not None:
@@ -105,14 +104,14 @@ def init(
     )
     names = [fmu_name("HybridPredictor", machine.name, FLAVOURS[0], version) for version in versions]
     fmus = [out.with_name(f"{fmu}.fmu") for fmu in names]
-    check_outputs([Output("--fmi", path, FMU) for path in fmus], {}, force=force)
+    check_outputs([("--fmi", path, ()) for path in fmus], {}, force=force)
     said = ", ".join(f"{key} = {value}" for key, value in given.items())
     comments = [
         f"Physics model: {model}, {said}. hybridsep identify finds it from a log of the axis.",
         f"Next: hybridsep backtest LOG --machine {out}",
     ]
     with written_text(out) as file:
-        file.write(sealed(machine_text(machine, comments, annotated=True), "init"))
+        file.write(machine_text(machine, comments, annotated=True))
     typer.echo(f"{out} written: {model}, {said}")
     if fmi is not None:
         build_here(load_machine(out), "HybridPredictor", out.parent, FLAVOURS[0], fmi=fmi)

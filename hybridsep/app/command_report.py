@@ -58,12 +58,12 @@ def report(
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
     from .log_intake import open_checked, reading_of
-    from .overwrite import REPORT, Output, check_outputs
+    from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console
 
     page = out or Path(f"{machine_name(log)}_report.html")
-    outputs = (Output("--out", page, {".html": REPORT}),)
+    outputs = [("--out", page, (".html",))]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
     if fmu is not None:
         check_controller(fmu, PREDICTOR)

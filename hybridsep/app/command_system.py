@@ -55,7 +55,7 @@ def system(
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
     from ..machines.machine import load_machine, machine_path
-    from .overwrite import SYSTEM, Output, check_outputs
+    from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
@@ -69,7 +69,7 @@ def system(
     check_available(target or ("host",))
     file = None if trajectory in TRAJECTORIES else trajectory
     inputs = {"machine file": machine_path(machine), "trajectory": file, "saved predictor": weights}
-    check_outputs([Output("--out", out, {".ssp": SYSTEM})], inputs, force=force)
+    check_outputs([("--out", out, (".ssp",))], inputs, force=force)
     with progress_bar(as_json) as advance:
         build_system(
             axis,

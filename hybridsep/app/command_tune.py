@@ -62,7 +62,7 @@ def tune(
     from ..fitting.tuning import tune as tune_on
     from ..machines.machine import load_machine, machine_path
     from .log_intake import show
-    from .overwrite import FIGURES, MACHINE, Output, check_outputs
+    from .outputs import FIGURES, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
     from .tune_table import print_tuning, tuning_summary
@@ -71,7 +71,7 @@ def tune(
         from ..fitting.tuning import tuning_figure
 
     given = load_machine(machine)
-    outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, FIGURES))
+    outputs = (("--out", out, (".toml",)), ("--figure", figure, FIGURES))
     changed, values, tried = _tried(given, parameters, writes=out is not None)
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
@@ -170,7 +170,6 @@ def _write_machine(
 ) -> None:
     """Write the machine file with the settings that were chosen."""
     from ..intake.repair import changes
-    from ..machines.seal import sealed
     from ..machines.text import machine_text
     from .tune_table import entries
 
@@ -179,7 +178,7 @@ def _write_machine(
     best = best.model_copy(update={"sources": tuple(sources)} if sources else {})
     comment = f"Settings of [predictor] from hybridsep tune on {', '.join(Path(name).name for name in read.pieces)}."
     with written_text(out) as file:
-        file.write(sealed(machine_text(best, [comment]), "tune"))
+        file.write(machine_text(best, [comment]))
 
 
 def _named(logs: Sequence[Path]) -> dict[str, Path]:

@@ -18,7 +18,6 @@ from rich.console import Console
 from typer.core import TyperGroup
 
 from ..base.errors import HybridSepError, LogError, brief
-from ..base.new_folders import remove_empty_folders
 from ..base.version import version_text
 
 __all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "run"]
@@ -53,8 +52,6 @@ class Commands(TyperGroup):
         except KeyboardInterrupt:
             errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
             raise typer.Exit(130) from None
-        finally:
-            remove_empty_folders()
 
 
 def _to_paste(error: HybridSepError) -> list[str]:

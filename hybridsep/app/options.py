@@ -58,9 +58,7 @@ TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-ForceOption = Annotated[
-    bool, typer.Option("--force", help="Overwrite an existing file even if it is not of the kind that is written.")
-]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
 MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
 ]

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["COMMANDS", "COMMANDS_HEAD", "DEFAULT_MACHINE", "data_folder"]
+__all__ = ["COMMANDS", "DEFAULT_MACHINE", "data_folder"]
 
 DEFAULT_MACHINE = "spring_mass_damper"
 """Machine file of the paper's staircase; its FMUs have no suffix."""
 
 COMMANDS = "commands.csv"
 """File that ``hybridsep fit`` writes beside a machine file: commands of the log to try with."""
-
-COMMANDS_HEAD = "# commands of a log, by hybridsep fit, to try with"
-"""Its first line."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 

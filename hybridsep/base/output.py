@@ -33,7 +33,7 @@ _ORPHAN_AGE = 3600.0
 
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
-    """Open a binary file that replaces ``path`` when the block ends without an exception.
+    """Open a binary file that replaces ``path`` when the block ends without an exception; its folder is made.
 
     A symbolic link is followed. The new file takes over the permissions and, where allowed, the owner of the old one;
     other hard links keep the old content. A device or a pipe cannot be replaced and is written directly.
@@ -45,6 +45,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         unchanged.
     """
     target = Path(os.path.realpath(path))
+    target.parent.mkdir(parents=True, exist_ok=True)
     try:
         before = Path(path).stat() if Path(path).exists() else None
         if before is not None and not os.access(path, os.W_OK):

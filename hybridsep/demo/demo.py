@@ -105,7 +105,6 @@ def demo(
     versions_of(fmi, flavour)
     recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
     seeds = SEEDS if full else 1
     cases = len(MACHINES) if full else 1
     total = seeds + 6 * full + cases * (1 + len(COMPENSATED)) + (recorded is not None)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.data_files import COMMANDS, COMMANDS_HEAD
+from ..base.data_files import COMMANDS
 from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
@@ -32,7 +32,6 @@ from ..identify.output_error import in_time
 from ..logs.log import Log
 from ..logs.units import Shown
 from ..machines.machine import Machine
-from ..machines.seal import sealed
 from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
@@ -226,7 +225,7 @@ def fit(
     limits = dict(options.drive_limits) or estimated_limits(recordings, T_s)
     machine = _machine(options, logs, model, settings, changes, plant["entries"], limits)
     with written_text(files["machine file"]) as file:
-        file.write(sealed(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)), "fit"))
+        file.write(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)))
     _write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
     predictor.save(files["trained predictor"])
     tracking: dict[str, float | None] = {}
@@ -393,7 +392,7 @@ def fit_files(out: Path, name: str, *, compensator: bool = False, fmi: str = FMI
 def _write_commands(path: Path, x_d: Array, T_s: float, unit: str) -> None:
     """Write commands as a CSV that ``--trajectory`` takes, m, or rad where that is the unit."""
     with written_text(path) as file:
-        file.write(f"{COMMANDS_HEAD}\nt [s],x_d [{unit}]\n")
+        file.write(f"# commands of a log, by hybridsep fit, to try with\nt [s],x_d [{unit}]\n")
         file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate(x_d.tolist()))
 
 

@@ -136,7 +136,6 @@ def build_fmu(
     if embed_weights and (weights is None or flavour != "native"):
         raise FmuError("embed_weights is for a native FMU with weights")
     path = Path(out) / f"{name}.fmu"
-    path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
         trained = None if weights is None else load_trained(weights, machine, model)
         fmu = Fmu.of(machine, model, name, fmi=fmi, samples=samples, trained=trained, origin=origin, windows=windows)

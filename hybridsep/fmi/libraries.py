@@ -84,7 +84,6 @@ def library_paths(
 
     for library, content in compiled(jobs):
         place = _place(compilers[library[1]].name, library)
-        place.parent.mkdir(parents=True, exist_ok=True)
         with written_whole(place) as file:
             file.write(content)
         on_library(library)

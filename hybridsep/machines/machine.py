@@ -40,8 +40,8 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs neither
 
 __all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
-NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]*$"
-"""Names of machines; they become parts of FMUs' names."""
+NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]{0,99}$"
+"""Names of machines; they become parts of FMUs' names, of which importers make names of files."""
 
 _PLACE_MAX = 60
 """Largest length of an entry's name in a message; the known ones are shorter."""

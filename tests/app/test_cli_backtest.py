@@ -127,13 +127,8 @@ def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     assert hybridsep("backtest", log, *MACHINE, "--figure", figure)[0] == 0
     first = figure.read_bytes()
     assert first[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
-    assert hybridsep("backtest", log, *MACHINE, "--figure", figure)[0] == 0  # it is ours
+    assert hybridsep("backtest", log, *MACHINE, "--figure", figure, "--force")[0] == 0
     assert figure.read_bytes() == first
-    if suffix != ".png":
-        figure.write_bytes(first.replace(b"hybridsep", b"somebody "))
-        status, _, err = hybridsep("backtest", log, *MACHINE, "--figure", figure)
-        assert status == 2
-        assert "exists and is no figure of hybridsep" in err
     assert "--figure must end in .png or .pdf or .svg" in hybridsep("backtest", log, *MACHINE, "--figure", "a.jpg")[2]
 
 
@@ -143,7 +138,9 @@ def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path:
     drawn = []
     for t_init in (0.0, 0.3):
         figure = tmp_path / "figure.svg"
-        status, _, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--t_init", t_init, "--figure", figure)
+        status, _, err = hybridsep(
+            "backtest", log, *MACHINE, "--trust", "true", "--t_init", t_init, "--figure", figure, "--force"
+        )
         assert status == 0, err
         drawn.append(figure.read_text(encoding="utf-8"))
     assert "<!-- linear hybrid model -->" in drawn[0]
@@ -165,12 +162,6 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, "--p", 20)
     assert status == 2
     assert "my.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
-    for option in ("--save", "--figure"):
-        other = tmp_path / ("user.csv" if option == "--save" else "user.pdf")
-        other.write_text("t,x_d,x\n0,0,0\n")
-        status, _, err = hybridsep("backtest", log, *MACHINE, option, other)
-        assert status == 2
-        assert f"{option} {other} exists and is no" in err
     assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
     assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
 

@@ -1,21 +1,21 @@
-"""Output files of the command line: no input or file of another kind is overwritten; arguments are checked first."""
+"""Output files of the command line: nothing of the user's is overwritten; arguments are checked first."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run, write_log
-from log_files import columns, write
+from log_files import write
 
-from hybridsep import HybridPredictor, load_machine
-from hybridsep.app.overwrite import BATCHES, FIGURE, FMU, RUN, STATE, SUMMARY
-from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, save_columns
+from hybridsep.app.outputs import written_before
 from hybridsep.demo import demo
 from hybridsep.machines.machine import machine_path
+from hybridsep.machines.naming import machine_name
 
 MACHINE = "spring_mass_damper"
 
@@ -103,93 +103,74 @@ def test_demo_does_not_overwrite_its_recording(hybridsep: Run, tmp_path: Path) -
     assert f"staircase.csv is the same file as the recording {recording}" in err
 
 
-# An existing file of another kind ----------------------------------------------------------------------------------
+# An existing file --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["notes.toml", "other.csv", "batches.npz"])
-def test_another_kind_needs_force(hybridsep: Run, tmp_path: Path, log: Path, name: str) -> None:
-    out = tmp_path / name
-    if name.endswith(".toml"):
-        own_machine(tmp_path).rename(out)
-    else:
-        write(out, columns())
-    before = out.read_bytes()
-    arguments = ("backtest", log, "-m", MACHINE, "--out", out)
-    err = refusal(hybridsep, *arguments)
-    assert f"--out {out} exists and is no CSV of hybridsep backtest; choose another name, or overwrite it with" in err
-    assert out.read_bytes() == before
-    assert hybridsep(*arguments, "--force")[0] == 0
-    assert out.read_text().startswith("t,rms_pb")
-    assert hybridsep(*arguments)[0] == 0  # its own kind needs no force
-
-
-def test_cosim_and_build_ask_too(hybridsep: Run, tmp_path: Path) -> None:
-    trajectory = command_file(tmp_path)
-    log, picture, archive = tmp_path / "log.csv", tmp_path / "picture.png", tmp_path / "FeedDrivePy.fmu"
-    write(log, columns())
-    picture.write_bytes(b"\xff\xd8 a photograph with the wrong name")
-    write(tmp_path / "arrays.npz", columns()).rename(archive)
-    kept = {path: path.read_bytes() for path in (log, picture, archive)}
-    common = ("cosim", "--trajectory", trajectory, "--flavour", "python")
-    assert "is no result of hybridsep cosim" in refusal(hybridsep, *common, "--out", log)
-    assert "--figure" in (err := refusal(hybridsep, *common, "--figure", picture))
-    assert "is no PNG" in err
-    build = ("build", "FeedDrivePy", "--flavour", "python", "--out", tmp_path)
-    assert "is no FMU of hybridsep" in refusal(hybridsep, *build)
-    assert {path: path.read_bytes() for path in kept} == kept
-    for _ in range(2):
-        assert hybridsep(*build, "--force")[0] == 0
-    assert hybridsep(*build)[0] == 0
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("backtest", "{log}", "-m", MACHINE, "--out", "{there}"),
+        ("cosim", "--trajectory", "{log}", "--out", "{there}"),
+        ("cosim", "--trajectory", "{log}", "--figure", "{there}"),
+        ("build", "FeedDrive", "--out", "{folder}"),
+        ("init", "{there}", "--tau", "0.006"),
+        ("demo", "--out", "{folder}"),
+        ("fit", "{log}", "--out", "{folder}"),
+    ],
+    ids=lambda arguments: f"{arguments[0]} {arguments[-2]}",
+)
+def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path, arguments: tuple[str, ...]) -> None:
+    folder = tmp_path / "there"
+    folder.mkdir()
+    names = {"build": "FeedDrive.fmu", "demo": "summary.json", "init": "axis.toml", "fit": "machine.toml"}
+    there = folder / names.get(arguments[0], "run.png" if "--figure" in arguments else "run.csv")
+    there.write_text("my own")
+    words = [word.format(log=log, there=there, folder=folder) for word in arguments]
+    assert f"{there} exists; choose another name, or overwrite it with --force" in refusal(hybridsep, *words)
+    assert (there.read_text(), list(folder.iterdir())) == ("my own", [there])
+    if arguments[0] in ("backtest", "init"):
+        assert hybridsep(*words, "--force")[0] == 0
+        assert there.read_text(encoding="utf-8") != "my own"
 
 
 @pytest.mark.slow
+def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, tmp_path: Path, log: Path) -> None:
+    out = tmp_path / "axis"
+    arguments = ("fit", log, "--Np", 20, "--out", out)
+    for _ in range(2):
+        assert hybridsep(*arguments)[0] == 0
+    (other := log.with_name("other.csv")).write_bytes(log.read_bytes())
+    assert "machine.toml exists" in refusal(hybridsep, "fit", other, *arguments[2:])
+    machine = out / "machine.toml"
+    edited = machine.read_text(encoding="utf-8") + "# mine\n"
+    machine.write_text(edited, encoding="utf-8")
+    assert f"{machine} exists; choose another name" in refusal(hybridsep, *arguments)
+    assert machine.read_text(encoding="utf-8") == edited
+    assert written_before(out / "fit.json", [log]) == {path for path in out.iterdir() if path != machine}
+
+
+def test_logs_of_two_days_have_a_folder_each() -> None:
+    days = [machine_name(Path(f"logs/spindle.2026-11-{day}.csv")) for day in (26, 27)]
+    assert days == ["spindle_2026_11_26", "spindle_2026_11_27"]
+    assert machine_name(Path("my_axis.csv.gz"), "X") == "my_axis_X"
+
+
 @pytest.mark.parametrize(
-    "arguments",
-    [("init", "{out}", "--tau", "0.006"), ("identify", "{log}", "--out", "{out}")],
-    ids=["init", "identify"],
+    ("name", "message"),
+    [
+        (b"x" * 226 + b".csv", "an axis's name must have at most 100 letters"),
+        (b"spindel\xe9.csv", "the name of a file that is read must be in UTF-8, got"),
+    ],
+    ids=["long", "Latin-1"],
 )
-def test_an_edited_machine_file_needs_force(
-    hybridsep: Run, tmp_path: Path, log: Path, arguments: tuple[str, ...]
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes")
+def test_names_that_cannot_be_written_are_refused_before_the_work(
+    hybridsep: Run, tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch, name: bytes, message: str
 ) -> None:
-    out = tmp_path / "axis.toml"
-    again = [part.format(out=out, log=log) for part in arguments]
-    for _ in range(2):  # as it was written it may be replaced
-        assert hybridsep(*again)[0] == 0
-    assert hybridsep("init", out, "--tau", "0.007")[0] == 0
-    written = out.read_text(encoding="utf-8")
-    out.write_bytes(written.replace("\n", "\r\n").encode())  # line ends are no edit
-    assert hybridsep(*again)[0] == 0
-    edited = out.read_text(encoding="utf-8") + "\n[drive_limits]\nv_max = 0.5\n"
-    out.write_text(edited, encoding="utf-8")
-    err = refusal(hybridsep, *again)
-    assert f"{out} exists and has been edited since `hybridsep {arguments[0]}` wrote it; choose another name" in err
-    assert "or overwrite it and lose the edits with --force" in err
-    assert out.read_text(encoding="utf-8") == edited
-    assert hybridsep(*again, "--force")[0] == 0
-    assert "v_max" not in out.read_text(encoding="utf-8")
-    own_machine(tmp_path).rename(out)
-    assert f"{out} exists and is no machine file that hybridsep wrote" in refusal(hybridsep, *again)
-
-
-def test_demo_asks_before_it_works(hybridsep: Run, tmp_path: Path) -> None:
-    (tmp_path / "summary.json").write_text('{"my": "results"}')
-    assert "summary.json exists and is no summary of hybridsep demo" in refusal(hybridsep, "demo", "--out", tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
-
-
-def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Callable[[str], Path]) -> None:
-    ours = {
-        RUN: [tmp_path / "a.csv", tmp_path / "a.npz", tmp_path / "b.csv", tmp_path / "b.npz"],
-        STATE: [tmp_path / "a.state"],
-        FMU: [python_fmu("FeedDrivePy")],
-    }
-    for path in ours[RUN]:
-        names = (PREDICTOR if path.stem == "a" else COMPENSATOR).columns
-        save_columns({name: np.zeros(3) for name in names}, path)
-    HybridPredictor(load_machine(MACHINE).model).save(ours[STATE][0])
-    every = [path for paths in ours.values() for path in paths]
-    for kind in (BATCHES, RUN, FIGURE, FMU, STATE, SUMMARY):
-        assert [path for path in every if kind.recognises(path)] == ours.get(kind, [])
+    monkeypatch.chdir(tmp_path)
+    log.rename(tmp_path / os.fsdecode(name))
+    monkeypatch.setattr("hybridsep.logs.log.read_log", None)
+    assert message in refusal(hybridsep, "fit", os.fsdecode(name))
 
 
 # All arguments before any work -------------------------------------------------------------------------------------
@@ -263,7 +244,8 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
     before = out.read_bytes()
     with log.open("a") as file:
         file.write("1.0,0.0,none\n")
-    assert "column 'x' must be a number, got 'none'" in refusal(hybridsep, "backtest", log, "-m", MACHINE, "--out", out)
+    again = ("backtest", log, "-m", MACHINE, "--out", out, "--force")
+    assert "column 'x' must be a number, got 'none'" in refusal(hybridsep, *again)
     assert out.read_bytes() == before
 
 
@@ -276,5 +258,5 @@ def test_a_file_that_has_the_folders_name_is_named(hybridsep: Run, tmp_path: Pat
     before = log.read_bytes()
     for out in (log, log / "deeper"):
         err = refusal(hybridsep, "fit", log, "--out", out)
-        assert f"--out {out / 'machine.toml'}: a file has the name of the folder {out}; choose another" in err
+        assert f"--out {out / 'machine.toml'}: {log} is a file, not a folder; choose another" in err
     assert log.read_bytes() == before

@@ -165,15 +165,6 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert "So far the hybrid is " in out
     assert "judged by 10 windows only: record at least 1.7 s." in " ".join(out.split())
     assert "held-out samples [µm]" in " ".join(out.split())
-    machine = tmp_path / "fit" / "machine.toml"
-    edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
-    machine.write_text(edited, encoding="utf-8")
-    status, _, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
-    assert status == 2
-    assert "exists and has been edited since `hybridsep fit` wrote it" in " ".join(err.split())
-    assert machine.read_text(encoding="utf-8") == edited
-    assert hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--force")[0] == 0
-    assert machine.read_text(encoding="utf-8") != edited
 
 
 @pytest.mark.slow
@@ -364,11 +355,7 @@ def test_a_look_ahead_longer_than_what_judges_is_refused(log: Path, tmp_path: Pa
         fit([read_log(log)], tmp_path, FitOptions(Np, "axis"))
 
 
-def test_a_foreign_file_is_not_overwritten(hybridsep: Run, log: Path, tmp_path: Path) -> None:
-    (tmp_path / "machine.toml").write_text("# mine\n")
-    status, _, err = hybridsep("fit", log, "--out", tmp_path)
-    assert status == 2
-    assert "machine.toml exists and is no machine file that hybridsep wrote" in " ".join(err.split())
+def test_a_name_that_can_be_none_of_an_fmu_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     status, _, err = hybridsep("fit", log, "--out", tmp_path, "--name", "no name")
     assert status == 2
     assert "--name must be" in err

@@ -108,7 +108,7 @@ def test_init_builds_what_build_would(hybridsep: Run, tmp_path: Path) -> None:
     path.unlink()
     status, _, err = hybridsep("init", path, "--tau", "0.006", "--fmi", "2")
     assert status == 2
-    assert "HybridPredictor_axis.fmu exists and is no" in " ".join(err.split())
+    assert "HybridPredictor_axis.fmu exists; choose another name" in " ".join(err.split())
     assert not path.exists()
 
 

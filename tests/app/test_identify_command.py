@@ -54,11 +54,6 @@ def test_what_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
         status, _, err = hybridsep("identify", log, *arguments)
         assert status == 2
         assert message in " ".join(err.split())
-    other = tmp_path / "notes.toml"
-    other.write_text("a = 1\n")
-    status, _, err = hybridsep("identify", log, "--out", other)
-    assert status == 2
-    assert "is no machine file" in " ".join(err.split())
     still = tmp_path / "still.csv"
     still.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3:.3f},0.1,0.1\n" for k in range(200)))
     status, _, err = hybridsep("identify", still)

@@ -135,7 +135,7 @@ def test_inputs_are_never_overwritten_nor_other_files(hybridsep: Run, tmp_path: 
     assert hybridsep("tune", log, *PAPER, *FEW, "--out", machine)[0] == 0
     again = ("tune", log, "-m", machine, "--jobs", "1", *FEW, "--out")
     assert "is the same file as the machine file" in hybridsep(*again, machine)[2]
-    assert "exists and is no machine file" in hybridsep(*again, notes)[2]
+    assert f"{notes} exists; choose another name" in hybridsep(*again, notes)[2]
     assert hybridsep(*again, notes, "--force")[0] == 0
 
 

@@ -213,11 +213,7 @@ def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     assert (status, out.split()[0]) == (0, str(path)), err
     structure = content(path)["SystemStructure.ssd"].decode()
     assert 'startElement="compensator" startConnector="x_dm" endElement="drive" endConnector="x_d"' in structure
-    assert hybridsep(*arguments, "--json")[0] == 0  # its own file is written anew
-    path.write_bytes(b"mine")
-    status, _, err = hybridsep(*arguments)
-    assert status == 2
-    assert "exists and is no system of hybridsep" in " ".join(err.split())
+    assert hybridsep(*arguments, "--json", "--force")[0] == 0
 
 
 @pytest.mark.parametrize(

@@ -79,12 +79,3 @@ def test_a_compensators_header_has_its_limits_and_compiles_as_cpp(hybridsep: Run
         subprocess.run(check, input=source, text=True, check=True)
     status, _, err = hybridsep("header", "emps", "--out", str(tmp_path / "emps.h"))
     assert (status, "--predictor writes the header of a predictor" in " ".join(err.split())) == (2, True)
-
-
-def test_a_header_of_ones_own_is_not_overwritten(hybridsep: Run, tmp_path: Path) -> None:
-    own = tmp_path / "axis.h"
-    own.write_text("int mine;\n", encoding="utf-8")
-    status, _, err = hybridsep("header", AXIS, "--out", str(own))
-    assert (status, own.read_text(encoding="utf-8")) == (2, "int mine;\n"), err
-    assert hybridsep("header", AXIS, "--out", str(own), "--force")[0] == 0
-    assert hybridsep("header", AXIS, "--out", str(own))[0] == 0

@@ -53,7 +53,7 @@ class TestWithoutLinuxCnc:
         given = ("--out", str(tmp_path), "--weights", str(tmp_path / "x.state"))
         assert hybridsep("hal", AXES[0], *given)[0] == 0
         assert (tmp_path / "x" / "weights.bin").read_bytes().startswith(b"HSEPWG")
-        status, out, _ = hybridsep("hal", AXES[0], "--out", str(tmp_path))
+        status, out, _ = hybridsep("hal", AXES[0], "--out", str(tmp_path), "--force")
         assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
         assert not (tmp_path / "x" / "weights.bin").exists()
         status, _, err = hybridsep("hal", *AXES, *given)
