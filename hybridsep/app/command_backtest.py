@@ -81,8 +81,8 @@ def backtest(
         *(("--save", path, (".state", *RUNS)) for path in saved),
     ]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
-    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
+    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     shown = shown_of(opened.file_unit, axis_machine.unit)
     title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
     states = [path for path in saved if path.suffix.lower() == ".state"]

@@ -65,6 +65,7 @@ def report(
     page = out or Path(f"{machine_name(log)}_report.html")
     outputs = [("--out", page, (".html",))]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
+    check_outputs(outputs, inputs, force=force)
     if fmu is not None:
         check_controller(fmu, PREDICTOR)
     axis_machine = load_machine(machine)
@@ -72,7 +73,6 @@ def report(
     predictor = warm_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
-    check_outputs(outputs, inputs, force=force)
     whole = opened if isinstance(opened, Log) else opened.read()
     with progress_bar(False) as advance:
         recording = Recording(whole.x_d, whole.x_meas, 0)

@@ -72,9 +72,9 @@ def tune(
 
     given = load_machine(machine)
     outputs = (("--out", out, (".toml",)), ("--figure", figure, FIGURES))
-    changed, values, tried = _tried(given, parameters, writes=out is not None)
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
+    changed, values, tried = _tried(given, parameters, writes=out is not None)
     read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust, fix=fix, as_is=as_is)
     with progress_bar(as_json) as advance:
         jobs = jobs or os.cpu_count() or 1

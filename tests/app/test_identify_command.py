@@ -95,7 +95,7 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     path.write_text(f"t,x_d,x\n{rows}\n")
     out = tmp_path / "axis.toml"
     for fix in ([], ["--fix"]):
-        status, _, err = hybridsep("identify", path, "--out", out, "--figure", tmp_path / "log.png", *fix)
+        status, _, err = hybridsep("identify", path, "--out", out, "--figure", tmp_path / "log.png", "--force", *fix)
         assert status == 0
         assert f"{n} of {len(x)} measured positions are missing" in " ".join(err.split())
         assert load_machine(out).model.modes[0].f_n == pytest.approx(20.0, abs=0.1)

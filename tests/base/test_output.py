@@ -91,11 +91,10 @@ def test_a_pipe_is_written_directly(tmp_path: Path) -> None:
     os.close(read)
 
 
-@pytest.mark.parametrize("place", ["", "missing/result.csv"])
-def test_what_cannot_be_written_is_named(tmp_path: Path, place: str) -> None:
-    with pytest.raises(OSError, match=r"Is a directory|No such file") as caught, written_whole(tmp_path / place):
+def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=r"Is a directory") as caught, written_whole(tmp_path):
         pass
-    assert caught.value.filename == str(tmp_path / place)
+    assert caught.value.filename == str(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
