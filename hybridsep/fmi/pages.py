@@ -95,7 +95,7 @@ def index_page(
         name=name,
         title=html.escape(fmu_title(machine, model) + paper_note(machine, model)),
         needs=html.escape(needs),
-        computes=filled(model, steps=filled("steps")),
+        computes=filled(model, steps=filled("steps"), residual=filled("residual")),
         partner=partner,
         command=command,
         rows=rows,

@@ -34,6 +34,7 @@ class PaperModel:
 
     may_miss: ClassVar[bool] = False
     n_rejected: ClassVar[int] = 0
+    farthest: ClassVar[float] = 0.0
     learned: ClassVar[tuple[()]] = ()
 
     settings: PredictorSettings = field(metadata=FIXED)

@@ -201,7 +201,8 @@ class HybridPredictor:
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
         forecast = residual_model.forecast(state.residual, ResidualWindow(command, x_pb, start), scales)
         self.pending = self._with_error(forecast)
-        return Prediction(x_pb[late:] + start, forecast.e_h[late:], self.pending.error.std[late:], self._warm_up(n))
+        std = np.maximum(self.pending.error.std[late:], state.residual.farthest)
+        return Prediction(x_pb[late:] + start, forecast.e_h[late:], std, self._warm_up(n))
 
     def _with_error(self, forecast: Forecast) -> PredictedWindow:
         """Return the window of a forecast with what is known of its error, pending measurement.

@@ -171,6 +171,19 @@ def test_a_known_delay_costs_little(new_stream: StreamMaker, trust: bool) -> Non
     assert last(unknown, "rms_pb") > 3 * last(sound, "rms_pb")
 
 
+@on_all((PREDICTOR,), needs="agreement")
+def test_a_rejected_measurement_is_within_the_interval(new_stream: StreamMaker) -> None:
+    """Of the windows that follow, as long as it is rejected; a sensor that is set anew by 1 mm is so for a second."""
+    r, x = late(PREDICTOR, 100, 0, 3000)
+    x = x + 1e-3 * (np.arange(3000) >= 1830)
+    shown = dict(zip(OUTPUTS[PREDICTOR], run(new_stream(), (r, x), TRUST)[:-1].T, strict=True))
+    error, std = np.abs(x - shown["x_h"]), shown["x_h_std"]
+    assert shown["n_rejected"][-1] == 1000
+    assert error[1900:2830].min() > 9e-4
+    assert (error < 1.96 * std)[1900:2830].all()
+    assert std[1700:1900].max() < 2e-5
+
+
 @cache
 def growing(model: str) -> tuple[Array, Array]:
     """Return the inputs of a look-ahead on a plant that rings, and whose motion grows from next to nothing, (n,), m."""

@@ -9,12 +9,13 @@ reads. After a second the axis has been moved, or its sensor set, and the value 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.signals import Array
+from ...base.records import within
+from ...base.signals import PREDICTION_MAX, Array
 from .constants import CONSTANTS
 
 __all__ = ["Reach", "reached"]
@@ -30,10 +31,13 @@ class Reach:
         Samples since the last one that was believed.
     n_beyond : int
         Of these, values out of reach, less the values within reach that followed.
+    farthest : float, m
+        Largest residual out of reach among them.
     """
 
     n_missing: int = 0
     n_beyond: int = 0
+    farthest: float = field(default=0.0, metadata=within())
 
 
 def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) -> tuple[NDArray[np.bool_], Reach]:
@@ -53,7 +57,7 @@ def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) 
     T_s : float, s
     """
     known = largest > 0.0 and fastest > 0.0
-    believed, n_missing, n_beyond = np.isfinite(e), reach.n_missing, reach.n_beyond
+    believed, n_missing, n_beyond, farthest = np.isfinite(e), reach.n_missing, reach.n_beyond, reach.farthest
     patience = math.ceil(CONSTANTS.patience / T_s)
     for k, size in enumerate(np.abs(e).tolist()):
         n_missing += 1
@@ -62,7 +66,7 @@ def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) 
         beyond = size > CONSTANTS.reach_residuals * largest + CONSTANTS.reach_steps * fastest
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
-            believed[k] = False
+            believed[k], farthest = False, max(farthest, min(size, PREDICTION_MAX))
         else:
-            n_missing, n_beyond, largest = 0, 0, max(largest, size)
-    return believed, Reach(n_missing, n_beyond)
+            n_missing, n_beyond, farthest, largest = 0, 0, 0.0, max(largest, size)
+    return believed, Reach(n_missing, n_beyond, farthest)

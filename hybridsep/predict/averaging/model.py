@@ -229,6 +229,11 @@ class TrustedModel:
         return self.run.n_rejected
 
     @property
+    def farthest(self) -> float:
+        """Largest residual among the last samples, m, where these were rejected; else 0."""
+        return self.run.reach.farthest
+
+    @property
     def last(self) -> float:
         """Last residual that was accepted or bridged, m."""
         return float(self.run.past[OF_PHYSICS][0])

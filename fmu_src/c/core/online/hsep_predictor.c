@@ -124,6 +124,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     hsep_residual_begin(hsep_predictor_model(self), self->k >= self->preview); /* the first fill is not learned */
     self->n_published = 0;
     self->held = self->residual;
+    hsep_predictor_uncertainty(self)->least = hsep_residual_farthest(hsep_predictor_model(self));
 }
 
 /* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
@@ -247,7 +248,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
 HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i)
 {
     const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);
-    return hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i];
+    return hsep_fmax(hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i], uncertainty->least);
 }
 
 static hsep_real predictor_rms(const hsep_predictor *self, hsep_real sum)

@@ -184,6 +184,11 @@ HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
     return trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL;
 }
 
+HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self)
+{
+    return self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->reach.farthest : 0.0;
+}
+
 HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self)
 {
     return self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->n_rejected : 0;

@@ -76,6 +76,9 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
 /* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
 HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self);
 
+/* m, largest residual among the last samples, where these were rejected; else 0. */
+HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self);
+
 /* Measurements of this run that were missing or not plausible. */
 HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self);
 

@@ -45,7 +45,8 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_w
 HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n)
 {
     hsep_uncertainty got;
-    return HSEP_LAID_OUT(got, block, uncertainty_lay_out(&got, Np, n)) && hsep_uncertainty_sound(&got);
+    return HSEP_LAID_OUT(got, block, uncertainty_lay_out(&got, Np, n)) && hsep_uncertainty_sound(&got) &&
+           hsep_within(&got.least, 1, HSEP_PREDICTION_MAX) && got.least >= 0.0;
 }
 
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)

@@ -22,6 +22,7 @@ typedef struct {
     hsep_real ratio;                                   /* c at its end relative to that at its beginning */
     hsep_real recent; /* m2, recent mean square of the residual; 0 before the first window */
     hsep_word n;      /* samples that are predicted */
+    hsep_real least;  /* m, what is published at least: the largest residual, if the last ones were rejected */
     hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, components averaged over time, up to the last sample */
     /* Offsets in words from the beginning of the struct */
     hsep_word e_h;        /* (n,) m, residual of the window as published */
@@ -29,7 +30,7 @@ typedef struct {
     hsep_word std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n);
 

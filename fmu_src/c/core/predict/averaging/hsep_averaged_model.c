@@ -109,7 +109,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameter
     hsep_trusted got;
     int sound = HSEP_LAID_OUT(got, block, trusted_lay_out(&got, parameters)) &&
                 (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 && got.settled <= 1 &&
+                got.known <= got.followed && got.reach.known <= 1 && hsep_within(&got.reach.farthest, 1, HSEP_PREDICTION_MAX) && got.settled <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
     for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -192,6 +192,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
     self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
+    self->reach.farthest = 0.0;
     self->settled = 0;
     self->early_square = 0.0;
     hsep_stack_forget(&learned->stack, HSEP_DOUBTING);

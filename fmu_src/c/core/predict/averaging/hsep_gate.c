@@ -2,6 +2,7 @@
 
 #include "hsep_math.h"
 #include "hsep_predict_constants.h"
+#include "hsep_range.h"
 
 HSEP_API void hsep_reach_begin(hsep_reach *self, hsep_real largest, hsep_real fastest)
 {
@@ -23,9 +24,11 @@ HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_real e, hsep_real T_s)
         self->n_beyond--;
     }
     if (self->n_beyond > 0 && (hsep_real)self->n_missing <= hsep_ceil(HSEP_TRUST_PATIENCE / T_s)) {
+        self->farthest = hsep_fmax(self->farthest, hsep_fmin(size, HSEP_PREDICTION_MAX));
         return 0;
     }
     self->n_missing = self->n_beyond = 0;
+    self->farthest = 0.0;
     self->largest = hsep_fmax(self->largest, size);
     return 1;
 }

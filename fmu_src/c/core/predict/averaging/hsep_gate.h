@@ -10,12 +10,13 @@
 typedef struct {
     hsep_word n_missing; /* samples since the last one that was believed, */
     hsep_word n_beyond;  /* of these, values out of reach, less values within reach that followed */
+    hsep_real farthest;  /* m, largest residual out of reach among them */
     hsep_real largest;   /* m, largest residual believed */
     hsep_real fastest;   /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_word known;     /* whether there was a motion, and a residual, before the window */
 } hsep_reach;
 
-HSEP_ASSERT_WORDS(hsep_reach, 5);
+HSEP_ASSERT_WORDS(hsep_reach, 6);
 
 /* Begin a window. largest: m, the largest residual believed before it; fastest: m. */
 HSEP_API void hsep_reach_begin(hsep_reach *self, hsep_real largest, hsep_real fastest);
