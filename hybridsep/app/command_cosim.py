@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -67,8 +66,6 @@ def cosim(
 
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
-    from ..base.apart import run_apart
-    from ..cosim.importer import faulty
     from ..cosim.loop import cosimulate
     from ..cosim.pairing import check_pair, default_trajectory, read_command, values_to_build
     from ..fmi.builds import build_here
@@ -105,9 +102,7 @@ def cosim(
         folder = Path(place)
         ahead = predictor or build_here(axis, model, folder, flavour, weights=weights)
         drive = plant or build_here(axis, "FeedDrive", folder, flavour)
-        given = [path.name for path in (predictor, plant) if path is not None]
-        call = partial(run_apart, faulty(" or ".join(given)), cosimulate) if given else cosimulate
-        run = call(
+        run = cosimulate(
             ahead,
             drive,
             command,

@@ -42,9 +42,7 @@ def report(
 
     It is checked and replayed as by backtest. The file needs no network.
     """
-    from ..base.apart import run_apart
     from ..cosim.fmus import check_controller
-    from ..cosim.importer import faulty
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
     from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words
@@ -81,7 +79,7 @@ def report(
         advance("time the FMU's steps", 0.95)
         steps = {}
         if fmu is not None:
-            steps = run_apart(faulty(fmu.name), step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
+            steps = step_times(fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
     judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the whole log")
     settings = predictor.settings
     written = Report(

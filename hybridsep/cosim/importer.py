@@ -21,13 +21,9 @@ from fmpy.fmi1 import FMICallException
 
 from ..base.errors import FmuError, first_line, listed
 from ..base.output import named_errors
-from ..fmi.pythonfmu_limits import check_unpacked
-from .archive_check import read_description_text
-from .binary_check import check_binary
-from .description_check import check_description
 from .driver import DRIVERS, Driver
 
-__all__ = ["FmuInstance", "faulty", "read_description"]
+__all__ = ["FmuInstance", "read_description"]
 
 
 def read_description(path: str | Path) -> Any:
@@ -48,11 +44,14 @@ def read_description(path: str | Path) -> Any:
 @lru_cache(maxsize=16)
 def _description(path: Path, *_file: int) -> Any:
     """Return the same; a file is read again when it is another one or has changed."""
-    check_description(path.name, read_description_text(path))
     try:
-        return fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:  # fmpy raises bare Exceptions here
-        raise FmuError(f"{path.name} is not a readable FMU: {first_line(error)}") from error
+        description = fmpy.read_model_description(str(path))
+    except Exception as error:  # fmpy raises bare Exceptions here, of several lines
+        raise FmuError(f"{path.name} is not a readable FMU: {first_line(' '.join(str(error).split()))}") from error
+    if description.coSimulation is None or description.fmiVersion[0] not in DRIVERS:
+        kind = "one for model exchange" if description.coSimulation is None else f"FMI {description.fmiVersion}"
+        raise FmuError(f"{path.name} must be an FMI 2.0 or 3.0 co-simulation FMU, got {kind}")
+    return description
 
 
 _WORDS_MAX = 1000
@@ -80,11 +79,6 @@ def _working_directory() -> Iterator[Path]:
             os.chdir(folder)
 
 
-def faulty(name: str) -> Callable[[str], FmuError]:
-    """Return the error of an FMU that ends the process it runs in, by how that ends (:mod:`hybridsep.base.apart`)."""
-    return lambda how: FmuError(f"{name} ended its process {how}: its library is faulty")
-
-
 class FmuInstance(AbstractContextManager["FmuInstance"]):
     """An instance of a co-simulation FMU; use it as a context manager, or close it.
 
@@ -109,9 +103,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     Raises
     ------
     FmuError
-        If the archive cannot be read, must not be unpacked, is no FMI 2.0 or 3.0 co-simulation FMU, has no intact
-        library for this platform, or refuses to be instantiated. A library's code runs in this process, and may still
-        end it; for a process of its own see :func:`~hybridsep.base.apart.run_apart`.
+        If the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
+        refuses to be instantiated. A library's code runs in this process, and may end it.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -142,7 +135,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         made = DRIVERS[self.description.fmiVersion[0]]
         try:
             self._check_library(folder, f"binaries/{made.platform}")
-            check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
                 driver = made(folder, self.description, instance_name)
         except Exception as error:  # fmpy raises bare Exceptions here
@@ -158,15 +150,11 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self._release = weakref.finalize(self, _release, driver.slave, folder)
 
     def _check_library(self, folder: Path, binaries: str) -> None:
-        """Raise FmuError if there is no library for this platform, or one that must not be loaded."""
+        """Raise FmuError if there is no library for this platform."""
         place = f"{binaries}/{self.description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
         if not (folder / place).is_file():
             there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
             raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
-        try:
-            check_binary(folder / place)
-        except ValueError as error:
-            raise FmuError(f"{place} {error}") from error
 
     @property
     def slave(self) -> Any:

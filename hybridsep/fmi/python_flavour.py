@@ -10,24 +10,28 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from importlib import metadata
 from pathlib import Path
 
 import pythonfmu
 
 from ..base.data_files import data_folder
+from ..base.errors import FmuError
 from ..base.version import __version__
 from .content import content_guid
 from .fmu import Fmu
 from .imported import imported_modules
 from .model_description import model_description
 from .pages import dependencies_note, filled, icon, index_page, reference_note
-from .pythonfmu_limits import checked_version, pythonfmu_license
 from .reference import has_reference
 from .reference_run import reference_run
 from .related_files import MANIFEST_FILE, manifest
 from .resource_data import RESOURCE_DATA_FILE, resource_data
 
-__all__ = ["files"]
+__all__ = ["checked_version", "files"]
+
+_SERIES = "0.7."
+"""Series of pythonfmu whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
 
 _SLAVES = {
     "HybridPredictor": "hybrid_predictor.py",
@@ -84,7 +88,7 @@ def files(fmu: Fmu) -> dict[str, bytes]:
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
     content["documentation/licenses/license.txt"] = (data_folder("fmu_src").parent / "LICENSE").read_bytes()
-    content["documentation/licenses/pythonfmu.txt"] = pythonfmu_license()
+    content["documentation/licenses/pythonfmu.txt"] = _license()
     guid = content_guid(content, fmu.table)
     content["resources/machine.json"] = json.dumps(
         {**fmu.table.as_json(), "content": guid}, indent=1, sort_keys=True
@@ -119,3 +123,28 @@ def _resources(model: str) -> dict[str, bytes]:
     for path in sorted(Path(pythonfmu.__file__).parent.glob("*.py")):
         content[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     return content
+
+
+def checked_version() -> str:
+    """Return the version of the pythonfmu that is installed.
+
+    Raises
+    ------
+    FmuError
+        If ``slave.py`` was not made for it.
+    """
+    version = metadata.version("pythonfmu")
+    if not version.startswith(_SERIES):
+        raise FmuError(
+            f"pythonfmu must be {_SERIES}x, whose reference counting hybridsep/fmi/slave.py balances, got {version}; "
+            f"pip install 'pythonfmu~={_SERIES}0'"
+        )
+    return version
+
+
+def _license() -> bytes:
+    """Return the licence of the pythonfmu that is installed, which goes with copies of it; FmuError if it has none."""
+    found = [file for file in metadata.files("pythonfmu") or () if file.name == "LICENSE"]
+    if not found:
+        raise FmuError("pythonfmu's LICENSE, which an FMU with a copy of it must carry, is not installed: reinstall it")
+    return found[0].read_binary()

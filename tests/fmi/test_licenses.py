@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from built_once import PYTHON
 
+from hybridsep import build_fmu, load_machine
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import FmuError
-from hybridsep.fmi.pythonfmu_limits import pythonfmu_license
 
 LICENSES = data_folder("fmu_src") / "c" / "licenses"
 
@@ -32,7 +32,7 @@ def test_the_notices_are_those_of_the_compiler() -> None:
         assert lines[0] == lines[1]
 
 
-def test_pythonfmu_without_its_licence_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.fmi.pythonfmu_limits.metadata.files", lambda name: [])
+def test_pythonfmu_without_its_licence_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridsep.fmi.python_flavour.metadata.files", lambda name: [])
     with pytest.raises(FmuError, match=r"pythonfmu's LICENSE, .* is not installed: reinstall it"):
-        pythonfmu_license()
+        build_fmu(load_machine("spring_mass_damper"), "FeedDrivePy", tmp_path, "python")
