@@ -45,7 +45,8 @@ def read_description(path: str | Path) -> Any:
 def _description(path: Path, *_file: int) -> Any:
     """Return the same; a file is read again when it is another one or has changed."""
     try:
-        description = fmpy.read_model_description(str(path))
+        with path.open("rb") as archive:  # fmpy leaves one open that it has opened and refused
+            description = fmpy.read_model_description(archive)
     except Exception as error:  # fmpy raises bare Exceptions here, of several lines
         raise FmuError(f"{path.name} is not a readable FMU: {first_line(' '.join(str(error).split()))}") from error
     if description.coSimulation is None or description.fmiVersion[0] not in DRIVERS:

@@ -182,7 +182,7 @@ def test_what_cannot_be_loaded_leaves_nothing_behind(
         python_fmu("FeedDrivePy"), tmp_path / "Useless.fmu", lambda n, c: None if n.endswith("machine.json") else c
     )
     for path, message in (
-        (unloadable, r"Unloadable\.fmu cannot be loaded: binaries/.*FeedDrive\S* is (no|truncated)"),
+        (unloadable, r"Unloadable\.fmu cannot be loaded: "),
         (truncated, r"Truncated\.fmu cannot be loaded: "),
         (bare, r"Bare\.fmu cannot be loaded: binaries/.*FeedDrive\S* is missing, there are binaries for none"),
         (foreign, r"Foreign\.fmu cannot be instantiated: .*(?i:guid)"),
