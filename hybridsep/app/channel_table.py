@@ -40,7 +40,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
         missing = [role for role in _ROLES if role != "t" and role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):
             words = " and ".join(_ROLES[role] for role in missing)
-            options = " ".join(f"--{role.replace('_', '-')} NAME" for role in missing)
+            options = " ".join(f"--{role} NAME" for role in missing)
             console.print(
                 f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}",
                 soft_wrap=True,

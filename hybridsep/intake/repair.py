@@ -64,7 +64,7 @@ def _check_motion(log: Log) -> None:
         raise LogError(
             f"{log.path}: the {' and the '.join(still)} position never change{'s' if len(still) == 1 else ''}: an axis "
             "at rest shows neither its model nor its errors; record it while it moves over the travel that is used, or "
-            "name other columns (--x-d NAME, --x NAME)"
+            "name other columns (--x_d NAME, --x NAME)"
         )
 
 

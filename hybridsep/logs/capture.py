@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..base.errors import LogError, brief, first_line, listed
+from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .source import Block, Source, sample_number
+from .source import ArraysSource
 
 __all__ = ["CaptureSource"]
 
@@ -25,7 +25,7 @@ _ROTARY = ("A", "B", "C", "SP", "S")
 """Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
 
 
-class CaptureSource(Source):
+class CaptureSource(ArraysSource):
     """Recording of a Siemens controller in Capture's JSON, read whole.
 
     The columns are the high-frequency signals under their own names, such as ``DES_POS|1``, and ``t`` from ``CYCLE``.
@@ -52,59 +52,32 @@ class CaptureSource(Source):
         cycle = header.get("CycleTimeMs")
         if isinstance(cycle, bool) or not isinstance(cycle, (int, float)) or not 0 < cycle < math.inf:
             raise LogError(f"{path}: Header.CycleTimeMs must be a number of milliseconds above 0, got {brief(cycle)}")
-        self._values = _rows(path, _entry(path, content, "Payload", list), len(names))
-        self._columns = {name: self._values[:, i] for i, name in enumerate(names)}
+        values = _rows(path, _entry(path, content, "Payload", list), len(names))
+        self._columns = {name: values[:, i] for i, name in enumerate(names)}
         self.names = list(names)
         if _COUNTER in self._columns:
             self._columns[_TIME] = 1e-3 * cycle * (self._columns[_COUNTER] - self._columns[_COUNTER][0])
             self.names.append(_TIME)
         axes = {signal["Name"]: signal["Axis"] for signal in signals}
-        self._axes = {
-            axes[name]: name.removeprefix(f"{_COMMANDED}|")
-            for name in names
-            if name.startswith(f"{_COMMANDED}|") and name.replace(_COMMANDED, _MEASURED, 1) in self._columns
-        }
+        pairs = {name: name.replace(_COMMANDED, _MEASURED, 1) for name in names if name.startswith(f"{_COMMANDED}|")}
+        self.axes = {axes[x_d]: (x_d, x) for x_d, x in pairs.items() if x in self._columns}
+        moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(self._columns[x_d]) != 0.0]
+        self.axis = moving[0] if moving else ""
         self.assumed_units = {
             name: "deg" if axis.upper().startswith(_ROTARY) else "mm"
             for name, axis in axes.items()
             if name.split("|")[0] in (_COMMANDED, _MEASURED)
         }
-        self.axes = list(self._axes)
-        self._choose_first()
+        self.roles = {"t": _TIME} if _TIME in self._columns else {}
 
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is a JSON object with the list of signals near its beginning."""
         return head.lstrip().startswith(b"{") and _SIGNALS in head
 
-    def choose_axis(self, axis: str) -> None:
-        """Choose an axis by its name, such as X1, or by its number in the signals' names."""
-        known = {name.lower(): number for name, number in self._axes.items()}
-        number = known.get(axis.lower(), axis if axis in self._axes.values() else None)
-        if number is None:
-            there = listed([f"{name:.20} ({number:.20})" for name, number in self._axes.items()], str)
-            raise LogError(
-                f"{self.path}: axis {brief(axis)} is missing; {_COMMANDED} and {_MEASURED} are there for {there}"
-            )
-        self._choose(number)
-        self.remarks = []
-
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        for i in range(0, len(self._values), n):
-            yield Block([self._columns[name][i : i + n] for name in names], sample_number(i))
-
-    def _choose_first(self) -> None:
-        moving = [name for name, number in self._axes.items() if np.ptp(self._columns[f"{_COMMANDED}|{number}"]) != 0.0]
-        chosen = next(iter(moving or self._axes), None)
-        self.roles = {_TIME: _TIME} if _TIME in self._columns else {}
-        if chosen is not None:
-            self._choose(self._axes[chosen])
-            if len(self._axes) > 1:
-                self.remarks = [f"axis {chosen} of {', '.join(self._axes)} is read; axis='…' (--axis) chooses another"]
-
-    def _choose(self, number: str) -> None:
-        self.roles = {**self.roles, "x_d": f"{_COMMANDED}|{number}", "x": f"{_MEASURED}|{number}"}
+    def column(self, name: str) -> Array:
+        """Return a signal."""
+        return self._columns[name]
 
 
 def _entry(path: Path, table: Any, name: str, kind: type, place: str = "") -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,8 +12,9 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
+from .names import ROLES, axes_of, guesses, known_names
 from .source import ArraysSource, Channel, Source
-from .text_layout import is_number
+from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
@@ -23,9 +26,6 @@ COUNT = "such as unit='0.1um' (--unit 0.1um)"
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
-ROLES = ("t", "x_d", "x")
-"""Time, commanded and measured position."""
-
 _GAP = 1.5
 """Intervals of the slower column between two samples of the faster one from which on the latter has a gap."""
 
@@ -33,19 +33,6 @@ _SAME = 1e-6
 """Largest difference of two channels' times, relative to their interval, at which they are the same: rounding."""
 
 _BLOCK = 10_000
-
-_NAMES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
-    "x_d": (
-        "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
-        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "des_pos", "q_d",
-    ),
-    "x": (
-        "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
-        "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
-    ),
-}  # fmt: skip
-"""Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +55,12 @@ class Column:
 
 
 def choose_columns(
-    source: Source, columns: Mapping[str, str] | None, unit: str | None, *, time_needed: bool
+    source: Source,
+    columns: Mapping[str, str] | None,
+    unit: str | None,
+    *,
+    axis: str | None = None,
+    time_needed: bool,
 ) -> dict[str, Column]:
     """Return the columns to read, by role.
 
@@ -79,6 +71,8 @@ def choose_columns(
         Names by role; a name may leave out the unit that the file's has.
     unit : str, optional
         Unit of the positions.
+    axis : str, optional
+        One of several axes, by the format's name or the columns' names: ``X1`` of ``X1_CommandPosition``.
     time_needed : bool
         Whether a time column must be there.
 
@@ -90,14 +84,15 @@ def choose_columns(
     for role in columns or ():
         if role not in ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
-    given = columns or {}
-    chosen = {role: _name(source, role, given.get(role)) for role in ("x_d", "x")}
+    given = dict(columns or {})
+    chosen, remarks = _positions(source, given, axis)
     own = source.times.get(chosen["x_d"] or "")
     chosen = {"t": own if own and "t" not in given else _name(source, "t", given.get("t")), **chosen}
     if chosen["t"] is None and "t" not in given and time_needed:
         chosen["t"] = _only_clock(source)
     if chosen["t"] is None and "t" not in given and not time_needed:
         del chosen["t"]
+    source.remarks = [*source.remarks, *remarks]
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
@@ -117,27 +112,57 @@ def choose_columns(
     return found
 
 
+def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tuple[dict[str, str | None], list[str]]:
+    """Return the names of commanded and measured position, None of what is not there, and remarks.
+
+    Those that are given count, then the named axis, the library's own names, the first axis that the format or the
+    names tell, and the other one of an axis of which one is given.
+    """
+    axes = source.axes or axes_of(source.names)
+    chosen = {role: _name(source, role, given[role]) for role in ("x_d", "x") if role in given}
+    if axis is not None:
+        found, remarks = _of_axis(source, axes, axis), list[str]()
+        pair: tuple[str | None, str | None] = found
+    else:
+        own = {} if source.axes else {role: _name(source, role, None) for role in ("x_d", "x") if role not in given}
+        partner = next((pair for pair in axes.values() if set(pair) & set(chosen.values())), None)
+        first = source.axis or next(iter(axes), None)
+        pair, remarks = (own.get("x_d"), own.get("x")), []
+        if partner is not None:
+            pair = partner
+        elif first is not None and not given and None in pair:
+            pair = axes[first]
+        read = next((name for name, one in axes.items() if one == pair), None)
+        if len(axes) > 1 and read is not None and not given:
+            remarks = [f"axis {read} of {listed(list(axes), str)} is read; axis='…' (--axis) chooses another"]
+    return {"x_d": pair[0], "x": pair[1], **chosen}, remarks
+
+
+def _of_axis(source: Source, axes: Mapping[str, tuple[str, str]], axis: str) -> tuple[str, str]:
+    """Return the positions of an axis by its name in any case, the end of it, or its number in the columns' names."""
+    for name, pair in axes.items():
+        ends = (re.split(r"[._ ]", name)[-1], pair[0].partition("|")[2])
+        if axis.lower() in (name.lower(), *(end.lower() for end in ends if end)):
+            return pair
+    there = f"there are {listed(list(axes), str)}" if axes else "no names tell axes: name the columns, --x_d and --x"
+    raise LogError(f"{source.path}: axis {brief(axis)} is missing; {there}")
+
+
 def _name(source: Source, role: str, given: str | None) -> str | None:
     """Return the file's name of a role's column, None if there is none.
 
     A given name is the file's own, with its unit or without; otherwise the format's own choice counts, then the known
-    names as they are, then the known names without units and in any spelling.
+    names.
     """
-    plain = {name: stated_unit(name)[0] for name in source.names}
     if given is not None:
-        known = [name for name in source.names if name == given] or [name for name in plain if plain[name] == given]
-        return known[0] if known else None
+        plain = [name for name in source.names if stated_unit(name)[0] == given]
+        return next((name for name in source.names if name == given), plain[0] if plain else None)
     if role in source.roles:
         return source.roles[role]
-    for spelled in ({name: name for name in source.names}, {name: _spelling(plain[name]) for name in source.names}):
-        for key in _NAMES[role]:
-            known = [name for name in source.names if spelled[name] == key]
-            if len(set(known)) > 1:
-                there = listed(known)
-                raise LogError(f"{source.path}: column {role} may be {there}; name it: --{_option(role)} NAME")
-            if known:
-                return known[0]
-    return None
+    known = known_names(role, source.names)
+    if len(set(known)) > 1:
+        raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")
+    return known[0] if known else None
 
 
 def _only_clock(source: Source) -> str | None:
@@ -150,16 +175,8 @@ def _only_clock(source: Source) -> str | None:
     return clocks[0]
 
 
-def _spelling(name: str) -> str:
-    return name.strip().lower().replace(" ", "_").replace("-", "_").replace(".", "_")
-
-
-def _option(role: str) -> str:
-    return role.replace("_", "-")
-
-
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
-    """Return the error of columns that are not there, by role."""
+    """Return the error of columns that are not there, by role, with the options that name those that may be meant."""
     there = listed(source.names)
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
@@ -170,9 +187,13 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
         )
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
-    options = " ".join(f"--{_option(role)} NAME" for role in names)
+    meant = dict(guesses(source.names, list(names)))
+    options = " ".join(f"--{role} {shlex.quote(name) if name else 'NAME'}" for role, name in meant.items())
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
+    error = LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
+    if all(meant.values()):
+        error.options = ((options, "if these are meant"),)
+    return error
 
 
 def _stated(source: Source, name: str) -> str:
@@ -196,7 +217,7 @@ def _time(source: Source, name: str) -> Column:
 def _position(source: Source, name: str, given: str | None) -> Column:
     if name in source.stamps:
         raise LogError(
-            f"{source.path}: column {brief(name)} must be a position, it holds timestamps; name another: --x-d NAME, "
+            f"{source.path}: column {brief(name)} must be a position, it holds timestamps; name another: --x_d NAME, "
             "--x NAME"
         )
     text = _stated(source, name)
@@ -207,7 +228,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
     if text and unit is None and not counts:
         raise LogError(
             f"{source.path}: column {brief(name)} must be a position in one of {', '.join(POSITION_UNITS)}, its unit "
-            f"is {brief(text)}; is it another quantity? Name another column (--x-d NAME, --x NAME), or correct the unit"
+            f"is {brief(text)}; is it another quantity? Name another column (--x_d NAME, --x NAME), or correct the unit"
         )
     chosen = position_unit(given) if given is not None else None
     if unit is not None and chosen not in (None, unit):
@@ -225,10 +246,11 @@ def channels(source: Source) -> list[Channel]:
     Samples are counted, and the interval is the mean of the times, s, where a column is the time. What is read without
     a word of the user's has a role.
     """
-    roles = {}
-    for role in ROLES:
-        with suppress(LogError):  # there are several
-            roles[_name(source, role, None)] = role
+    roles: dict[str | None, str] = {}
+    with suppress(LogError):  # there are several
+        roles.update((name, role) for role, name in _positions(source, {}, None)[0].items())
+    with suppress(LogError):
+        roles[source.times.get(next(iter(roles), None) or "") or _name(source, "t", None) or _only_clock(source)] = "t"
     t = next((name for name, role in roles.items() if role == "t"), None)
     whole, clocks = isinstance(source, ArraysSource), {*source.times.values(), t}
     extents: dict[str, tuple[int | None, float | None]] = {}
@@ -353,7 +375,7 @@ class _Resampled(ArraysSource):
     def __init__(self, source: Source, columns: Mapping[str, Array], remark: str) -> None:
         super().__init__(source.path)
         self._columns = columns
-        self.names, self.units, self.roles = source.names, source.units, source.roles
+        self.names, self.units, self.axes = source.names, source.units, source.axes
         self.remarks = [*source.remarks, remark]
 
     @staticmethod

@@ -17,8 +17,7 @@ import numpy as np
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
 from .source import Block, Channel, Source, line_number
-from .text import TextSource, bounded_lines, with_own_names
-from .text_layout import decimal_points, is_number, split
+from .text import TextSource, bounded_lines, decimal_points, is_number, split, with_own_names
 
 __all__ = ["HalscopeCsvSource", "HalscopePairsSource"]
 
@@ -48,31 +47,13 @@ class _HalscopeSource(Source):
     def _end(self, names: Sequence[str]) -> None:
         """Add the time to the columns, and find the joints among them."""
         self.names = [*names, _TIME] if _TIME not in names else list(names)
-        self._joints: dict[str, tuple[str, str]] = {}
+        self.axes = {}
         for commanded, measured in zip(_COMMANDED, _MEASURED, strict=True):
             for name in names:
                 joint = name.removesuffix(f".{commanded}")
                 if joint != name and f"{joint}.{measured}" in names:
-                    self._joints.setdefault(joint, (name, f"{joint}.{measured}"))
-        self.axes = list(self._joints)
-        self.roles = {_TIME: _TIME}
-        self.remarks = [_UNIT]
-        if self._joints:
-            self.choose_axis(next(iter(self._joints)))
-            if len(self._joints) > 1:
-                first, *_ = self._joints
-                self.remarks.append(f"{first} of {', '.join(self._joints)} is read; axis='…' (--axis) chooses another")
-
-    def choose_axis(self, axis: str) -> None:
-        """Choose a joint by the names of its pins, ``joint.0``, or by its number."""
-        known = [joint for joint in self._joints if axis in (joint, joint.rpartition(".")[2])]
-        if not known:
-            there = listed(list(self._joints), str)
-            raise LogError(
-                f"{self.path}: axis {brief(axis)} is missing; {_COMMANDED[0]} and {_MEASURED[0]} are there for {there}"
-            )
-        x_d, x = self._joints[known[0]]
-        self.roles = {_TIME: _TIME, "x_d": x_d, "x": x}
+                    self.axes.setdefault(joint, (name, f"{joint}.{measured}"))
+        self.roles = {"t": _TIME}
         self.remarks = [_UNIT]
 
     def channels(self) -> list[Channel]:
@@ -95,7 +76,7 @@ class HalscopeCsvSource(_HalscopeSource, TextSource):
         with path.open(encoding="utf-8", errors="replace") as file:
             names = split(list(islice(bounded_lines(path, file), 2))[-1].rstrip("\r\n"), ";")
         # Positions and scales of the screen stand in comments between names and numbers
-        self._layout = replace(self._layout, names=names, units={}, header=2)
+        self._table = replace(self._table, names=names, units={}, header=2)
         own, self.twins = with_own_names(names)
         self.units = {}
         self._end(own)

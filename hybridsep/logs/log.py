@@ -115,8 +115,6 @@ class LogReader:
         Unit of the positions that are returned.
     file_unit : str
         Their unit in the file.
-    remarks : tuple of str
-        What was chosen that the user may want to change.
     """
 
     def __init__(
@@ -134,18 +132,22 @@ class LogReader:
         self.path = Path(path)
         given = check_reading(unit, T_s)
         self._source = open_source(self.path)
-        if axis is not None:
-            self._source.choose_axis(axis)
-        chosen = choose_columns(self._source, columns, unit, time_needed=given is None)
+        chosen = choose_columns(self._source, columns, unit, axis=axis, time_needed=given is None)
         self._may_miss = not uniform if may_miss is None else may_miss
-        self._source.measured, self._source.may_miss = chosen["x"].name, self._may_miss
+        self._source.commanded, self._source.measured = chosen["x_d"].name, chosen["x"].name
+        self._source.may_miss = self._may_miss
         self._source, self._columns = on_one_clock(self._source, chosen, resample=resample)
         self.unit, self.file_unit = self._columns["x_d"].unit.si, self._columns["x_d"].unit.name
-        self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
+        self._guesses = list(self._guessed(columns or {}))
         self._uniform = uniform
         self._check_twins()
         self.is_even = True
         self.n_samples, self.T_s = self._scan(given)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was chosen, left out or filled that the user may want to change."""
+        return (*self._source.remarks, *self._guesses, *self._source.notes())
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
         """Iterate over the log as pairs ``(x_d, x_meas)``, in :attr:`unit`, of at most ``n`` samples each.
@@ -197,12 +199,12 @@ class LogReader:
 
     def _guessed(self, given: Mapping[str, str]) -> Iterator[str]:
         """Yield a remark if a column of positions was recognised by a name other than the library's own."""
-        known = {*_OWN_NAMES, *self._source.roles.values()}
+        known = {*_OWN_NAMES, *(name for pair in self._source.axes.values() for name in pair)}
         roles = [role for role in ("x_d", "x") if role not in given]
         if any(stated_unit(self._columns[role].name)[0] not in known for role in roles):
             x_d, x = brief(self._columns["x_d"].name), brief(self._columns["x"].name)
             yield (
-                f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x-d, --x) name "
+                f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x_d, --x) name "
                 "others"
             )
 

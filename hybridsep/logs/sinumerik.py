@@ -17,10 +17,10 @@ from xml.parsers import expat
 
 import numpy as np
 
-from ..base.errors import LogError, brief, first_line, listed
+from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import ArraysSource, Channel
-from .text_layout import is_number
+from .text import is_number
 
 __all__ = ["SinumerikSource"]
 
@@ -149,13 +149,7 @@ class SinumerikSource(ArraysSource):
         self.names = [*self._signals, *self._clocks]
         self.units = dict.fromkeys(self._clocks, "s")
         self.assumed_units = {name: "mm" for name, signal in self._signals.items() if signal.kind == "posn"}
-        self._axes = self._positions()
-        self.axes = list(self._axes)
-        if self._axes:
-            first = next(iter(self._axes))
-            self.choose_axis(first)
-            if len(self._axes) > 1:
-                self.remarks = [f"axis {first} of {', '.join(self._axes)} is read; axis='…' (--axis) chooses another"]
+        self.axes = self._positions()
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -169,17 +163,6 @@ class SinumerikSource(ArraysSource):
             replace(one, n_samples=known[one.name].n, interval=known[one.name].interval) if one.name in known else one
             for one in super().channels()
         ]
-
-    def choose_axis(self, axis: str) -> None:
-        """Choose an axis by its number in the signals' addresses."""
-        if axis not in self._axes:
-            raise LogError(
-                f"{self.path}: axis {brief(axis)} is missing; a commanded and a measured position are there for "
-                f"{listed(list(self._axes), str)}"
-            )
-        x_d, x = self._axes[axis]
-        self.roles = {"x_d": x_d, "x": x}
-        self.remarks = []
 
     def column(self, name: str) -> Array:
         """Return the times of a clock, or a signal's values, each held until the next one."""

@@ -97,12 +97,14 @@ class Source(ABC):
     times : mapping
         Name of a column → column of its times, where columns may be sampled at rates of their own; only those with the
         same times can be read side by side.
-    axes : sequence of str
-        Axes that :meth:`choose_axis` takes, where the format names several.
+    axes : mapping
+        Name of an axis → its columns of commanded and measured position, where the format names them.
+    axis : str
+        Axis that is read without a word of the user's, where it is not the first one.
     remarks : list of str
         What was chosen for the reader that the user may want to change.
-    measured : str
-        Column of the measured position.
+    commanded, measured : str
+        Columns of the positions that are read.
     may_miss : bool
         Whether nothing between two delimiters stands for NaN there.
     """
@@ -119,9 +121,10 @@ class Source(ABC):
         self.roles: Mapping[str, str] = {}
         self.stamps: Set[str] = frozenset()
         self.times: Mapping[str, str] = {}
-        self.axes: Sequence[str] = ()
+        self.axes: Mapping[str, tuple[str, str]] = {}
+        self.axis = ""
         self.remarks: list[str] = []
-        self.measured, self.may_miss = "", False
+        self.commanded, self.measured, self.may_miss = "", "", False
 
     @staticmethod
     @abstractmethod
@@ -138,9 +141,9 @@ class Source(ABC):
         units = {**self.assumed_units, **self.units}
         return [Channel(name, units.get(name, ""), roles.get(name, "")) for name in self.names]
 
-    def choose_axis(self, axis: str) -> None:
-        """Choose one of several axes by its name; LogError if the format holds a single one."""
-        raise LogError(f"{self.path}: axis {brief(axis)} was named, but a {self.format} file holds columns: name those")
+    def notes(self) -> list[str]:
+        """Return what the last pass over the file left out or filled."""
+        return []
 
 
 class ArraysSource(Source):

@@ -1,14 +1,23 @@
-"""Streaming reader of delimited text, plain or gzip-compressed."""
+"""Streaming reader of delimited text, plain or gzip-compressed.
+
+The first lines tell the table: what delimits its fields, where its numbers begin, and which line above them has the
+names. Below, a line without any number (an ``overrun``, names that are written again) is left out and counted; what is
+left must have the table's columns.
+"""
 
 from __future__ import annotations
 
 import codecs
+import csv
 import gzip
 import math
+import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
@@ -16,42 +25,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief, first_line
-from .source import NEEDS_TRUST, Block, Source
-from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
+from .names import n_known
+from .source import NEEDS_TRUST, Block, Source, line_number
 from .timestamps import CELL, Clock, cell, stamp_kind
+from .units import plain_name, position_unit, time_unit
 
-__all__ = ["TextSource", "bounded_lines", "with_own_names"]
+__all__ = ["TextSource", "bounded_lines", "decimal_points", "is_number", "split", "with_own_names"]
 
-_HEAD_LINES = 400
+_HEAD_LINES = 1000
 """Lines, blank ones aside, in which names and numbers must begin."""
 
 _LINE_MAX = 1_000_000
 """Largest length of a line, in characters: a thousand columns; a file without line ends must not fill the memory."""
 
-_NUMBER_BEGINS = frozenset("0123456789+-.")
-"""First characters that most lines have, and no comment."""
+_COMMENTS = ("#", "%", "//", "!")
+"""Beginnings of a comment line."""
+
+_DELIMITERS = (";", "\t", ",", None)
+"""Delimiters by precedence; None is blanks."""
+
+_NO_UNITS = ("", "-", "1", "[-]")
+"""Entries of a row of units where a column has none."""
+
+_MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|null|none", re.IGNORECASE)
+"""Spellings of a missing number: of C libraries, R, databases and Excel."""
 
 _GZIP = b"\x1f\x8b"
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
 
 
-def _as_latin_1(error: UnicodeError) -> tuple[str, int]:
-    """Read bytes that are no UTF-8 as Latin-1, in which every byte is a character."""
-    if not isinstance(error, UnicodeDecodeError):
-        raise error
-    return error.object[error.start : error.end].decode("latin-1"), error.end
+@dataclass(frozen=True)
+class _Table:
+    """Table of a text.
 
+    Attributes
+    ----------
+    names : list of str
+        Column names, one empty where rows have names of their own.
+    units : dict
+        Name → unit, from a row of units below the names.
+    delimiter : str or None
+        Between columns; None is blanks.
+    decimal_comma : bool
+        Whether numbers have a decimal comma.
+    header : int
+        Line number of the names, from 1.
+    first : int
+        Line number from which numbers are read.
+    clocks : mapping
+        Index of a column of timestamps with a time of day → index of the column with their dates, None if they hold
+        them or there are none.
+    """
 
-_FALLBACK = "hybridsep-latin-1"
-codecs.register_error(_FALLBACK, _as_latin_1)
+    names: list[str]
+    units: dict[str, str]
+    delimiter: str | None
+    decimal_comma: bool
+    header: int
+    first: int
+    clocks: Mapping[int, int | None]
 
 
 class TextSource(Source):
     """Text with a line of column names, then numbers, delimited by comma, semicolon, tab or blanks.
 
     Preamble, comments and a row of units are skipped, decimal commas are read; columns of timestamps become seconds.
-    UTF-8, UTF-16 with a byte-order mark or Latin-1, plain or in gzip.
+    UTF-8, UTF-16 with a byte-order mark or Latin-1, plain or in gzip. A blank cell of the command is as before, as
+    controllers' traces write it.
     """
 
     format = "text"
@@ -60,28 +101,26 @@ class TextSource(Source):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         with path.open("rb") as file:
-            start = file.read(4)
-        self._compressed = start.startswith(_GZIP)
-        self._encoding = "utf-8-sig"
+            self._compressed = file.read(2) == _GZIP
         try:
-            if self._compressed:
-                with gzip.open(path) as packed:
-                    start = packed.read(4)
-            self._encoding = "utf-16" if start.startswith(_UTF_16) else "utf-8-sig"
-            with self._open() as file:
-                numbered = ((i, line) for i, line in enumerate(bounded_lines(self.path, file), 1) if not line.isspace())
-                layout = find_layout(list(islice(numbered, _HEAD_LINES)))
+            with gzip.open(path) if self._compressed else path.open("rb") as file:
+                self._encoding = _encoding(file.read(1 << 16))
+            with self._open() as text:
+                numbered = ((i, line) for i, line in enumerate(bounded_lines(self.path, text), 1) if not line.isspace())
+                table = _find_table(list(islice(numbered, _HEAD_LINES)))
         except _DAMAGE as error:
             raise LogError(f"{path}: is truncated or damaged: {first_line(error)}") from error
-        if layout is None:
+        if table is None:
             raise LogError(f"{path}: the file is empty, a line of column names was expected")
-        self._layout: Layout = layout
-        self.names, self.twins = with_own_names(layout.names)
-        self.units = layout.units | {
-            twin: layout.units[name] for name, twins in self.twins.items() if name in layout.units for twin in twins
+        self._table: _Table = table
+        self.names, self.twins = with_own_names(table.names)
+        self.units = table.units | {
+            twin: table.units[name] for name, twins in self.twins.items() if name in table.units for twin in twins
         }
-        self.stamps = frozenset(self.names[i] for i in layout.clocks)
-        self._dates = {i: date for i, date in layout.clocks.items() if date is not None}
+        self.stamps = frozenset(self.names[i] for i in table.clocks)
+        self._dates = {i: date for i, date in table.clocks.items() if date is not None}
+        self._left_out: list[tuple[int, str]] = []
+        self._held, self._last = 0, math.nan
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -94,90 +133,120 @@ class TextSource(Source):
         clocks = {
             i: Clock(self.path, self.names[i], self.names[self._dates[i]] if i in self._dates else "")
             for i in use
-            if i in self._layout.clocks
+            if i in self._table.clocks
         }
-        line = self._layout.first - 1
+        line = self._table.first - 1
+        self._left_out, self._held, self._last = [], 0, math.nan
         try:
             with self._open() as file:
                 rest = islice(bounded_lines(self.path, file), line, None)
                 while lines := list(islice(rest, n)):
-                    numbers = [line + 1 + i for i, text in enumerate(lines) if not _is_skipped(text)]
+                    numbered = [
+                        (line + i, text) for i, text in enumerate(lines, 1) if not self._is_skipped(line + i, text)
+                    ]
                     line += len(lines)
-                    if len(numbers) < len(lines):
-                        lines = [text for text in lines if not _is_skipped(text)]
-                    if lines:
-                        yield self._block(lines, numbers, use, clocks)
+                    if numbered:
+                        yield self._block(numbered, use, clocks)
         except _DAMAGE as error:
             raise LogError(f"{self.path}: is truncated or damaged after line {line}: {first_line(error)}") from error
 
+    def notes(self) -> list[str]:
+        """Return what the last pass over the file left out or filled."""
+        notes = []
+        if self._left_out:
+            number, text = self._left_out[0]
+            n = len(self._left_out)
+            notes.append(
+                f"{n} line{'s' if n > 1 else ''} without numbers among the rows left out, line {number} first: "
+                f"{brief(text.strip())}"
+            )
+        if self._held:
+            notes.append(
+                f"column {brief(self.commanded)} is blank in {self._held} rows: read as before, as a trace of changes"
+            )
+        return notes
+
     def _open(self) -> IO[str]:
         if self._compressed:
-            return gzip.open(self.path, "rt", encoding=self._encoding, errors=self._errors)
-        return self.path.open(encoding=self._encoding, errors=self._errors)
+            return gzip.open(self.path, "rt", encoding=self._encoding, errors="replace")
+        return self.path.open(encoding=self._encoding, errors="replace")
 
-    @property
-    def _errors(self) -> str:
-        return _FALLBACK if self._encoding == "utf-8-sig" else "replace"
+    def _is_skipped(self, number: int, text: str) -> bool:
+        """Return whether a line is blank, a comment or has no number, which is noted."""
+        if text[0].isdigit() or text.isspace() or text.lstrip().startswith(_COMMENTS):
+            return not text[0].isdigit()
+        fields = split(text.strip(" \r\n"), self._table.delimiter)
+        if any(is_number(decimal_points(field)) or stamp_kind(field) for field in fields):
+            return False
+        self._left_out.append((number, text))
+        return True
 
-    def _block(self, lines: list[str], numbers: list[int], use: list[int], clocks: Mapping[int, Clock]) -> Block:
+    def _block(self, numbered: list[tuple[int, str]], use: list[int], clocks: Mapping[int, Clock]) -> Block:
         """Return a block of the columns ``use``, timestamps as seconds."""
         dates = {i: self._dates[i] for i in clocks if i in self._dates}
         read = [*use, *dates.values()]
-        found = dict(zip(read, self._columns(lines, numbers, read, {*clocks, *dates.values()}), strict=True))
-
-        def where(i: int) -> str:
-            return f"line {numbers[i]}"
-
+        found = dict(zip(read, self._columns(numbered, read, {*clocks, *dates.values()}), strict=True))
+        where = line_number([number for number, _ in numbered])
         for i, clock in clocks.items():
             found[i] = clock.seconds(found[i], where, found[dates[i]] if i in dates else None)
         return Block([found[i] for i in use], where)
 
-    def _columns(self, lines: list[str], numbers: list[int], use: list[int], stamps: Set[int]) -> list[NDArray[Any]]:
+    def _columns(self, numbered: list[tuple[int, str]], use: list[int], stamps: set[int]) -> list[NDArray[Any]]:
         """Return the columns ``use``, ``stamps`` among them as text."""
-        mark, expected = self._layout.delimiter, len(self._layout.names)
-        if self._layout.decimal_comma:
-            lines = [decimal_points(text) for text in lines]
+        mark, expected = self._table.delimiter, len(self._table.names)
+        lines = [decimal_points(text) if self._table.decimal_comma else text for _, text in numbered]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
         if min(widths) != expected or max(widths) != expected:
-            widths = [len(split(text, mark)) for text in lines]  # without delimiters between quotation marks
-        if min(widths) != expected or max(widths) != expected:
-            i = next(i for i, width in enumerate(widths) if width != expected)
-            self._convert(lines[i], numbers[i], use, stamps)  # a decimal comma is the likelier fault
-            raise LogError(
-                f"{self.path}, line {numbers[i]}: {expected} columns were expected as in line {self._layout.header}, "
-                f"got {widths[i]}"
-            )
+            for (number, _), text in zip(numbered, lines, strict=True):
+                fields = split(text.strip(" \r\n"), mark)  # without delimiters between quotation marks
+                if len(fields) < expected or any(fields[expected:]):
+                    self._row(text, number, use, stamps)  # a decimal comma is the likelier fault
+                    raise LogError(
+                        f"{self.path}, line {number}: {expected} columns were expected as in line "
+                        f"{self._table.header}, got {len(fields)}"
+                    )
         types = np.dtype([(str(k), CELL.str if i in stamps else "f8") for k, i in enumerate(use)])
         try:
             rows = np.loadtxt(lines, types, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=1)
-        except ValueError:
-            # Line by line, for the message, or for a notation that only Python's float() accepts.
-            converted = [self._convert(text, number, use, stamps) for text, number in zip(lines, numbers, strict=True)]
+        except ValueError:  # what is no number, or one that only Python's float() accepts
+            converted = [
+                self._row(text, number, use, stamps) for (number, _), text in zip(numbered, lines, strict=True)
+            ]
             rows = np.array(converted, types)
-        return [np.ascontiguousarray(rows[name]) for name in types.names or ()]
+        columns = [np.ascontiguousarray(rows[name]) for name in types.names or ()]
+        for i, column in zip(use, columns, strict=True):
+            if self.names[i] == self.commanded and i not in stamps:
+                self._last = float(column[-1])
+        return columns
 
-    def _convert(self, text: str, number: int, use: list[int], stamps: Set[int]) -> tuple[float | bytes, ...]:
+    def _row(self, text: str, number: int, use: list[int], stamps: set[int]) -> tuple[float | bytes, ...]:
         """Return the numbers, and texts of ``stamps``, of one line in the columns ``use``, as far as it has them."""
-        fields = split(text.strip(" \r\n"), self._layout.delimiter)
+        fields = split(text.strip(" \r\n"), self._table.delimiter)
         row: list[float | bytes] = []
         for i in use:
             if i >= len(fields):
                 continue
+            name, field = self.names[i], fields[i]
+            missing = (not field or _MISSING.fullmatch(field)) and name in (
+                *(self.measured, *self.twins.get(self.measured, ())),
+            )
             if i in stamps:
-                row.append(cell(fields[i]))
-                continue
-            missing = not fields[i] and self.names[i] in (self.measured, *self.twins.get(self.measured, ()))
-            if missing and self.may_miss:
+                row.append(cell(field))
+            elif is_number(decimal_points(field)):
+                row.append(float(decimal_points(field)))
+            elif missing and self.may_miss:
                 row.append(math.nan)
-                continue
-            number_there = decimal_points(fields[i])
-            if not is_number(number_there):
-                came = brief(fields[i]) if fields[i] else "nothing"
+            elif not field and name == self.commanded and not math.isnan(self._last):
+                self._held += 1
+                row.append(self._last)
+            else:
+                came = brief(field) if field else "nothing"
                 raise LogError(
-                    f"{self.path}, line {number}: column {brief(self.names[i])} must be a number, got {came}"
-                    f"{NEEDS_TRUST if missing else _hint(fields[i], divided=len(fields) > len(self._layout.names))}"
+                    f"{self.path}, line {number}: column {brief(name)} must be a number, got {came}"
+                    f"{NEEDS_TRUST if missing else _hint(field, divided=len(fields) > len(self._table.names))}"
                 )
-            row.append(float(number_there))
+            if name == self.commanded and i not in stamps:
+                self._last = float(row[-1])
         return tuple(row)
 
 
@@ -202,6 +271,40 @@ def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]
     return own, twins
 
 
+def is_number(text: str) -> bool:
+    """Return whether a field is a number with a decimal point; an underscore is not one of its digits."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text
+
+
+def decimal_points(text: str) -> str:
+    """Return a text with decimal points for commas."""
+    return text.replace(",", ".")
+
+
+def split(line: str, delimiter: str | None) -> list[str]:
+    """Return the fields of a line without blanks and quotation marks around them."""
+    if delimiter is not None and '"' in line:
+        return [
+            field.strip().strip("'") for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+        ]
+    return [field.strip().strip("\"'") for field in line.split(delimiter)]
+
+
+def _encoding(head: bytes) -> str:
+    """Return the encoding of a text that begins with these bytes."""
+    if head.startswith(_UTF_16):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8-sig")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
 def _hint(field: str, *, divided: bool) -> str:
     if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
@@ -217,5 +320,145 @@ def _hint(field: str, *, divided: bool) -> str:
     return ""
 
 
-def _is_skipped(text: str) -> bool:
-    return text[0] not in _NUMBER_BEGINS and (text.isspace() or text.lstrip().startswith(COMMENTS))
+# Table
+
+
+def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
+    """Return the table of a file that begins with these lines, numbered from 1; None if they are all comments.
+
+    Of the delimiters that which gives most rows of numbers below names counts, then that with most columns. Where there
+    is none, the first line that is no comment is taken for the names, so that the reader's message names what is wrong
+    below it.
+    """
+    best: tuple[tuple[int, int], _Table] | None = None
+    for delimiter in _DELIMITERS:
+        rows = [(number, split(line.strip(" \r\n"), delimiter), line) for number, line in lines]
+        widths = [0 if line.lstrip().startswith(_COMMENTS) else _width(fields) for _, fields, line in rows]
+        for width in {*widths} - {0}:
+            begun = [i for i, (before, now) in enumerate(pairwise([0, *widths])) if now == width != before]
+            tables: dict[tuple[str, ...], tuple[int, _Table]] = {}
+            names: tuple[str, ...] = ()
+            for start in begun:
+                end = next((i for i in range(start, len(widths)) if widths[i] != width), len(widths))
+                table = _with_names(rows, start, end, delimiter)
+                names = names if table is None else tuple(table.names)
+                if names:  # written again among the rows, they begin no table
+                    n, first = tables.get(names, (0, table))
+                    assert first is not None
+                    tables[names] = (n + end - start, first)
+            for n, table in tables.values():
+                # That blanks divide a timestamp makes no column
+                divided = delimiter is None and any(date is not None for date in table.clocks.values())
+                score = (n, width - divided)
+                if best is None or score > best[0]:
+                    best = (score, table)
+    return _first_line(lines) if best is None else best[1]
+
+
+def _width(fields: Sequence[str]) -> int:
+    """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
+    numbers = sum(is_number(decimal_points(text)) for text in fields)
+    others = [text for text in fields if text and not is_number(decimal_points(text)) and not _MISSING.fullmatch(text)]
+    return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
+
+
+def _with_names(
+    rows: Sequence[tuple[int, list[str], str]], start: int, end: int, delimiter: str | None
+) -> _Table | None:
+    """Return the table of a run of rows below its names, and perhaps a row of units; None without them."""
+    fields = [row for _, row, _ in rows[start:end]]
+    width = len(fields[0])
+    blank = next(i for i in range(width) if any(row[width - 1 - i] for row in fields))  # at the ends of rows
+    kinds = [_kind([row[i] for row in fields]) for i in range(width)]
+    above: list[tuple[int, list[str]]] = []
+    for number, _, line in reversed(rows[:start]):
+        names = _names(line, delimiter)
+        if delimiter is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
+            i = list(pairwise(kinds)).index(("date", "time"))  # one name for both
+            names = [*names[:i], f"{names[i]} (date)", *names[i:]]
+        while len(names) > width - blank and not names[-1]:
+            names.pop()
+        if len(names) == width - blank - 1 and (blank == 0) and _are_row_names([row[0] for row in fields]):
+            names = ["", *names]
+        fits = width - blank <= len(names) <= width
+        if fits and not all(map(is_number, names)) and not any(map(stamp_kind, names)):
+            above.append((number, names))
+        elif not line.lstrip().startswith(_COMMENTS):
+            break
+    if not above:
+        return None
+    numeric = [i for i in range(len(above[0][1])) if not kinds[i]]  # hh:mm:ss may stand above timestamps
+    has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
+    header, names = _best_names(above[has_units:])
+    units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
+    comma = delimiter != "," and any("," in text for row in fields for text in row if is_number(decimal_points(text)))
+    stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
+    return _Table(names, stated, delimiter, comma, header, rows[start][0], _clocks(kinds))
+
+
+def _best_names(above: Sequence[tuple[int, list[str]]]) -> tuple[int, list[str]]:
+    """Return line and names, of the two rows above the numbers that with more known ones, or both where one repeats.
+
+    Above names that occur several times, the row above says of what: ``X axis,,Y axis,`` over ``cmd,act,cmd,act``.
+    """
+    (number, names), *others = above
+    if not others or len(others[0][1]) != len(names):
+        return number, names
+    upper = others[0][1]
+    groups, group = [], ""
+    for text in upper:
+        group = text or group
+        groups.append(group)
+    joined = [f"{group} {name}".strip() for group, name in zip(groups, names, strict=True)]
+    if len({*names}) < len(names) and len({*joined}) == len(joined) and n_known(upper) <= n_known(joined):
+        return number, joined
+    return others[0] if n_known(upper) > n_known(names) else (number, names)
+
+
+def _are_row_names(cells: Sequence[str]) -> bool:
+    """Return whether a column counts its rows or is text, as the names of rows in R's tables."""
+    if len(cells) < 2 or any(map(stamp_kind, cells)):
+        return False
+    return not any(map(is_number, cells)) or all(
+        is_number(one) and is_number(other) and float(other) == float(one) + 1.0 for one, other in pairwise(cells)
+    )
+
+
+def _kind(cells: Sequence[str]) -> str:
+    """Return which timestamps most cells of a column are, empty if they are none."""
+    ((kind, n),) = Counter(map(stamp_kind, cells)).most_common(1)
+    return kind if 2 * n > len(cells) else ""
+
+
+def _clocks(kinds: Sequence[str]) -> dict[int, int | None]:
+    """Return the columns with a time of day, each with the column beside it that holds the dates."""
+    clocks: dict[int, int | None] = {}
+    for i, kind in enumerate(kinds):
+        beside = [j for j in (i - 1, i + 1) if kind == "time" and 0 <= j < len(kinds) and kinds[j] == "date"]
+        if "time" in kind:
+            clocks[i] = beside[0] if beside else None
+    return clocks
+
+
+def _first_line(lines: Sequence[tuple[int, str]]) -> _Table | None:
+    known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
+    if not known:
+        return None
+    number, line = known[0]
+    delimiter = next((mark for mark in _DELIMITERS if mark and mark in line), None)
+    return _Table(_names(line, delimiter), {}, delimiter, False, number, number + 1, {})
+
+
+def _names(line: str, delimiter: str | None) -> list[str]:
+    """Return the fields of a line of names; a leading comment mark is how numpy.savetxt and MATLAB write theirs."""
+    line = line.strip(" \r\n")
+    for mark in _COMMENTS:
+        line = line.removeprefix(mark)
+    return split(line.strip(" "), delimiter)
+
+
+def _is_row_of_units(fields: Sequence[str]) -> bool:
+    texts = [field.strip("[]()").strip() for field in fields]
+    known = [bool(position_unit(text) or time_unit(text) or "/" in text) for text in texts]
+    blank = [plain_name(text) in _NO_UNITS for text in texts]
+    return any(known) and all(a or b for a, b in zip(known, blank, strict=True))

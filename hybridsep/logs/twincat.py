@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 from .source import Block, Channel, Source, line_number
-from .text import bounded_lines
-from .text_layout import decimal_points, is_number
+from .text import bounded_lines, decimal_points, is_number
 
 __all__ = ["TwinCatSource"]
 

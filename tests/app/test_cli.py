@@ -66,7 +66,7 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", header="time,command,position", scale=1e3)
-    names = ("--t", "time", "--x-d", "command", "--x", "position", "--unit", "mm")
+    names = ("--t", "time", "--x_d", "command", "--x", "position", "--unit", "mm")
     sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lam", 1e-11, "--t-init", 0.2)
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
     assert status == 0
@@ -294,7 +294,7 @@ def test_missing_columns_are_named_by_options(hybridsep: Run, tmp_path: Path) ->
     log = write_log(tmp_path / "log.csv", n=300, header="t,one,two")
     err = hybridsep("backtest", log, "-m", "spring_mass_damper")[2]
     assert err.startswith(f"error: {log}: columns 'x_d', 'x' are missing, the file has 't', 'one', 'two'")
-    assert err.endswith("; name them: --x-d NAME --x NAME\n")
+    assert err.endswith("; name them: --x_d NAME --x NAME\n")
 
 
 def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:

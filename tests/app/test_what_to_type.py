@@ -14,7 +14,7 @@ from staircase_data import commanded, measured
 @pytest.mark.parametrize("scale", [1e3, 6e4])  # refused by the checks, and by the reader
 def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
     log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
-    given = ("fit", log, "--x-d", "goal", "--x", "present")
+    given = ("fit", log, "--x_d", "goal", "--x", "present")
     status, out, err = hybridsep(*given, "--out", tmp_path / "fit")
     assert (status, out) == (2, "")
     lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
@@ -77,7 +77,7 @@ def test_channels_of_a_text_are_told(tmp_path: Path, hybridsep: Run) -> None:
     status, out, _ = hybridsep("fit", log, "--list-channels")
     assert status == 0
     words = "none is read as the commanded and measured position; name it: hybridsep fit "
-    assert f"{words}{log} --x-d NAME --x NAME" in out
+    assert f"{words}{log} --x_d NAME --x NAME" in out
 
 
 def test_a_log_at_rest_is_refused(tmp_path: Path, hybridsep: Run) -> None:

@@ -129,7 +129,7 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
         ("0,0,0\n1,0,nan\n", r"log\.csv, line 3: column 'x' must be finite, got nan"),
         ("0,0,0\n1,-inf,0\n", r"line 3: column 'x_d' must be finite, got -inf"),
         ("0,0,0\n1,abc,0\n", r"line 3: column 'x_d' must be a number, got 'abc'"),
-        ("0,0,0\n1,,0\n", r"line 3: column 'x_d' must be a number, got nothing"),
+        ("0,,0\n1,0,0\n", r"line 2: column 'x_d' must be a number, got nothing"),
         ("0,0,0\n1,1_0,0\n", r"line 3: column 'x_d' must be a number, got '1_0'"),
         ("0,0,0\n\n1,0\n", r"line 4: 3 columns were expected as in line 1, got 2"),
         ("0,0,0\n1,0,0,0\n", r"line 3: 3 columns were expected as in line 1, got 4"),

@@ -51,7 +51,7 @@ def test_columns_that_are_there_are_counted(tmp_path: Path) -> None:
     path = write(tmp_path / "log.npz", dict.fromkeys(MANY, np.zeros(9)))
     with pytest.raises(LogError, match=r"the file has 'column 0', .*, 'column 11' … and 988 more; name them: --t NAME"):
         read_log(path)
-    with pytest.raises(LogError, match=rf"axis '{'y' * 59}… \(1002 characters\) was named"):
+    with pytest.raises(LogError, match=rf"axis '{'y' * 59}… \(1002 characters\) is missing; no names tell axes"):
         read_log(write(tmp_path / "log.csv", columns()), axis="y" * 1000)
 
 

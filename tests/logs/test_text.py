@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from log_files import columns, write, write_csv
+from places import CASES
 
 from hybridsep.base.errors import LogError
 from hybridsep.logs.log import open_log, read_log
@@ -124,7 +125,7 @@ def test_a_given_unit_must_not_contradict_the_names(tmp_path: Path) -> None:
         read_log(path, unit="um")
     assert read_log(path, unit="mm").x_d[1] == read_log(path, unit="millimetre").x_d[1] == 3e-3
     assert read_log(path, columns={"x": "x"}).x_meas[1] == 4e-3
-    with pytest.raises(LogError, match=r"axis 'X1' was named, but a text file holds columns: name those"):
+    with pytest.raises(LogError, match=r"axis 'X1' is missing; no names tell axes: name the columns, --x_d and --x"):
         read_log(path, axis="X1")
 
 
@@ -160,7 +161,6 @@ def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
 @pytest.mark.parametrize(
     ("row", "problem"),
     [
-        ("1,,4", "column 'x_d' must be a number, got nothing$"),
         ("1,nan,4", "column 'x_d' must be finite, got nan$"),
         (",3,4", "column 't' must be a number, got nothing$"),
         ("1,3,inf", "column 'x' must be finite, got inf$"),
@@ -183,9 +183,123 @@ def test_counts_are_read_with_their_length(tmp_path: Path) -> None:
 def test_columns_that_were_recognised_are_said(tmp_path: Path) -> None:
     text = "t [s],X_cmd [mm],X_act [mm],Y_cmd [mm],Y_act [mm]\n0,1,2,3,4\n0.001,1,2,3,4\n"
     path = write_csv(tmp_path / "log.csv", text)
-    (remark,) = read_log(path).remarks
+    axis, remark = read_log(path).remarks
+    assert axis == "axis X of X, Y is read; axis='…' (--axis) chooses another"
     assert remark.startswith(
         "columns 'X_cmd [mm]' and 'X_act [mm]' are read as the commanded and the measured position"
     )
     assert read_log(path, columns={"x_d": "Y_cmd", "x": "Y_act"}).remarks == ()
     assert read_log(write_csv(path, "t,x_d [mm],x_meas\n0,1,2\n1,1,2\n")).remarks == ()
+
+
+# What recorders write beside their numbers
+
+
+ROWS = [f"{k / 1000:.3f},{k % 7},{k % 7}.5" for k in range(50)]
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases/logs beside the repository")
+@pytest.mark.parametrize(
+    ("name", "n", "missing"),
+    [
+        ("header_repeated", 78, []),
+        ("nan_nanind", 49, [21, 22]),
+        ("nan_qnan", 49, [21, 22]),
+        ("rownames_R", 59, []),
+        ("trail_header_only", 50, []),
+        ("trail_rows_only", 50, []),
+        ("trail_semicolon_rows", 50, []),
+    ],
+)
+def test_recorded_texts(name: str, n: int, missing: list[int]) -> None:
+    log = read_log(CASES / f"{name}.csv", uniform=False)
+    assert (len(log.t), log.T_s, log.file_unit, np.flatnonzero(np.isnan(log.x_meas)).tolist()) == (
+        n,
+        1e-3,
+        "mm",
+        missing,
+    )
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases/logs beside the repository")
+def test_a_trace_of_changes() -> None:
+    """A setpoint that is written when it changes, and an encoder that is sampled half as often."""
+    log = read_log(CASES / "sinumerik_axis7_blank_cells.csv", may_miss=True)
+    assert (len(log.t), log.T_s, log.unit, int(np.isnan(log.x_meas).sum())) == (3000, 2e-3, "rad", 1500)
+    assert not log.x_d.any()
+    assert log.remarks[-1] == (
+        "column 'Position setpoint [deg]' is blank in 2999 rows: read as before, as a trace of changes"
+    )
+
+
+@pytest.mark.parametrize(
+    "missing", ["NA", "N/A", "#N/A", "NULL", "null", "None", "-nan(ind)", "1.#QNAN", "-1.#IND00", ""]
+)
+def test_spellings_of_a_missing_measurement(tmp_path: Path, missing: str) -> None:
+    rows = [*ROWS[:10], f"0.010,3,{missing}", *ROWS[11:]]
+    log = read_log(write_csv(tmp_path / "log.csv", "\n".join(["t,x_d,x", *rows])), may_miss=True)
+    assert np.flatnonzero(np.isnan(log.x_meas)).tolist() == [10]
+
+
+def test_a_blank_command_is_as_before(tmp_path: Path) -> None:
+    log = read_log(write_csv(tmp_path / "log.csv", "t,x_d,x\n0,1,2\n1,,2\n2,,3\n3,4,4\n"))
+    assert log.x_d.tolist() == [1.0, 1.0, 1.0, 4.0]
+
+
+def test_lines_without_numbers_are_said(tmp_path: Path) -> None:
+    rows = [*ROWS[:10], "overrun", *ROWS[10:20], "t,x_d,x", *ROWS[20:], "end of recording"]
+    log = read_log(write_csv(tmp_path / "log.csv", "\n".join(["t,x_d,x", *rows])))
+    assert (len(log.t), log.remarks) == (
+        50,
+        ("3 lines without numbers among the rows left out, line 12 first: 'overrun'",),
+    )
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "".join(f"key {i}: value {i}\n" for i in range(400)) + "t,x_d,x\n",
+        "".join(f"key {i},{i}\n" for i in range(400)) + "t,x_d,x\n",
+        "t,x_d,x\nfloat,float,float\n",
+        "t,x_d,x\nTime of day,Wanted,Real\nms,mm,mm\n",
+        "recorded,by,nobody\nt,x_d,x\n",
+        ",X axis,\ntime,command,actual\n",
+    ],
+)
+def test_what_stands_above_the_numbers(tmp_path: Path, head: str) -> None:
+    log = read_log(write_csv(tmp_path / "log.csv", head + "\n".join(ROWS)))
+    assert (len(log.t), log.x_d[3] / log.x_d[1]) == (50, pytest.approx(3.0))
+
+
+@pytest.mark.parametrize(
+    ("names", "axes"),
+    [
+        ("X1_CommandPosition,X1_ActualPosition,Y1_CommandPosition,Y1_ActualPosition", ["X1", "Y1"]),
+        ("DES_POS|1,ENC_POS|1,DES_POS|2,ENC_POS|2", ["1", "2"]),
+        ("joint_pos_target_1,joint_pos_1,joint_pos_target_2,joint_pos_2", ["1", "joint_2"]),
+        ("XPosRef,XPosFb,YPosRef,YPosFb", ["x", "y"]),
+        ("X_cmd [mm],X_act [mm],Y_cmd [mm],Y_act [mm]", ["X", "Y"]),
+        ("XPOS_CMD,XPOS_FB,YPOS_CMD,YPOS_FB", ["X", "Y"]),
+        ("X axis,,Y axis,\ncommand,actual,command,actual", ["X", "Y"]),
+    ],
+)
+def test_axes_of_a_text(tmp_path: Path, names: str, axes: list[str]) -> None:
+    rows = "".join(f"{k % 5},{k % 5}.25,{k % 3},{k % 3}.5\n" for k in range(9))
+    path = write_csv(tmp_path / "log.csv", f"{names}\n{rows}")
+    for axis, (x_d, x) in zip([None, *axes], [(1.0, 1.25), (1.0, 1.25), (1.0, 1.5)], strict=True):
+        log = read_log(path, T_s=1e-3, axis=axis, unit="mm")
+        assert (1e3 * log.x_d[1], 1e3 * log.x_meas[1]) == pytest.approx((x_d, x))
+    with pytest.raises(LogError, match="axis 'Q' is missing; there are "):
+        read_log(path, T_s=1e-3, axis="Q")
+
+
+def test_the_other_position_of_a_named_one(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_cmd,x_act,y_cmd,y_act\n0,1,2,3,4\n1,1,2,3,4\n")
+    assert read_log(path, columns={"x_d": "y_cmd"}).x_meas.tolist() == [4.0, 4.0]
+
+
+def test_german_names_are_proposed(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "Zeit;Soll;Istposition [m]\n0;1;2\n1;3;4\n")
+    with pytest.raises(LogError, match=r"name them: --x_d Soll --x 'Istposition \[m\]'$") as caught:
+        read_log(path)
+    assert caught.value.options == (("--x_d Soll --x 'Istposition [m]'", "if these are meant"),)

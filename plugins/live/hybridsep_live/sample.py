@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from hybridsep.base.errors import ParameterError, SignalError, brief, first_line
 from hybridsep.logs.columns import Column, choose_columns
 from hybridsep.logs.source import Block, Source
-from hybridsep.logs.text_layout import is_number, split
+from hybridsep.logs.text import is_number, split
 from hybridsep.logs.units import stated_unit
 
 __all__ = ["AHEAD", "AS_NAMED", "NUMBER", "MessageReader", "Reading", "RowReader", "Sample"]

@@ -1,0 +1,107 @@
+"""Recognition of columns by their names: time, commanded and measured position, of one axis or of several."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+from .units import stated_unit
+
+__all__ = ["ROLES", "axes_of", "guesses", "known_names", "n_known"]
+
+ROLES = ("t", "x_d", "x")
+"""Time, commanded and measured position."""
+
+_NAMES: Mapping[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
+    "x_d": (
+        "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
+        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "des_pos", "q_d",
+    ),
+    "x": (
+        "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
+        "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
+    ),
+}  # fmt: skip
+"""Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
+
+_COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "des", "desired", "target"}
+_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder"}
+_POSITION = {"pos", "position"}
+"""Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
+
+_GERMAN = {"t": r"zeit|time", "x_d": r"soll|lagesoll", "x": r"ist|lageist"}
+"""Beginnings of names that are not read without a word of the user's: a message proposes them."""
+
+_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
+_POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
+_AXIS = re.compile(r"[xyzabcq]?\d*", re.IGNORECASE)
+"""Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity."""
+
+
+def known_names(role: str, names: Sequence[str]) -> list[str]:
+    """Return the columns of the role's best known name, as it is, or without unit and in any spelling."""
+    for spelled in ({name: name for name in names}, {name: _spelling(stated_unit(name)[0]) for name in names}):
+        for key in _NAMES[role]:
+            if known := [name for name in names if spelled[name] == key]:
+                return known
+    return []
+
+
+def n_known(names: Sequence[str]) -> int:
+    """Return how many roles names have."""
+    return sum(bool(known_names(role, names)) for role in ROLES) + 2 * len(axes_of(names))
+
+
+def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return commanded and measured position by axis: ``X1_CommandPosition``, ``X1_ActualPosition`` of ``X1``."""
+    commanded: dict[str, str] = {}
+    measured: dict[str, str] = {}
+    positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
+    whole: dict[str, list[str]] = {"x_d": [], "x": []}
+    for name in names:
+        words = [token.lower() for token in _tokens(name)]
+        axis = _axis(name)
+        is_position = any(word in _POSITION for word in words)
+        kinds = [any(word in known for word in words) for known in (_COMMANDED, _MEASURED)]
+        if not any(kinds) and is_position:
+            positions.setdefault(axis, name)
+        elif sum(kinds) == 1 and (is_position or _AXIS.fullmatch(axis)):
+            (commanded if kinds[0] else measured).setdefault(axis, name)
+            if is_position:
+                whole["x_d" if kinds[0] else "x"].append(name)
+    found = {
+        axis: (x_d, measured.get(axis) or positions[axis])
+        for axis, x_d in commanded.items()
+        if axis in measured or axis in positions
+    }
+    if not found and [len(names) for names in whole.values()] == [1, 1]:  # the only ones, whatever their axis
+        return {"": (whole["x_d"][0], whole["x"][0])}
+    return found
+
+
+def guesses(names: Sequence[str], roles: Sequence[str]) -> Iterator[tuple[str, str | None]]:
+    """Yield for each role the first column whose name may mean it, in German too; None without one."""
+    for role in roles:
+        begins = re.compile(_GERMAN[role], re.IGNORECASE)
+        yield role, next((name for name in names if begins.match(name.strip())), None)
+
+
+def _axis(name: str) -> str:
+    """Return what is left of a name without unit and words of positions: ``joint_1`` of ``joint_pos_target_1``."""
+    left, gap = "", ""
+    for token in _tokens(name):
+        if not token.isalnum():
+            gap = gap or ("_" if token == " " else token)
+        elif token.lower() not in _COMMANDED | _MEASURED | _POSITION | {"axis"}:
+            left, gap = f"{left}{gap if left else ''}{token}", ""
+    return left
+
+
+def _tokens(name: str) -> list[str]:
+    """Return words, numbers and signs of a name without its unit; ``_`` is a blank, ``XPOS`` two words."""
+    return _TOKEN.findall(_POS.sub(r" \1", stated_unit(name)[0].replace("_", " ")))
+
+
+def _spelling(name: str) -> str:
+    return name.strip().lower().replace(" ", "_").replace("-", "_").replace(".", "_")
