@@ -27,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 from hybridsep.app import cli
-from hybridsep.cosim.fmus import FmuController
+from hybridsep.cosim.adapters import FmuController
 
 Column = list[float]
 

@@ -24,7 +24,7 @@ import rumoca
 
 from benchmarks.common import Array
 from hybridsep.base.data_files import data_folder
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_name
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.trajectory import spiral, staircase
@@ -107,10 +107,10 @@ def played(path: Path, x_d: Array, T_s: float, steps: int, **values: float) -> M
     h = T_s / steps
     with FmuInstance(path) as fmu:
         fmu.initialise({"x_d": float(x_d[0]), **values})
-        read, write = fmu.real_reader(("x", "x_meas", "v")), fmu.real_writer(("x_d",))
+        read = fmu.reader(("x", "x_meas", "v"))
         for k, command in enumerate(x_d.tolist()):
             rows[k] = read()
-            write([command])
+            fmu.set("x_d", command)
             for i in range(steps):
                 fmu.step(k * T_s + i * h, h)
     return Motion(*rows.T)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from .base.settings import CompensatorSettings, Limits, PredictorSettings
     from .compensate.compensator import SepCompensator
     from .compensate.planning import SepState
-    from .cosim.importer import FmuInstance
-    from .cosim.library import Compensator
+    from .cosim.adapters import Compensator
+    from .cosim.fmu import FmuInstance
     from .cosim.loop import cosimulate
     from .cosim.run import Run
     from .evaluate.backtest import backtest, backtest_stream
@@ -72,10 +72,10 @@ __all__ = [
 
 _MODULES = {
     "PAPER_LIMITS": "plants.trajectory",
-    "Compensator": "cosim.library",
+    "Compensator": "cosim.adapters",
     "CompensatorSettings": "base.settings",
     "Encoder": "plants.encoder",
-    "FmuInstance": "cosim.importer",
+    "FmuInstance": "cosim.fmu",
     "HybridPredictor": "predict.predictor",
     "HybridSepError": "base.errors",
     "Limits": "base.settings",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..base.data_files import DEFAULT_MACHINE
+from ..base.data_files import COMMANDS, DEFAULT_MACHINE
 from ..base.errors import ParameterError
 from ..base.settings import PARAMETERS, check
 from ..fmi.flavours import FLAVOURS
@@ -28,7 +29,11 @@ from .options import (
     takes_parameters,
 )
 
-__all__ = ["cosim"]
+if TYPE_CHECKING:
+    from ..base.signals import Array
+    from ..machines.machine import Machine
+
+__all__ = ["cosim", "default_trajectory", "read_command"]
 
 
 @takes_parameters(PREDICTOR_ENTRIES, COMPENSATOR_ENTRIES)
@@ -67,7 +72,6 @@ def cosim(
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
     from ..cosim.loop import cosimulate
-    from ..cosim.pairing import check_pair, default_trajectory, read_command, values_to_build
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
     from .outputs import RUNS, check_outputs
@@ -88,12 +92,12 @@ def cosim(
         raise ParameterError(f"{', '.join(wrong)} must come with --compensate")
     values = dict(parameters)
     if predictor is None:
-        values = values_to_build(axis, model, values)
+        values = _values_to_build(axis, model, values)
     if seed is not None:
         check("seed", seed)
     if compensate is not None:
         values["compensate"] = PARAMETERS["compensate"].to_fmi(compensate)
-    check_pair(axis, model, predictor, plant, weights, flavour)
+    _check_pair(axis, model, predictor, plant, weights, flavour)
     file = None if trajectory in TRAJECTORIES else trajectory
     inputs = {"trajectory": file, "predictor": predictor, "plant": plant, "saved predictor": weights}
     check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)
@@ -120,3 +124,84 @@ def cosim(
     print_run(run, as_json, title)
     if not as_json:
         print_written(out, figure)
+
+
+def default_trajectory(machine: str | Path) -> str:
+    """Return what is played where nothing is given: a fit's commands beside the machine file, else the staircase."""
+    path = Path(machine)
+    commands = path.with_name(COMMANDS)
+    return str(commands) if path.suffix == ".toml" and commands.is_file() else "staircase"
+
+
+def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
+    """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
+    from ..logs.log import check_reading
+    from ..machines.agree import check_interval
+    from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
+
+    check_reading(unit, T_s)
+    limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
+    if trajectory == "staircase":
+        return staircase(axis.T_s, limits=limits)
+    if trajectory in ("spiral_x", "spiral_y"):
+        return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
+    command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
+    check_interval(trajectory, found, axis)
+    return command
+
+
+def _values_to_build(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
+    if model == "HybridPredictor":
+        axis.changed("predictor", values)
+        return dict(values)
+    settings = axis.changed("compensator", values).compensator_settings
+    windows = {"preview": settings.preview, "spacing": settings.spacing} if "Np" in values else {}
+    return {**values, **windows}
+
+
+def _check_pair(
+    axis: Machine,
+    model: str,
+    predictor: Path | None,
+    plant: Path | None,
+    weights: Path | None,
+    flavour: str,
+) -> None:
+    """Check a co-simulation's two FMUs: those that are given, and that the others can be built.
+
+    Parameters
+    ----------
+    axis : Machine
+    model : {"HybridPredictor", "SepCompensator"}
+        The look-ahead.
+    predictor, plant : Path, optional
+        Archives; built if left out.
+    weights : Path, optional
+        For a look-ahead that is built.
+    flavour : {"native", "python"}
+    """
+    from ..cosim.adapters import check_controller, check_plant
+    from ..cosim.run import COMPENSATOR, PREDICTOR
+    from ..fmi.archive import fmu_names
+    from ..fmi.libraries import check_available
+
+    models = fmu_names(axis, flavour).values()
+    if plant is None and "FeedDrive" not in models:
+        raise ParameterError(
+            f"machine {axis.name} has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant "
+            "FMU with --plant"
+        )
+    if predictor is None and model not in models:
+        raise ParameterError(
+            f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "
+            "compensator FMU with --predictor"
+        )
+    if predictor is not None and weights is not None:
+        raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
+    if predictor is not None:
+        check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
+    if plant is not None:
+        check_plant(plant)
+    if flavour == "native" and None in (predictor, plant):
+        check_available(("host",))

@@ -42,7 +42,7 @@ def report(
 
     It is checked and replayed as by backtest. The file needs no network.
     """
-    from ..cosim.fmus import check_controller
+    from ..cosim.adapters import check_controller
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
     from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words

@@ -9,6 +9,7 @@ import typer
 
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS, check
+from .command_cosim import default_trajectory, read_command
 from .options import (
     TRAJECTORIES,
     ForceOption,
@@ -51,7 +52,6 @@ def system(
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
-    from ..cosim.pairing import default_trajectory, read_command
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
     from ..machines.machine import load_machine, machine_path

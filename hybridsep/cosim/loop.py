@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,8 @@ from ..compensate.compensator import SepCompensator
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
-from .library import Compensator, LibraryController, LibraryDrive, OwnController
+from .adapters import Compensator, FmuController, FmuDrive, LibraryController, LibraryDrive, OwnController
 from .run import Run
-
-if TYPE_CHECKING:
-    from .fmus import FmuController, FmuDrive
 
 __all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
 
@@ -63,7 +60,7 @@ def cosimulate(
     ----------
     controller : str, Path, HybridPredictor, SepCompensator or Compensator
         An FMU's archive, an object of the library, which begins a run with what it has learned kept, or your own:
-        :class:`~hybridsep.cosim.library.Compensator`.
+        :class:`~hybridsep.cosim.adapters.Compensator`.
     plant : str, Path or Plant
         An FMU's archive, an object of the library, or one of your own; it is reset to rest at ``r(0)``.
     r : (n,) array_like, m
@@ -160,8 +157,6 @@ def _controller(
 ) -> FmuController | LibraryController | OwnController:
     """Return the loop's adapter of a controller."""
     if isinstance(controller, (str, Path)):
-        from .fmus import FmuController  # fmpy is loaded where an FMU is
-
         _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
         return FmuController(controller, values or {}, start_time)
     _refuse(values, "controller_values are for an FMU; make the controller with these parameters")
@@ -176,8 +171,6 @@ def _drive(
 ) -> FmuDrive | LibraryDrive:
     """Return the loop's adapter of a plant."""
     if isinstance(plant, (str, Path)):
-        from .fmus import FmuDrive
-
         _refuse(encoder, "encoder is for a plant of the library; an FMU's noise and seed are among its plant_values")
         return FmuDrive(plant, values or {}, start_time)
     _refuse(values, "plant_values are for an FMU; make the plant with these parameters")

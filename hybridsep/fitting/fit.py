@@ -21,7 +21,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
-from ..cosim.fmus import FmuController
+from ..cosim.adapters import FmuController
 from ..fmi.archive import fmu_name
 from ..fmi.builds import build_here
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of

@@ -15,7 +15,7 @@ import pytest
 from command_line import Run, write_log
 from log_files import columns, write
 
-from hybridsep.cosim.fmus import FmuDrive
+from hybridsep.cosim.adapters import FmuDrive
 
 MACHINE = "spring_mass_damper"
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")

@@ -18,7 +18,7 @@ from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import LogError, ParameterError
-from hybridsep.cosim.fmus import FmuController
+from hybridsep.cosim.adapters import FmuController
 from hybridsep.fitting.advice import recommendation
 from hybridsep.fitting.fit import Fit, FitOptions, fit, fit_files, sha256_of
 from hybridsep.fitting.replay import replay, split_log

@@ -14,7 +14,7 @@ from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.cosim.importer import read_description
+from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import drive_limits
 from hybridsep.fmi.archive import build_fmu

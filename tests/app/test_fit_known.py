@@ -12,7 +12,7 @@ from identification_cases import T_S, measured
 
 from hybridsep import PAPER_LIMITS, HybridPredictor, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.signals import Array
-from hybridsep.cosim.importer import read_description
+from hybridsep.cosim.fmu import read_description
 from hybridsep.identify.output_error import in_time
 from hybridsep.identify.periodic import residual_period
 

@@ -12,8 +12,8 @@ from staircase_data import commanded, measured
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.errors import ParameterError
-from hybridsep.cosim.fmus import FmuController
-from hybridsep.cosim.importer import read_description
+from hybridsep.cosim.adapters import FmuController
+from hybridsep.cosim.fmu import read_description
 from hybridsep.demo import cases
 from hybridsep.demo.demo import demo, demo_files
 from hybridsep.fitting.fit import fit_files

@@ -16,7 +16,7 @@ from c_compiler import FMI_HEADERS, compiler, run_compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.compiler import compile_flags
 
 ROLES = {"REFERENCE": "ReferenceTrajectory", "PREDICTOR": "HybridPredictor", "PLANT": "FeedDrive"}

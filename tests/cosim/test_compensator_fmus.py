@@ -15,7 +15,7 @@ from built_once import BuiltFmus
 from hybridsep import fmu_names, load_machine
 from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
-from hybridsep.cosim.fmus import check_controller
+from hybridsep.cosim.adapters import check_controller
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import COMPENSATOR, Run
 from hybridsep.evaluate.figures import contour_figure, tracking_figure

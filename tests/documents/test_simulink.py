@@ -8,7 +8,7 @@ import pytest
 from built_once import BuiltFmus
 from places import ROOT
 
-from hybridsep.cosim.importer import read_description
+from hybridsep.cosim.fmu import read_description
 
 SCRIPT = (ROOT / "examples" / "simulink_loop.m").read_text(encoding="utf-8")
 PORTS = {

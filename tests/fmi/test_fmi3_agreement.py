@@ -11,7 +11,7 @@ from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 
 from hybridsep import build_fmu, cosimulate, load_machine, staircase
 from hybridsep.base.errors import FmuError
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 
 PAIRS = dict(zip(FMI3, NATIVE, strict=True))
 
@@ -19,7 +19,7 @@ PAIRS = dict(zip(FMI3, NATIVE, strict=True))
 def reader(fmu: FmuInstance) -> Callable[[], bytes]:
     """Return a function that gives all outputs and locals bit by bit, samples of windows one by one."""
     shown = [v for v in fmu.variables.values() if v.causality in ("output", "local")]
-    reals = fmu.real_reader([v.name for v in shown if v.type in ("Real", "Float64")])
+    reals = fmu.reader([v.name for v in shown if v.type in ("Real", "Float64")])
     others = [v.name for v in shown if v.type not in ("Real", "Float64")]
     return lambda: np.array(reals()).tobytes() + bytes(str([int(fmu.get(name)) for name in others]), "ascii")
 

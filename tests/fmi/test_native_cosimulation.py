@@ -14,7 +14,7 @@ from library_stream import start_values
 
 from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.signals import Array
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names

@@ -22,7 +22,7 @@ from fmpy.model_description import read_build_description
 from fmpy.validation import validate_fmu
 
 from hybridsep.base.errors import FmuError
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import archived, build_fmu, fmu_names
 from hybridsep.fmi.compiler import ALL_TARGETS, compile_flags, host_target
 from hybridsep.fmi.flavours import FLAVOURS

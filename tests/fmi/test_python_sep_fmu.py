@@ -17,7 +17,7 @@ from library_models import trained_predictor
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.fmu import Fmu

@@ -25,7 +25,7 @@ from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.records import leaves, numbers_of
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file

@@ -15,7 +15,7 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 from hybridsep import build_fmu, load_machine
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.compiler import TARGETS, host_target
 
 WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")

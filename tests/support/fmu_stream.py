@@ -10,7 +10,7 @@ import numpy as np
 from stream import OUTPUTS, Array, RefusedStreamError, Value, kind_of
 
 from hybridsep.base.errors import FmuError
-from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.fmu import FmuInstance
 
 
 class FmuStream:
@@ -48,7 +48,7 @@ class FmuStream:
 
     def window(self, name: str) -> Array:
         names = [variable for variable in self._fmu.variables if variable.partition("[")[0] == name]
-        return np.array(self._fmu.real_reader(names)())
+        return np.array(self._fmu.reader(names)())
 
     def save(self) -> bytes:
         return self._fmu.save()

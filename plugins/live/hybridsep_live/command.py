@@ -65,8 +65,9 @@ def live(
     from contextlib import ExitStack
 
     from hybridsep import build_fmu, fmu_names, load_machine
-    from hybridsep.cosim.fmus import FmuController
-    from hybridsep.cosim.pairing import check_predictor
+    from hybridsep.base.errors import ParameterError
+    from hybridsep.cosim.adapters import FmuController, check_controller
+    from hybridsep.cosim.run import PREDICTOR
     from hybridsep.logs.units import shown_of
 
     from .first_seconds import FirstSeconds
@@ -81,7 +82,10 @@ def live(
         if Path(machine).is_file() and state.is_file():
             weights = state
             _say(f"note: starts warm, from {state} (--cold starts without)")
-    check_predictor(own, predictor, weights)
+    if predictor is not None:
+        if weights is not None:
+            raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
+        check_controller(predictor, PREDICTOR)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     given = Given(columns, unit, T_s, axis, speed)
     run = LiveRun({}, 0)

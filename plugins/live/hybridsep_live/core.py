@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsep.base.errors import FmuError, SignalError
-from hybridsep.cosim.fmus import FmuController
+from hybridsep.cosim.adapters import FmuController
 
 from .sample import Sample
 

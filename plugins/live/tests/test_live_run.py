@@ -15,7 +15,7 @@ from staircase_data import commanded
 
 from hybridsep import backtest, load_machine
 from hybridsep.base.errors import FmuError, ParameterError, SignalError
-from hybridsep.cosim.fmus import FmuController
+from hybridsep.cosim.adapters import FmuController
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.warm_start import warm_predictor

@@ -11,19 +11,87 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from ctypes import c_bool, c_double, c_int, c_int32, c_int64, c_uint32
+from dataclasses import dataclass
 from functools import lru_cache, partial
+from math import prod
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
 from typing import Any
 
 import fmpy
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.fmi3 import FMU3Slave
 
 from ..base.errors import FmuError, first_line, listed
 from ..base.output import named_errors
-from .driver import DRIVERS, Driver
 
 __all__ = ["FmuInstance", "read_description"]
+
+_WORDS_MAX = 1000
+"""Most characters of an FMU's message in an error."""
+
+_LOADING = threading.Lock()
+
+logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs' refusals are part of our errors
+
+
+@dataclass(frozen=True)
+class _Version:
+    """What differs between versions of FMI.
+
+    Attributes
+    ----------
+    slave : type
+        fmpy's.
+    platform : str
+        Folder of this machine's library below ``binaries/``.
+    prefix : str
+        Begin of the functions' names.
+    sized : bool
+        Whether they are told the number of values, which without arrays is the number of variables.
+    access : mapping
+        Type of a variable → type whose functions get and set it; real numbers first.
+    c_types : mapping
+        That type → type of C.
+    state, deserialise : str
+        What the version's functions call a state, and its deserialisation.
+    """
+
+    slave: type[Any]
+    platform: str
+    prefix: str
+    sized: bool
+    access: Mapping[str, str]
+    c_types: Mapping[str, Any]
+    state: str
+    deserialise: str
+
+
+_VERSIONS = {
+    "2": _Version(
+        *(FMU2Slave, fmpy.platform, "fmi2", False),
+        access={"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"},
+        c_types={"Real": c_double, "Integer": c_int, "Boolean": c_int},
+        state="FMUstate",
+        deserialise="deSerialize",
+    ),
+    "3": _Version(
+        *(FMU3Slave, fmpy.platform_tuple, "fmi3", True),
+        access={"Float64": "Float64", "Int32": "Int32", "Enumeration": "Int64", "Boolean": "Boolean"},
+        c_types={"Float64": c_double, "Int32": c_int32, "Int64": c_int64, "Boolean": c_bool},
+        state="FMUState",
+        deserialise="deserialize",
+    ),
+}
+"""By the first digit of the version."""
 
 
 def read_description(path: str | Path) -> Any:
@@ -32,7 +100,7 @@ def read_description(path: str | Path) -> Any:
     Raises
     ------
     FmuError
-        If there is none at ``path``.
+        If there is none at ``path``, or fmpy's validation has a finding.
     """
     path = Path(path)
     if not path.is_file():
@@ -46,21 +114,13 @@ def _description(path: Path, *_file: int) -> Any:
     """Return the same; a file is read again when it is another one or has changed."""
     try:
         with path.open("rb") as archive:  # fmpy leaves one open that it has opened and refused
-            description = fmpy.read_model_description(archive)
+            found = fmpy.read_model_description(archive)
     except Exception as error:  # fmpy raises bare Exceptions here, of several lines
         raise FmuError(f"{path.name} is not a readable FMU: {first_line(' '.join(str(error).split()))}") from error
-    if description.coSimulation is None or description.fmiVersion[0] not in DRIVERS:
-        kind = "one for model exchange" if description.coSimulation is None else f"FMI {description.fmiVersion}"
+    if found.coSimulation is None or found.fmiVersion[0] not in _VERSIONS:
+        kind = "one for model exchange" if found.coSimulation is None else f"FMI {found.fmiVersion}"
         raise FmuError(f"{path.name} must be an FMI 2.0 or 3.0 co-simulation FMU, got {kind}")
-    return description
-
-
-_WORDS_MAX = 1000
-"""Most characters of an FMU's message in an error."""
-
-logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs' refusals are part of our errors
-
-_LOADING = threading.Lock()
+    return found
 
 
 @contextmanager
@@ -105,7 +165,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     ------
     FmuError
         If the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
-        refuses to be instantiated. A library's code runs in this process, and may end it.
+        refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -115,47 +175,46 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             archive = folder / self.path
         self.description = read_description(archive)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
+        self._version = _VERSIONS[self.description.fmiVersion[0]]
         self._release: weakref.finalize[..., FmuInstance] | None = None
         folder = Path(mkdtemp())
         try:
-            self._instantiate(archive, folder, instance_name or self.path.stem)
+            self._load(archive, folder, instance_name or self.path.stem)
         except BaseException:
             self.close()
             _remove(folder)
             raise
 
-    def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> None:
+    def _load(self, archive: Path, folder: Path, instance_name: str) -> None:
         """Unpack the archive, load its library and make the instance."""
+        identifier, version = self.description.coSimulation.modelIdentifier, self._version
+        place = f"binaries/{version.platform}/{identifier}{fmpy.sharedLibraryExtension}"
         try:
             with named_errors(gettempdir()):
                 fmpy.extract(str(archive), folder, include=_serves_a_run)
-        except OSError:  # the disk's, with a name
-            raise
+            if not (folder / place).is_file():
+                there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
+                raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
+            with _working_directory():
+                slave = version.slave(
+                    guid=self.description.guid,
+                    unzipDirectory=str(folder),
+                    modelIdentifier=identifier,
+                    instanceName=instance_name,
+                )
+        except OSError as error:
+            if error.filename is not None:  # the disk's, with a name
+                raise
+            raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
         except Exception as error:  # fmpy raises bare Exceptions here
             raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
-        made = DRIVERS[self.description.fmiVersion[0]]
         try:
-            self._check_library(folder, f"binaries/{made.platform}")
-            with _working_directory():
-                driver = made(folder, self.description, instance_name)
-        except Exception as error:  # fmpy raises bare Exceptions here
-            reason = error if isinstance(error, FmuError) else first_line(error)
-            raise FmuError(f"{self.path.name} cannot be loaded: {reason}") from error
-        try:
-            driver.instantiate(_keeper(self.log))
+            _instantiate(slave, version, self.log)
         except Exception as error:
-            driver.slave.freeLibrary()
+            slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
-        self._driver = driver
-        # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
-        self._release = weakref.finalize(self, _release, driver.slave, folder)
-
-    def _check_library(self, folder: Path, binaries: str) -> None:
-        """Raise FmuError if there is no library for this platform."""
-        place = f"{binaries}/{self.description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-        if not (folder / place).is_file():
-            there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
-            raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
+        self._slave = slave
+        self._release = weakref.finalize(self, _release, slave, folder)  # also of an instance that nobody closes
 
     @property
     def slave(self) -> Any:
@@ -166,16 +225,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         FmuError
             If the instance is closed.
         """
-        return self._open.slave
-
-    @property
-    def _open(self) -> Driver:
-        self._check_open()
-        return self._driver
-
-    def _check_open(self) -> None:
         if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
+        return self._slave
 
     def __exit__(self, *error: object) -> None:
         self.close()
@@ -200,7 +252,12 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
     ) -> None:
         """Enter Initialization Mode and set parameters and start values; for errors see :meth:`initialise`."""
-        self._call(self._open.begin, start_time, stop_time)
+        slave, experiment = self.slave, {"startTime": start_time, "stopTime": stop_time}
+        if self._version.prefix == "fmi2":
+            self._call(slave.setupExperiment, **experiment)
+            self._call(slave.enterInitializationMode)
+        else:
+            self._call(slave.enterInitializationMode, **experiment)
         for name, value in (values or {}).items():
             self.set(name, value)
 
@@ -210,53 +267,47 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def set(self, name: str, value: Any) -> None:
         """Set one variable."""
-        driver, variable = self._open, self._variable(name)
+        variable, access = self._variable(name), self._version.access
         if variable.type in ("Integer", "Int32", "Enumeration") and not (isinstance(value, int) and abs(value) < 2**31):
             raise FmuError(f"{self.path.name}: {name} must be a whole number within ±{2**31 - 1}, got {value!r}")
-        if variable.type == driver.real and not isinstance(value, (int, float)):
+        if variable.type == next(iter(access)) and not isinstance(value, (int, float)):
             raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
-        self._check_type(variable)
-        self._call(driver.writer([variable]), [value])
+        call, buffer = self._prepared("Set", [variable])
+        buffer[:] = [value]
+        self._call(call)
 
     def get(self, name: str) -> Any:
         """Return one variable; of an array a list."""
-        driver, variable = self._open, self._variable(name)
-        self._check_type(variable)
-        values = self._call(driver.reader([variable]))
-        return values if variable.shape else values[0]
+        variable = self._variable(name)
+        call, values = self._prepared("Get", [variable])
+        self._call(call)
+        return list(values) if variable.shape else values[0]
 
     def real_stepper(self, names: Sequence[str]) -> Callable[[Sequence[float], float, float], None]:
         """Return a function of values, ``t`` and ``h`` that sets these real numbers, in one FMI call, and steps."""
-        write = self._open.writer([self._variable(name) for name in names])
+        call, buffer = self._prepared("Set", list(map(self._variable, names)))
         do_step = self.slave.doStep
 
         def step(values: Sequence[float], t: float, h: float) -> None:
-            write(values)
+            buffer[:] = values
+            call()
             do_step(t, h)
 
         return partial(self._call_open, step)
 
-    def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
-        """Return a function that sets these real numbers in one FMI call."""
-        return partial(self._call_open, self._open.writer([self._variable(name) for name in names]))
-
-    def real_reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
-        """Return a function that gets these real numbers in one FMI call, an array's one after the other."""
-        return partial(self._call_open, self._open.reader([self._variable(name) for name in names]))
-
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
-        """Return a function that gets these variables, none of them an array, in one FMI call for each type."""
+        """Return a function that gets these variables in one FMI call for each type, an array's one after the other."""
         of_type: dict[str, list[Any]] = {}
-        for name in names:
-            variable = self._variable(name)
-            self._check_type(variable)
-            of_type.setdefault(self._open.access[variable.type], []).append(variable)
-        reads = [self._open.reader(variables) for variables in of_type.values()]
-        got = [variable.name for variables in of_type.values() for variable in variables]
-        places = [got.index(name) for name in names]
+        for variable in map(self._variable, names):
+            of_type.setdefault(self._version.access[variable.type], []).append(variable)
+        prepared = [self._prepared("Get", variables) for variables in of_type.values()]
+        got = [v.name for variables in of_type.values() for v in variables for _ in range(prod(v.shape or ()))]
+        places = [i for name in names for i, one in enumerate(got) if one == name]
 
         def read() -> list[Any]:
-            values = [value for read_type in reads for value in read_type()]
+            for call, _ in prepared:
+                call()
+            values = [value for _, buffer in prepared for value in buffer]
             return [values[place] for place in places]
 
         return partial(self._call_open, read)
@@ -271,25 +322,45 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def save(self) -> bytes:
         """Return the whole state, serialised."""
-        return bytes(self._call(self._open.save))
+        state = self._call_state("get")
+        try:
+            return bytes(self._call_state("serialize", state))
+        finally:
+            self._call_state("free", state)
 
     def restore(self, blob: bytes) -> None:
         """Take over a state that :meth:`save` returned, of this or another instance."""
-        self._call(self._open.restore, blob)
-
-    def _check_type(self, variable: Any) -> None:
-        """Raise FmuError for a variable of a type that is not supported."""
-        if variable.type not in self._open.access:
-            raise FmuError(f"{self.path.name}: {variable.name} is a {variable.type}, which is not supported here")
+        state = self._call_state(self._version.deserialise, blob)
+        try:
+            self._call_state("set", state)
+        finally:
+            self._call_state("free", state)
 
     def _variable(self, name: str) -> Any:
+        """Return a variable; FmuError if there is none, or one of a type that is not supported."""
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")
-        return self.variables[name]
+        variable = self.variables[name]
+        if variable.type not in self._version.access:
+            raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
+        return variable
+
+    def _prepared(self, verb: str, variables: Sequence[Any]) -> tuple[Callable[[], object], Any]:
+        """Return an FMI call that gets or sets variables of one type, and the array of C that holds their values."""
+        version, slave = self._version, self.slave
+        kind = version.access[variables[0].type]
+        n = sum(prod(variable.shape or ()) for variable in variables)
+        references = (c_uint32 * len(variables))(*(variable.valueReference for variable in variables))
+        values = (version.c_types[kind] * n)()
+        arguments = (slave.component, references, len(variables), values, *((n,) if version.sized else ()))
+        return partial(getattr(slave, f"{version.prefix}{verb}{kind}"), *arguments), values
+
+    def _call_state(self, verb: str, *arguments: Any) -> Any:
+        return self._call(getattr(self.slave, f"{verb}{self._version.state}"), *arguments)
 
     def _call_open(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a function that was made for this instance, if it is still open."""
-        self._check_open()
+        _ = self.slave
         return self._call(function, *arguments)
 
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
@@ -312,14 +383,21 @@ def _serves_a_run(name: str) -> bool:
     return not name.startswith(("sources/", "documentation/"))
 
 
-def _keeper(log: list[tuple[int, str]]) -> Callable[[int, str], None]:
-    """Return a function that puts an FMU's messages into ``log``, of which it keeps the last."""
+def _instantiate(slave: Any, version: _Version, log: list[tuple[int, str]]) -> None:
+    """Make the instance with logging on; ``log`` keeps the last messages, and holds on to no instance."""
 
-    def keep(status: int, message: str) -> None:
-        log.append((status, message))
+    def keep(status: int, message: bytes | None) -> None:
+        log.append((status, (message or b"").decode("utf-8", "replace")))
         del log[:-1000]
 
-    return keep
+    if version.prefix == "fmi3":
+        slave.instantiate(loggingOn=True, logMessage=lambda _environment, status, _category, text: keep(status, text))
+        return
+    functions = fmi2CallbackFunctions()
+    functions.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, status, _category, text: keep(status, text))
+    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    slave.instantiate(callbacks=functions, loggingOn=True)
 
 
 def _release(slave: Any, folder: Path) -> None:
