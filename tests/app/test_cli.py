@@ -146,7 +146,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(out)["n_samples"] == 1500
     with np.load(tmp_path / "run.npz") as arrays:
         assert len(arrays["x_h"]) == 1500
-    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, "--p", 30, "--json")
+    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, "--p", 30, "--force", "--json")
     assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
 
 
