@@ -8,17 +8,18 @@ from __future__ import annotations
 import struct
 import warnings
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
 
-from ..base.errors import LogError, brief
+from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .extras import library, reading
-from .source import ArraysSource, Block, Source, check_column, sample_number
+from .extras import library
+from .source import ArraysSource, check_column
 
 __all__ = ["MatSource", "NpzSource", "ParquetSource"]
 
@@ -41,7 +42,11 @@ _TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _DAY = 86_400
 
 
-def check_declared(path: Path, n_bytes: int) -> None:
+_OWN = (TypeError, AttributeError, LookupError)
+"""Errors whose messages tell of the library's own names."""
+
+
+def _check_declared(path: Path, n_bytes: int) -> None:
     """Raise LogError if a file declares more than its size can hold."""
     size = path.stat().st_size
     if n_bytes > max(_SMALL, _COMPRESSION_MAX * size):
@@ -49,6 +54,28 @@ def check_declared(path: Path, n_bytes: int) -> None:
             f"{path}: declares {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
             "the memory; save the log again, without compression"
         )
+
+
+@contextmanager
+def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
+    """Turn what a library raises into a LogError on ``what`` of a file, all of it if left out, and why.
+
+    A damaged file may fail in every way there is.
+    """
+    try:
+        yield
+    except (MemoryError, LogError):
+        raise
+    except Exception as error:
+        name = type(error).__name__ if type(error).__module__ == "builtins" else _qualified(type(error))
+        why = name if isinstance(error, _OWN) else first_line(f"{name}: {error}")
+        subject = f"{what} is" if what else "is"
+        raise LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}") from error
+
+
+def _qualified(kind: type) -> str:
+    """Return an exception's name, with its module where it is called error, as zlib's and struct's are."""
+    return f"{kind.__module__}.{kind.__name__}" if kind.__name__ == "error" else kind.__name__
 
 
 class NpzSource(ArraysSource):
@@ -59,7 +86,7 @@ class NpzSource(ArraysSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        with reading(path, "an .npz file"), zipfile.ZipFile(path) as archive:
+        with _reading(path, "an .npz file"), zipfile.ZipFile(path) as archive:
             members = archive.namelist()
         self.names = [member.removesuffix(".npy") for member in members if member.endswith(".npy")]
 
@@ -72,7 +99,7 @@ class NpzSource(ArraysSource):
     def column(self, name: str) -> Array:
         """Return an array's values, after its header was compared with the member's size."""
         member = f"{name}.npy"
-        with reading(self.path, "an array", f"column {brief(name)}"), zipfile.ZipFile(self.path) as archive:
+        with _reading(self.path, "an array", f"column {brief(name)}"), zipfile.ZipFile(self.path) as archive:
             with archive.open(member) as stream:
                 shape, dtype = _npy_header(stream)
                 n = check_column(self.path, name, shape, dtype)
@@ -81,7 +108,7 @@ class NpzSource(ArraysSource):
                 raise LogError(
                     f"{self.path}: column {brief(name)} is truncated: {declared} bytes were expected, got {there}"
                 )
-            check_declared(self.path, declared)
+            _check_declared(self.path, declared)
             with archive.open(member) as stream:
                 values = npy.read_array(stream, allow_pickle=False)
         return np.asarray(values, dtype=np.float64).ravel()
@@ -104,9 +131,9 @@ class MatSource(ArraysSource):
         super().__init__(path)
         from scipy import io  # a quarter of a second, which a text need not wait
 
-        with reading(path, "a MATLAB file"), warnings.catch_warnings():
+        with _reading(path, "a MATLAB file"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of names that occur twice: the last one counts, as in MATLAB
-            check_declared(path, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in io.whosmat(path)))
+            _check_declared(path, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in io.whosmat(path)))
             variables = [item for item in io.loadmat(path).items() if not item[0].startswith("__")]
             self._variables = {name: value for one in variables for name, value in _fields(*one)}
         self.names = list(self._variables)
@@ -146,23 +173,23 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield f"{name}.imag", value.imag
 
 
-class ParquetSource(Source):
-    """The columns of a Parquet file, streamed row group by row group; fields of structs are ``struct.field``.
+class ParquetSource(ArraysSource):
+    """The columns of a Parquet file; fields of structs are ``struct.field``.
 
     Nothing in the place of a number is NaN. Timestamps, times of day and durations become seconds since the first one.
     """
 
     format = "Parquet"
-    endings: ClassVar[tuple[str, ...]] = (".parquet", ".pq")
+    endings = (".parquet", ".pq")
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self._arrow = library(path, "pyarrow", "parquet", "a Parquet file")
         self._parquet = library(path, "pyarrow.parquet", "parquet", "a Parquet file")
-        with reading(path, "a Parquet file"), self._file() as file:
+        with _reading(path, "a Parquet file"), self._file() as file:
             groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
             written = sum(group.column(i).total_uncompressed_size for group in groups for i in range(group.num_columns))
-            check_declared(path, max(written, _COLUMNS * 8 * file.metadata.num_rows))  # a value that repeats is one
+            _check_declared(path, max(written, _COLUMNS * 8 * file.metadata.num_rows))  # a value that repeats is one
             self._leaves = {".".join(place): (place, field) for place, field in self._found(file.schema_arrow, ())}
         types = self._arrow.types
         temporal = (types.is_timestamp, types.is_time, types.is_duration)
@@ -181,15 +208,16 @@ class ParquetSource(Source):
         """Return whether it begins with Parquet's mark."""
         return head.startswith(b"PAR1")
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        clocks = {name: _ArrowClock() for name in names}
-        start = 0
-        with reading(self.path, "a Parquet file"), self._file() as file:
-            columns = list(dict.fromkeys(names))
-            for batch in file.iter_batches(batch_size=n, columns=columns, use_threads=False):
-                yield Block([self._numbers(batch, name, clocks[name]) for name in names], sample_number(start))
-                start += batch.num_rows
+    def column(self, name: str) -> Array:
+        """Return a column."""
+        (top, *fields), _ = self._leaves[name]
+        with _reading(self.path, "a Parquet file"), self._file() as file:
+            table = file.read(columns=[name], use_threads=False)
+            values = table.column(table.schema.get_field_index(top)).combine_chunks()
+            values.validate(full=True)  # what a damaged file holds may point anywhere
+            for field in fields:
+                values = values.field(field)
+            return self._seconds(values) if name in self.stamps else self._numbers(values, name)
 
     def _file(self) -> Any:
         # A column of a row group is then read in pieces, not at once
@@ -204,42 +232,22 @@ class ParquetSource(Source):
             else:
                 yield place, field
 
-    def _numbers(self, batch: Any, name: str, clock: _ArrowClock) -> Array:
-        """Return a column of a batch."""
-        (top, *fields), _ = self._leaves[name]
-        values = batch.column(batch.schema.get_field_index(top))
-        values.validate(full=True)  # what a damaged file holds may point anywhere
-        for field in fields:
-            values = values.field(field)
+    def _numbers(self, values: Any, name: str) -> Array:
+        """Return an array of numbers, NaN where there is none."""
         kind, types = values.type, self._arrow.types
-        if name in self.stamps:
-            integers = values.cast(self._arrow.int32() if kind.bit_width == 32 else self._arrow.int64())
-            ticks = np.asarray(integers.fill_null(0).to_numpy(zero_copy_only=False), dtype=np.int64)
-            missing = np.asarray(values.is_null())
-            return clock.seconds(ticks, missing, _TICKS[kind.unit], of_day=types.is_time(kind))
         if types.is_decimal(kind):
             values = values.cast(self._arrow.float64())
         elif not (types.is_integer(kind) or types.is_floating(kind)):
             raise LogError(f"{self.path}: column {brief(name)} must be numbers, got {kind}")
         return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
 
-
-class _ArrowClock:
-    """Arrow's times as seconds since the first one; a time of day passes midnight where it falls by half a day."""
-
-    def __init__(self) -> None:
-        self._first: int | None = None
-        self._last, self._days = 0.0, 0
-
-    def seconds(self, ticks: np.ndarray[Any, np.dtype[np.int64]], missing: Any, tick: float, *, of_day: bool) -> Array:
-        """Return the next times, NaN where there is none."""
-        if self._first is None:
-            self._first = int(ticks[0])
-        found: Array = np.asarray((ticks - self._first) * tick, dtype=np.float64)
-        if of_day:
-            falls = np.diff(found, prepend=self._last) < -_DAY / 2
-            self._last = float(found[-1])
-            days = self._days + np.cumsum(falls)
-            self._days, found = int(days[-1]), found + _DAY * days
-        found[missing] = np.nan
+    def _seconds(self, values: Any) -> Array:
+        """Return times as seconds since the first one; a time of day passes midnight where it falls by half a day."""
+        kind = values.type
+        integers = values.cast(self._arrow.int32() if kind.bit_width == 32 else self._arrow.int64()).fill_null(0)
+        ticks = np.asarray(integers.to_numpy(zero_copy_only=False), dtype=np.int64)
+        found: Array = np.asarray((ticks - ticks[0]) * _TICKS[kind.unit], dtype=np.float64)
+        if self._arrow.types.is_time(kind):
+            found += _DAY * np.cumsum(np.diff(found, prepend=0.0) < -_DAY / 2)
+        found[np.asarray(values.is_null())] = np.nan
         return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -31,8 +31,6 @@ _GAP = 1.5
 
 _SAME = 1e-6
 """Largest difference of two channels' times, relative to their interval, at which they are the same: rounding."""
-
-_BLOCK = 10_000
 
 
 @dataclass(frozen=True)
@@ -282,16 +280,13 @@ def channels(source: Source) -> list[Channel]:
 
 def _extent(source: Source, name: str, *, is_time: bool) -> tuple[int | None, float | None]:
     """Return a column's samples, and of times the mean interval, s; None of a column that is not numbers."""
-    n, ends = 0, [0.0, 0.0]
     try:
         factor = _time(source, name).unit.factor if is_time else None
-        for block in source.blocks([name], _BLOCK):
-            (values,) = block.columns
-            ends = [float(values[0]) if n == 0 else ends[0], float(values[-1])]
-            n += len(values)
+        (values,) = source.read([name]).columns
     except LogError:
         return None, None
-    return n, factor * (ends[1] - ends[0]) / (n - 1) if factor is not None and n > 1 else None
+    n = len(values)
+    return n, factor * float(values[-1] - values[0]) / (n - 1) if factor is not None and n > 1 else None
 
 
 # Rates of their own
@@ -322,7 +317,9 @@ def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: boo
     t_d, t_x = source.times.get(x_d), source.times.get(x)
     if t_d is None or t_x is None or t_d == t_x or "t" not in chosen or chosen["t"].name != t_d:
         return source, chosen
-    read = {x_d: _whole(source, t_d, x_d), x: _whole(source, t_x, x)}
+    read = {x_d: source.read((t_d, x_d)).columns, x: source.read((t_x, x)).columns}
+    if not all(len(t) for t, _ in read.values()):
+        raise LogError(f"{source.path}: columns {brief(x_d)} and {brief(x)} need samples, got none")
     intervals = {name: (t[-1] - t[0]) / max(len(t) - 1, 1) for name, (t, _) in read.items()}
     (a, _), (b, _) = read.values()
     if len(a) == len(b) and (np.abs(a - b) <= _SAME * min(np.abs(list(intervals.values())))).all():
@@ -346,13 +343,7 @@ def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: boo
     return _Resampled(source, columns_read, f"resampled onto the times of the slower column: {rates}"), chosen
 
 
-def _whole(source: Source, *names: str) -> tuple[Array, ...]:
-    """Return columns of the same times."""
-    blocks = [block.columns for block in source.blocks(names, _BLOCK)] or [[np.full(1, np.nan)] * len(names)]
-    return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
-
-
-def _interpolated(source: Source, t_name: str, name: str, samples: tuple[Array, ...], at: Array, gap: float) -> Array:
+def _interpolated(source: Source, t_name: str, name: str, samples: Sequence[Array], at: Array, gap: float) -> Array:
     """Return a column at other times; LogError where its samples there are further apart than ``gap``."""
     t, x = samples
     if not (np.diff(t) > 0.0).all():

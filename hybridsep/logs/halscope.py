@@ -60,8 +60,8 @@ class _HalscopeSource(Source):
         """Return the columns with what the file says of them."""
         return [replace(one, interval=self._period) for one in super().channels()]
 
-    def _times(self, start: int, n: int) -> Array:
-        return self._period * np.arange(start, start + n, dtype=np.float64)
+    def _times(self, n: int) -> Array:
+        return self._period * np.arange(n, dtype=np.float64)
 
 
 class HalscopeCsvSource(_HalscopeSource, TextSource):
@@ -87,15 +87,13 @@ class HalscopeCsvSource(_HalscopeSource, TextSource):
         match = _PERIOD.match(head)
         return match is not None and bool(match[1])
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``."""
         own = [name for name in names if name != _TIME] or self.names[:1]
-        start = 0
-        for block in super().blocks(own, n):
-            found = dict(zip(own, block.columns, strict=True))
-            size = len(block.columns[0])
-            yield Block([self._times(start, size) if name == _TIME else found[name] for name in names], block.where)
-            start += size
+        block = super().read(own)
+        found = dict(zip(own, block.columns, strict=True))
+        t = self._times(len(block.columns[0]))
+        return Block([t if name == _TIME else found[name] for name in names], block.where)
 
 
 class HalscopePairsSource(_HalscopeSource):
@@ -126,17 +124,13 @@ class HalscopePairsSource(_HalscopeSource):
         match = _PERIOD.match(head)
         return match is not None and not match[1]
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``."""
         use = [2 * self._names.index(name) + 1 for name in names if name != _TIME]
-        lines, start = self._lines(), 0
-        ahead = list(islice(lines, 1))
-        while more := list(islice(lines, n)):
-            taken, ahead = [*ahead, *more][:-1], more[-1:]
-            found = iter(self._columns(taken, use))
-            columns = [self._times(start, len(taken)) if name == _TIME else next(found) for name in names]
-            yield Block(columns, line_number([number for number, _ in taken]))
-            start += len(taken)
+        lines = list(self._lines())[:-1]
+        found = iter(self._columns(lines, use))
+        columns = [self._times(len(lines)) if name == _TIME else next(found) for name in names]
+        return Block(columns, line_number([number for number, _ in lines]))
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         """Iterate over the lines of samples with their numbers."""

@@ -306,10 +306,9 @@ def open_log(
     may_miss: bool | None = None,
     resample: bool = False,
 ) -> LogReader:
-    """Open a log for reading in bounded memory.
+    """Open a log for reading chunk by chunk.
 
-    Text, Parquet, TwinCAT's and halscope's files are streamed; of the others, columns are read whole. What a file is,
-    its content tells.
+    Columns are read whole, so that their size is limited by the memory. What a file is, its content tells.
 
     Parameters
     ----------

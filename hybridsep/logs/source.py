@@ -1,14 +1,16 @@
-"""Interface of log formats: named columns in blocks of samples."""
+"""Interface of log formats: named columns of one length."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
@@ -20,9 +22,7 @@ __all__ = [
     "Channel",
     "Source",
     "check_column",
-    "check_lengths",
     "line_number",
-    "sample_number",
 ]
 
 
@@ -32,7 +32,7 @@ NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them w
 
 @dataclass(frozen=True)
 class Block:
-    """Block of consecutive samples.
+    """Samples of columns.
 
     Attributes
     ----------
@@ -132,8 +132,14 @@ class Source(ABC):
         """Return whether a file that begins with these bytes, 4 kB if it has as many, is of this format."""
 
     @abstractmethod
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``; LogError if they cannot be read, or differ in length."""
+
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+        whole = self.read(names)
+        for i in range(0, len(whole.columns[0]), n):
+            yield Block([column[i : i + n] for column in whole.columns], partial(_later, whole.where, i))
 
     def channels(self) -> list[Channel]:
         """Return the columns with what the file says of them."""
@@ -147,26 +153,27 @@ class Source(ABC):
 
 
 class ArraysSource(Source):
-    """Columns that are read whole, so that their size is limited by the memory."""
+    """Columns that are read one at a time."""
 
     @abstractmethod
     def column(self, name: str) -> Array:
         """Return a column's values."""
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``; LogError if they cannot be read, or differ in length."""
         columns = [self.column(name) for name in names]
-        check_lengths(self.path, {name: len(column) for name, column in zip(names, columns, strict=True)})
-        for i in range(0, len(columns[0]), n):
-            yield Block([column[i : i + n] for column in columns], sample_number(i))
+        lengths = {name: len(column) for name, column in zip(names, columns, strict=True)}
+        if len(set(lengths.values())) > 1:
+            text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
+            raise LogError(f"{self.path}: all columns must have the same number of samples, got: {text}")
+        return Block(columns, lambda i: f"sample {i + 1} (the first is 1)")
 
 
-def sample_number(offset: int) -> Callable[[int], str]:
-    """Return the location, for messages, of samples in a block that begins at ``offset``; counted from 1."""
-    return lambda i: f"sample {offset + i + 1} (the first is 1)"
+def _later(where: Callable[[int], str], start: int, i: int) -> str:
+    return where(start + i)
 
 
-def line_number(numbers: Sequence[int]) -> Callable[[int], str]:
+def line_number(numbers: Sequence[int] | NDArray[np.int64]) -> Callable[[int], str]:
     """Return the location, for messages, of samples in a block whose lines have these numbers."""
     return lambda i: f"line {numbers[i]}"
 
@@ -183,10 +190,3 @@ def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
         raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
     return 0 if 0 in lengths else max(lengths, default=1)
-
-
-def check_lengths(path: Path, lengths: dict[str, int]) -> None:
-    """Raise LogError if columns differ in length."""
-    if len(set(lengths.values())) > 1:
-        text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
-        raise LogError(f"{path}: all columns must have the same number of samples, got: {text}")

@@ -1,4 +1,4 @@
-"""Streaming reader of delimited text, plain or gzip-compressed.
+"""Delimited text, plain or gzip-compressed.
 
 The first lines tell the table: what delimits its fields, where its numbers begin, and which line above them has the
 names. Below, a line without any number (an ``overrun``, names that are written again) is left out and counted; what is
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief, first_line
+from ..base.signals import Array
 from .names import n_known
 from .source import NEEDS_TRUST, Block, Source, line_number
 from .timestamps import CELL, Clock, cell, stamp_kind
@@ -34,6 +35,9 @@ __all__ = ["TextSource", "bounded_lines", "decimal_points", "is_number", "split"
 
 _HEAD_LINES = 1000
 """Lines, blank ones aside, in which names and numbers must begin."""
+
+_BLOCK = 10_000
+"""Lines that are converted at once."""
 
 _LINE_MAX = 1_000_000
 """Largest length of a line, in characters: a thousand columns; a file without line ends must not fill the memory."""
@@ -127,8 +131,8 @@ class TextSource(Source):
         """Return whether there is no byte 0, or a mark of gzip or UTF-16."""
         return head.startswith((_GZIP, *_UTF_16)) or b"\0" not in head
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``."""
         use = [self.names.index(name) for name in names]
         clocks = {
             i: Clock(self.path, self.names[i], self.names[self._dates[i]] if i in self._dates else "")
@@ -137,18 +141,20 @@ class TextSource(Source):
         }
         line = self._table.first - 1
         self._left_out, self._held, self._last = [], 0, math.nan
+        parts, numbers = [], []
         try:
             with self._open() as file:
                 rest = islice(bounded_lines(self.path, file), line, None)
-                while lines := list(islice(rest, n)):
-                    numbered = [
-                        (line + i, text) for i, text in enumerate(lines, 1) if not self._is_skipped(line + i, text)
-                    ]
+                while lines := list(islice(rest, _BLOCK)):
+                    numbered = [one for one in enumerate(lines, line + 1) if not self._is_skipped(*one)]
                     line += len(lines)
                     if numbered:
-                        yield self._block(numbered, use, clocks)
+                        parts.append(self._block(numbered, use, clocks))
+                        numbers.append(np.array([number for number, _ in numbered]))
         except _DAMAGE as error:
             raise LogError(f"{self.path}: is truncated or damaged after line {line}: {first_line(error)}") from error
+        columns = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)] or [np.empty(0)] * len(names)
+        return Block(columns, line_number(np.concatenate(numbers) if numbers else []))
 
     def notes(self) -> list[str]:
         """Return what the last pass over the file left out or filled."""
@@ -181,15 +187,15 @@ class TextSource(Source):
         self._left_out.append((number, text))
         return True
 
-    def _block(self, numbered: list[tuple[int, str]], use: list[int], clocks: Mapping[int, Clock]) -> Block:
-        """Return a block of the columns ``use``, timestamps as seconds."""
+    def _block(self, numbered: list[tuple[int, str]], use: list[int], clocks: Mapping[int, Clock]) -> list[Array]:
+        """Return the columns ``use`` of some lines, timestamps as seconds."""
         dates = {i: self._dates[i] for i in clocks if i in self._dates}
         read = [*use, *dates.values()]
         found = dict(zip(read, self._columns(numbered, read, {*clocks, *dates.values()}), strict=True))
         where = line_number([number for number, _ in numbered])
         for i, clock in clocks.items():
             found[i] = clock.seconds(found[i], where, found[dates[i]] if i in dates else None)
-        return Block([found[i] for i in use], where)
+        return [found[i] for i in use]
 
     def _columns(self, numbered: list[tuple[int, str]], use: list[int], stamps: set[int]) -> list[NDArray[Any]]:
         """Return the columns ``use``, ``stamps`` among them as text."""

@@ -8,18 +8,16 @@ of what is known of each channel, each with its key before it, then a column of 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
-from .source import Block, Channel, Source, line_number
+from .source import ArraysSource, Channel
 from .text import bounded_lines, decimal_points, is_number
 
 __all__ = ["TwinCatSource"]
@@ -43,7 +41,7 @@ class _Place:
     time: int
 
 
-class TwinCatSource(Source):
+class TwinCatSource(ArraysSource):
     """The channels of an export of TwinCAT Scope; channels that are sampled more slowly end in an earlier line.
 
     Where slow channels are filled with their previous value, the lines in which their time repeats are left out. The
@@ -58,16 +56,18 @@ class TwinCatSource(Source):
         with path.open("rb") as file:
             head = file.read(16).removeprefix(_BOM)
         self._mark = head[len(_NAME) : len(_NAME) + 1].decode("latin-1")
-        with self._open() as file:
-            lines = list(enumerate(islice(bounded_lines(path, file), _HEAD_LINES), 1))
-        rows = [(number, line.rstrip("\r\n").split(self._mark)) for number, line in lines]
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            lines = [line.rstrip("\r\n") for line in bounded_lines(path, file)]
+        rows = [(number, line.split(self._mark)) for number, line in enumerate(lines[:_HEAD_LINES], 1)]
         block = next((i for i, (_, row) in enumerate(rows) if i and row[0] == _NAME), None)
         if block is None:
             raise LogError(f"{path}: a row of the channels' names was expected below the head, got none")
         first = next((i for i in range(block, len(rows)) if is_number(decimal_points(rows[i][1][0]))), None)
         if first is None:
             raise LogError(f"{path}: numbers were expected below the channels' names, got none")
-        self._header, self._first = rows[block][0], rows[first][0]
+        self._first = rows[first][0]
+        table = takewhile(lambda line: line and not line.startswith("EOF"), lines[first:])
+        self._lines = [line if self._mark == "," else decimal_points(line) for line in table]
         self._known = {row[0]: row for _, row in rows[block:first] if row[0]}
         self._places = self._channels(rows[first])
         self._scale_times(rows[:block], rows[first][1])
@@ -139,73 +139,38 @@ class TwinCatSource(Source):
         whole = start if len(start) < 19 and start else decimal_points(first[0]).partition(".")[0]
         self._origin = int(whole) if self._ticks and whole.isdigit() and len(whole) < 19 else 0
 
-    def _open(self) -> Any:
-        return self.path.open(encoding="utf-8-sig", errors="replace")
+    def column(self, name: str) -> Array:
+        """Return a channel down to its last sample, or times in s."""
+        place = self._places[name]
+        values = self._field(place.field, name)
+        clock = self.times.get(name, name)
+        if clock in self._slow:
+            values = values[np.diff(self._field(place.time, clock), prepend=np.nan) != 0.0]
+        return values
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        places = [self._places[name] for name in names]
-        clock = places[0].time
-        repeats = any(self._places[name].field == clock for name in self._slow)
-        fields = [place.field for place in places] + ([clock] if repeats else [])
-        last, line, ended = np.nan, self._first - 1, False
-        with self._open() as file:
-            rest = islice(bounded_lines(self.path, file), line, None)
-            while not ended and (lines := list(islice(rest, n))):
-                numbers = range(line + 1, line + 1 + len(lines))
-                line += len(lines)
-                columns, ended = self._columns(lines, numbers, fields)
-                keep = np.arange(len(columns[0]))
-                if repeats and len(keep):
-                    t = columns.pop()
-                    keep = np.flatnonzero(np.diff(t, prepend=last) != 0.0)
-                    last = float(t[-1])
-                if len(keep):
-                    yield Block([column[keep] for column in columns], line_number([numbers[i] for i in keep.tolist()]))
-
-    def _columns(self, lines: Sequence[str], numbers: Sequence[int], fields: Sequence[int]) -> tuple[list[Array], bool]:
-        """Return fields of the lines as numbers, times in s, and whether they end with these lines."""
-        if self._mark != ",":
-            lines = [decimal_points(line) for line in lines]
-        counted = [self._ticks and self._is_time(field) for field in fields]
-        types = np.dtype([(str(k), np.int64 if ticks else np.float64) for k, ticks in enumerate(counted)])
+    def _field(self, field: int, name: str) -> Array:
+        """Return a field of all lines down to the last one that has it."""
+        is_time = field in {place.time for place in self._places.values()}
+        ticks = is_time and self._ticks
+        end = next((i for i in reversed(range(len(self._lines))) if self._row_cell(i, field)), -1) + 1
+        kind = np.dtype(np.int64 if ticks else np.float64)
         try:
-            rows = np.loadtxt(lines, types, delimiter=self._mark, usecols=fields, comments=None, ndmin=1)
-            ended = False
+            mark, lines = self._mark, self._lines[:end]
+            values = np.loadtxt(lines, kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
         except (ValueError, OverflowError):
-            found = self._line_by_line(lines, numbers, fields, counted)
-            rows, ended = np.array(found, types), len(found) < len(lines)
-        return [
-            self._scaled(np.ascontiguousarray(rows[name]), field, ticks)
-            for name, field, ticks in zip(types.names or (), fields, counted, strict=True)
-        ], ended
-
-    def _line_by_line(
-        self, lines: Sequence[str], numbers: Sequence[int], fields: Sequence[int], counted: Sequence[bool]
-    ) -> list[tuple[float, ...]]:
-        """Return the fields of the lines down to that in which all of them are empty."""
-        found: list[tuple[float, ...]] = []
-        for line, number in zip(lines, numbers, strict=True):
-            row = line.rstrip("\r\n").split(self._mark)
-            cells = [row[field].strip() if field < len(row) else "" for field in fields]
-            if not any(cells) or row[0].strip() == "EOF":
-                return found
-            for field, cell, ticks in zip(fields, cells, counted, strict=True):
-                if not (cell.isdigit() and len(cell) < 19 if ticks else is_number(cell)):
-                    what = "a whole number" if ticks else "a number"
-                    name = next(name for name, place in self._places.items() if place.field == field)
-                    raise LogError(
-                        f"{self.path}, line {number}: column {brief(name)} must be {what}, got "
-                        f"{brief(cell) if cell else 'nothing'}"
-                    )
-            found.append(tuple(int(c) if ticks else float(c) for c, ticks in zip(cells, counted, strict=True)))
-        return found
-
-    def _is_time(self, field: int) -> bool:
-        return any(place.field == place.time == field for place in self._places.values())
-
-    def _scaled(self, values: NDArray[Any], field: int, ticks: bool) -> Array:
-        """Return times in s, other columns as they are."""
+            values = np.array([self._number(i, field, name, ticks=ticks) for i in range(end)], kind)
         if ticks:
-            return (values - self._origin) * _TICK
-        return values * _MS if self._is_time(field) else values
+            return np.asarray((values - self._origin) * _TICK, dtype=np.float64)
+        return np.asarray(values * _MS if is_time else values, dtype=np.float64)
+
+    def _row_cell(self, i: int, field: int) -> str:
+        row = self._lines[i].split(self._mark)
+        return row[field].strip() if field < len(row) else ""
+
+    def _number(self, i: int, field: int, name: str, *, ticks: bool) -> float:
+        """Return the number in a field of a line; LogError if it is none."""
+        cell = self._row_cell(i, field)
+        if not (cell.isdigit() and len(cell) < 19 if ticks else is_number(cell)):
+            what, came = "a whole number" if ticks else "a number", brief(cell) if cell else "nothing"
+            raise LogError(f"{self.path}, line {self._first + i}: column {brief(name)} must be {what}, got {came}")
+        return int(cell) if ticks else float(cell)

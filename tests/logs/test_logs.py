@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -165,18 +164,6 @@ def test_an_interval_that_is_not_round_stays(tmp_path: Path) -> None:
 def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
     assert read_log(path, uniform=False).T_s == 5.5
-
-
-@pytest.mark.slow
-def test_memory_does_not_grow_with_a_text(tmp_path: Path) -> None:
-    peaks = []
-    for n in (20_000, 160_000):
-        path = write(tmp_path / f"log{n}.csv", columns(n, 1e-5))
-        tracemalloc.start()
-        assert sum(len(x) for _, x in open_log(path).chunks(1000)) == n
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < 1.2 * peaks[0] + 50_000
 
 
 def test_recorded_axis() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -81,9 +81,9 @@ class _Names(Source):
         """Return False: a stream is no file."""
         return False
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Yield nothing: there are names alone."""
-        yield from ()
+    def read(self, names: Sequence[str]) -> Block:
+        """Return nothing: there are names alone."""
+        return Block([], str)
 
 
 class _Chosen:

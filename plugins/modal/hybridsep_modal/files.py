@@ -28,7 +28,6 @@ ROLES: Mapping[str, tuple[str, ...]] = {
 """Names of the columns, without unit and brackets; ``h_re``, ``Re(H)`` and ``H.real`` are found by their parts."""
 
 _WORD = re.compile(r"[a-z]+")
-_ALL = 10_000_000
 
 
 class ResponseFile(NamedTuple):
@@ -118,10 +117,10 @@ def _columns(source: Source, names: list[str]) -> list[Array]:
     for name in names:
         if name not in source.names:
             raise LogError(f"{source.path}: column {brief(name)} is missing, the file has {listed(source.names)}")
-    blocks = [block.columns for block in source.blocks(names, _ALL)]
-    if not blocks:
+    columns = source.read(names).columns
+    if not len(columns[0]):
         raise LogError(f"{source.path}: a frequency response needs lines, got none")
-    return [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
+    return columns
 
 
 def _is_angular(name: str) -> bool:
