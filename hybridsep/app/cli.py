@@ -16,7 +16,6 @@ from .command_cosim import cosim
 from .command_demo import demo
 from .command_example_log import example_log
 from .command_fit import fit
-from .command_fleet import fleet
 from .command_hal import hal
 from .command_header import header
 from .command_identify import identify
@@ -29,7 +28,7 @@ from .panels import EXAMPLES, PanelledCommand
 
 __all__ = ["app", "main"]
 
-PLUG_INS = ("live", "modal")
+PLUG_INS = ("fleet", "live", "modal")
 """Commands that this repository has as plug-ins, in ``plugins``."""
 
 
@@ -85,7 +84,6 @@ for _command in (
     header,
     backtest,
     report,
-    fleet,
     example_log,
 ):
     _name = _command.__name__.replace("_", "-")

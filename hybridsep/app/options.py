@@ -41,13 +41,11 @@ __all__ = [
     "ReadingOptions",
     "ResampleOption",
     "SavedOption",
-    "SchedulerOption",
     "TimeColumnOption",
     "TrajectoryOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
-    "WorkersOption",
     "parameter_help",
     "takes_parameters",
     "takes_reading",
@@ -90,12 +88,6 @@ CommandColumnOption = Annotated[
 ]
 MeasuredColumnOption = Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")]
 AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
-WorkersOption = Annotated[
-    int, typer.Option(min=0, help="Processes of a Dask cluster that is started on this machine (extra fleet).")
-]
-SchedulerOption = Annotated[
-    str, typer.Option(help="Address of a running Dask scheduler, such as tcp://127.0.0.1:8786 (extra fleet).")
-]
 ResampleOption = Annotated[
     bool,
     typer.Option(

@@ -62,7 +62,6 @@ EXAMPLES = {
         "hybridsep report my_axis.csv -m my_axis/machine.toml",
         "hybridsep report my_axis.csv -m my_axis/machine.toml --weights my_axis/trained.state --out today.html",
     ),
-    "fleet": ("hybridsep fleet logs --out results", "hybridsep fleet report results"),
     "hal": ("hybridsep hal my_axis/machine.toml --out hal", "hybridsep hal x/machine.toml y/machine.toml --out hal"),
     "header": (
         "hybridsep header my_axis/machine.toml --predictor",

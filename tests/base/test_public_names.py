@@ -14,7 +14,7 @@ from places import ROOT
 
 import hybridsep
 
-SLOW_MODULES = {"matplotlib", "control", "fmpy", "ruckig", "scipy.spatial", "joblib"}
+SLOW_MODULES = {"matplotlib", "control", "fmpy", "ruckig", "scipy.spatial"}
 SOURCE = Path(hybridsep.__file__).read_text(encoding="utf-8")
 
 

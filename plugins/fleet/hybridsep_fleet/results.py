@@ -1,7 +1,4 @@
-"""Results of a fleet: a dataset that only grows, one row an axis of a log as it was then.
-
-Its files are Parquet where pyarrow (extra ``fleet``) is installed, else JSON; both are read.
-"""
+"""Results of a fleet: a Parquet dataset that only grows, one row an axis of a log as it was then."""
 
 from __future__ import annotations
 
@@ -9,18 +6,20 @@ import hashlib
 import json
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import LogError, StateError, first_line
-from ..base.output import written_whole
-from ..logs.extras import library
+import pyarrow
+from pyarrow import parquet
+
+from hybridsep.base.errors import StateError, first_line
+from hybridsep.base.output import written_whole
+
 from .sources import LogFile
 
 __all__ = ["COLUMNS", "Results", "key_of"]
 
-_FOLDER, _PARQUET, _JSON = "rows", ".parquet", ".json"
+_FOLDER, _ENDING = "rows", ".parquet"
 
 COLUMNS: Mapping[str, str] = {
     **dict.fromkeys(("key", "url", "stamp", "log", "machine", "axis", "settings", "recorded", "run"), "string"),
@@ -30,6 +29,8 @@ COLUMNS: Mapping[str, str] = {
     **dict.fromkeys(("T_s", "dead_time", "rms_pb", "rms_hold", "rms_h", "ratio", "friction", "seconds"), "float64"),
 }
 """Columns and their types. ``modes``, ``peers``, ``findings`` and ``axes`` hold JSON."""
+
+_SCHEMA = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in COLUMNS.items()])
 
 
 def key_of(log: str, axis: str, settings: str) -> str:
@@ -48,7 +49,6 @@ class Results:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._rows = folder / _FOLDER
-        self._parquet = find_spec("pyarrow") is not None
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write rows; a column that a row leaves out is null."""
@@ -57,14 +57,9 @@ class Results:
         self._rows.mkdir(parents=True, exist_ok=True)
         # Names increase with time, so that the last row of an axis is the latest
         name = f"{max(row['run'] for row in rows)}-{len(list(self._rows.iterdir())):06}-{uuid.uuid4().hex}"
-        path = self._rows / f"{name.replace(':', '')}{_PARQUET if self._parquet else _JSON}"
         whole = [{column: row.get(column) for column in COLUMNS} for row in rows]
-        with written_whole(path) as file:
-            if self._parquet:
-                arrow, parquet = _arrow(path)
-                parquet.write_table(arrow.Table.from_pylist(whole, schema=_schema(arrow)), file)
-            else:
-                file.write(json.dumps(whole).encode())
+        with written_whole(self._rows / f"{name.replace(':', '')}{_ENDING}") as file:
+            parquet.write_table(pyarrow.Table.from_pylist(whole, schema=_SCHEMA), file)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows, the oldest first.
@@ -73,16 +68,11 @@ class Results:
         ------
         StateError
             If a file is damaged.
-        LogError
-            If one is Parquet and pyarrow is not installed.
         """
         found: list[dict[str, Any]] = []
-        paths = self._rows.iterdir() if self._rows.is_dir() else ()
-        for path in sorted(path for path in paths if path.suffix in (_PARQUET, _JSON)):
+        for path in sorted(self._rows.glob(f"*{_ENDING}")):
             try:
-                found += _read(path)
-            except LogError:  # pyarrow is not installed
-                raise
+                found += parquet.read_table(path, schema=_SCHEMA).to_pylist()
             except (OSError, LookupError, TypeError, ValueError) as error:  # pyarrow's are of these
                 raise StateError(
                     f"{path}: is damaged: {first_line(error)}; remove it, its logs are fitted again"
@@ -103,21 +93,3 @@ class Results:
             for log in logs
             if (known := (log.url, log.size, log.stamp)) not in done or not wanted[known] <= done[known]
         ]
-
-
-def _arrow(path: Path) -> tuple[Any, Any]:
-    """Return pyarrow and its Parquet; LogError if they are not installed."""
-    return tuple(library(path, name, "fleet", "Parquet") for name in ("pyarrow", "pyarrow.parquet"))
-
-
-def _schema(arrow: Any) -> Any:
-    return arrow.schema([(name, getattr(arrow, kind)()) for name, kind in COLUMNS.items()])
-
-
-def _read(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a file."""
-    if path.suffix == _PARQUET:
-        arrow, parquet = _arrow(path)
-        rows: list[dict[str, Any]] = parquet.read_table(path, schema=_schema(arrow)).to_pylist()
-        return rows
-    return [{column: row[column] for column in COLUMNS} for row in json.loads(path.read_text(encoding="utf-8"))]

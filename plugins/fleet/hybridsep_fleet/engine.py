@@ -1,4 +1,4 @@
-"""Engines that work on many tasks: Dask distributed, a cluster of this machine or a running one, else joblib.
+"""Engine that works on many tasks: Dask distributed, a cluster of this machine or a running one.
 
 Dask blames every task that is assigned to a worker as it dies. So no worker has more than one, and one that is blamed
 is repeated alone before it is reported: if the process ends twice, the log itself is the cause, by its memory for
@@ -12,16 +12,18 @@ import multiprocessing
 import signal
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, contextmanager
-from typing import Any, NamedTuple, TypeVar
+from contextlib import contextmanager
+from typing import Any, NamedTuple, Protocol, TypeVar
 
-from ..base.errors import HybridSepError, ParameterError, first_line
-from ..logs.extras import library
+import dask
+from dask.system import CPU_COUNT
+from distributed import Client, KilledWorker, LocalCluster, Security, as_completed, wait
 
-__all__ = ["Done", "Engine", "check_engine", "cluster", "joblib_engine"]
+from hybridsep.base.errors import HybridSepError, ParameterError, first_line
+
+__all__ = ["Done", "Engine", "attempt", "cluster"]
 
 T = TypeVar("T")
 
@@ -86,64 +88,22 @@ class Done(NamedTuple):
     failure: str = ""
 
 
-class Engine(ABC):
-    """Engine.
+class Engine(Protocol):
+    """What works on tasks.
 
     Attributes
     ----------
     words : str
-        What works, for messages.
+        What it is, for messages.
     """
 
     words: str
 
-    @abstractmethod
     def run(self, work: Callable[[T], Any], tasks: Iterable[T]) -> Iterator[Done]:
         """Work on all tasks; yield each once, as it is over, in any order."""
 
 
-class _Joblib(Engine):
-    """Processes of this machine; one that ends takes the others with it, which are begun again."""
-
-    def __init__(self, jobs: int) -> None:
-        from joblib import cpu_count
-
-        self._jobs = min(jobs, cpu_count()) if jobs else cpu_count()
-        self.words = f"joblib, {self._jobs} process{'es' if self._jobs > 1 else ''}"
-
-    def run(self, work: Callable[[T], Any], tasks: Iterable[T]) -> Iterator[Done]:
-        """Work on all tasks; yield each once, as it is over, in any order."""
-        left = dict(enumerate(tasks))
-        if self._jobs == 1:
-            for task in left.values():
-                yield Done(task, *_tried(work, task))
-            return
-        for i, outcome in self._parallel(work, left):
-            yield Done(left.pop(i), *outcome)
-        for i, task in left.items():  # a process has ended: one by one, so that it is known on which
-            attempts = (list(self._parallel(work, {i: task})) for _ in range(_ALONE))
-            found = next((attempt for attempt in attempts if attempt), None)
-            yield Done(task, *found[0][1]) if found else Done(task, None, _ENDED.format(limit=""))
-
-    def _parallel(self, work: Callable[[T], Any], tasks: dict[int, T]) -> Iterator[tuple[int, tuple[Any, str]]]:
-        from joblib import Parallel, delayed
-        from joblib.externals.loky.process_executor import BrokenProcessPool, TerminatedWorkerError
-
-        parallel = Parallel(n_jobs=self._jobs if len(tasks) > 1 else 2, return_as="generator_unordered")
-        try:
-            with _ignoring_ctrl_c():
-                running = parallel(delayed(_numbered)(work, i, task) for i, task in list(tasks.items()))
-            with closing(running):  # ends the processes where this one is interrupted
-                yield from running
-        except (BrokenProcessPool, TerminatedWorkerError):
-            return
-
-
-def _numbered(work: Callable[[T], Any], i: int, task: T) -> tuple[int, tuple[Any, str]]:
-    return i, _tried(work, task)
-
-
-def _tried(work: Callable[[T], Any], task: T) -> tuple[Any, str]:
+def attempt(work: Callable[[T], Any], task: T) -> tuple[Any, str]:
     """Return the result of a task, and why there is none; one task must not end the run of thousands."""
     try:
         return work(task), ""
@@ -155,16 +115,11 @@ def _tried(work: Callable[[T], Any], task: T) -> tuple[Any, str]:
         return None, first_line(f"unexpected {type(error).__name__}: {error}")
 
 
-def joblib_engine(jobs: int = 0) -> Engine:
-    """Return joblib's processes, as many as there are cores if ``jobs`` is 0."""
-    return _Joblib(jobs)
-
-
-class _Dask(Engine):
+class _Dask:
     """Workers of a Dask cluster."""
 
-    def __init__(self, client: Any, distributed: Any, words: str, limit: str) -> None:
-        self._client, self._distributed = client, distributed
+    def __init__(self, client: Client, words: str, limit: str) -> None:
+        self._client = client
         self.words, self._limit = words, limit
         self._n, self._counted = 0, -_COUNTED
 
@@ -173,10 +128,10 @@ class _Dask(Engine):
         waiting = iter(tasks)
         blamed: deque[T] = deque()
         under_way: dict[Any, T] = {}
-        over = self._distributed.as_completed(with_results=False)
+        over = as_completed(with_results=False)
         while True:
             while len(under_way) < self._workers() and (task := next(waiting, _NONE)) is not _NONE:
-                future = self._client.submit(_tried, work, task, pure=False, retries=0)
+                future = self._client.submit(attempt, work, task, pure=False, retries=0)
                 under_way[future] = task
                 over.add(future)
             if not under_way:
@@ -196,8 +151,8 @@ class _Dask(Engine):
 
     def _alone(self, work: Callable[[T], Any], task: T) -> Done | None:
         """Return what came of a task that nothing else runs beside; None if its worker ended."""
-        future = self._client.submit(_tried, work, task, pure=False, retries=0)
-        self._distributed.wait([future])
+        future = self._client.submit(attempt, work, task, pure=False, retries=0)
+        wait([future])
         return self._done(future, task)
 
     def _workers(self) -> int:
@@ -211,7 +166,7 @@ class _Dask(Engine):
         if future.status == "finished":
             return Done(task, *future.result())
         error = future.exception() if future.status == "error" else None
-        if error is None or isinstance(error, self._distributed.KilledWorker):
+        if error is None or isinstance(error, KilledWorker):
             return None
         return Done(task, None, first_line(f"{type(error).__name__}: {error}"))
 
@@ -238,46 +193,43 @@ def _ending(started: Any) -> Iterator[None]:
 def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
     """Start a cluster of this machine, or use a running one, and end what was started.
 
+    Who connects to a cluster that is started here needs a certificate that is made for it and stays in its processes:
+    a scheduler runs what it is sent, as its own user.
+
     Parameters
     ----------
     workers : int
-        Processes of a cluster of this machine, each with its share of the memory.
+        Processes of a cluster of this machine, each with its share of the memory; as many as cores if 0.
     scheduler : str
-        Address of a running one, such as ``tcp://127.0.0.1:8786``; ``tls://`` with Dask's own settings.
+        Address of a running one, such as ``tls://10.0.0.5:8786``, with Dask's own settings of TLS.
 
     Raises
     ------
-    LogError
-        If Dask is not installed.
     ParameterError
-        If the scheduler cannot be reached.
+        If the scheduler cannot be reached, or both are given.
     """
-    dask = library(scheduler or "--workers", "dask", "fleet", "an engine")
-    distributed = library(scheduler or "--workers", "distributed", "fleet", "an engine")
+    if workers and scheduler:
+        raise ParameterError("--workers and --scheduler exclude each other")
     with dask.config.set(_CONFIG):
         if scheduler:
             try:
-                client = distributed.Client(scheduler, timeout=_REACHED)
+                client = Client(scheduler, timeout=_REACHED)
             except (OSError, ValueError) as error:
                 raise ParameterError(f"--scheduler {scheduler} cannot be reached: {first_line(error)}") from error
             with client:
-                yield _Dask(client, distributed, f"Dask at {scheduler}", "")
+                yield _Dask(client, f"Dask at {scheduler}", "")
             return
         with _ignoring_ctrl_c():
-            started = distributed.LocalCluster(
-                n_workers=workers,
+            started = LocalCluster(
+                n_workers=workers or CPU_COUNT,
                 threads_per_worker=1,
                 host="127.0.0.1",
+                security=Security.temporary(),
                 dashboard_address="127.0.0.1:0",  # of its own, so that several may run, and for this machine alone
                 silence_logs=50,
             )
-        with _ending(started), distributed.Client(started) as client:
-            limit = min(one["memory_limit"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
-            words = f"Dask, {workers} worker{'s' if workers > 1 else ''} of {limit / 2**30:.1f} GB"
-            yield _Dask(client, distributed, words, f"; its memory limit is {limit / 2**30:.1f} GB")
-
-
-def check_engine(workers: int, scheduler: str) -> None:
-    """Raise ParameterError if both a cluster to be started and a running one are named."""
-    if workers and scheduler:
-        raise ParameterError("--workers and --scheduler exclude each other")
+        with _ending(started), Client(started) as client:
+            there = client.scheduler_info(n_workers=-1)["workers"].values()
+            limit = min(one["memory_limit"] for one in there) / 2**30
+            words = f"Dask, {len(there)} worker{'s' if len(there) > 1 else ''} of {limit:.1f} GB"
+            yield _Dask(client, words, f"; its memory limit is {limit:.1f} GB")

@@ -13,21 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import MachineError, brief
-from ..base.metrics import rms_ratio
-from ..base.threads import one_blas_thread
-from ..evaluate.report import Report
-from ..fitting.advice import Judged, extent, recommendation
-from ..fitting.fit import FitOptions, fit
-from ..fitting.replay import Recording, Replay, replay
-from ..fitting.report import fit_report, judged_by, write_errors, write_findings
-from ..intake.finding import Finding, findings_table
-from ..intake.repair import changes, take_in
-from ..logs.formats import open_source
-from ..machines.agree import check_interval, check_unit
-from ..machines.machine import Machine, load_machine
-from ..machines.naming import machine_name
-from ..predict.predictor import HybridPredictor
+from hybridsep.base.errors import MachineError, brief
+from hybridsep.base.metrics import rms_ratio
+from hybridsep.base.threads import one_blas_thread
+from hybridsep.evaluate.report import Report
+from hybridsep.fitting.advice import Judged, extent, recommendation
+from hybridsep.fitting.fit import FitOptions, fit
+from hybridsep.fitting.replay import Recording, Replay, replay
+from hybridsep.fitting.report import fit_report, judged_by, write_errors, write_findings
+from hybridsep.intake.finding import Finding, findings_table
+from hybridsep.intake.repair import changes, take_in
+from hybridsep.logs.formats import open_source
+from hybridsep.machines.agree import check_interval, check_unit
+from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.naming import machine_name
+from hybridsep.predict.predictor import HybridPredictor
+
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 
@@ -82,10 +83,10 @@ def work(task: AxisTask) -> dict[str, Any]:
 
 
 def _fitted(task: AxisTask, path: Path) -> _Judged:
-    used, findings = take_in([task.settings.read(path, task.axis)], fix=task.settings.fix)
+    used, findings = take_in([task.settings.read(path, task.axis)], fix=False)
     folder = _folder(task)
     name = machine_name(path, task.axis)
-    options = FitOptions(task.settings.Np, name, known=dict(task.settings.known))
+    options = FitOptions(task.settings.Np, name)
     result = fit(used, folder, options, changes=changes(findings), fmus=task.settings.fmus)
     if task.settings.reports:
         fit_report(result, used, findings).write(folder / "report.html")
@@ -98,7 +99,7 @@ def _replayed(task: AxisTask, path: Path) -> _Judged:
     machine = _machine(task)
     check_unit(path.name, log, machine)
     check_interval(path.name, log.T_s, machine)
-    (used,), findings = take_in([log], fix=task.settings.fix)
+    (used,), findings = take_in([log], fix=False)
     predictor = HybridPredictor(machine.model, machine.predictor_settings)
     recordings = [Recording(one.x_d, one.x_meas, 0) for one in used.segments()]
     judged = Judged(replay(predictor, recordings).with_peers(), used.T_s, used.shown, "the log")

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from ..base.errors import LogError, first_line
-from ..logs.extras import library
-from ..logs.formats import READERS
+import fsspec
+
+from hybridsep.base.errors import LogError, first_line
+from hybridsep.logs.formats import READERS
 
 __all__ = ["LogFile", "find_logs", "local_copy"]
 
@@ -81,7 +81,6 @@ def local_copy(url: str) -> Iterator[Path]:
     if "://" not in url:
         yield Path(url)
         return
-    fsspec = _fsspec(url)
     with TemporaryDirectory(prefix="hybridsep-") as folder:
         path = Path(folder) / url.rstrip("/").rpartition("/")[2]
         try:
@@ -112,7 +111,6 @@ def _local(source: str) -> Iterator[LogFile]:
 
 
 def _remote(source: str) -> Iterator[LogFile]:
-    fsspec = _fsspec(source)
     try:
         store, root = fsspec.core.url_to_fs(source)
         store.invalidate_cache()
@@ -143,7 +141,3 @@ def _machine(below: tuple[str, ...]) -> str:
 def _day(below: tuple[str, ...], changed: str) -> str:
     dates = _DATE.findall("/".join(below))
     return "-".join(dates[-1]) if dates else changed
-
-
-def _fsspec(url: str) -> Any:
-    return library(url, "fsspec", "fleet", "in an object store")

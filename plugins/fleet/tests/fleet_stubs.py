@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from hybridsep.base.errors import LogError
+from hybridsep_fleet.engine import Done, attempt
 
-__all__ = ["row", "squared"]
+__all__ = ["Here", "row", "squared"]
+
+
+class Here:
+    """Engine that works in this process."""
+
+    words = "this process"
+
+    def run(self, work: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Done]:
+        for task in tasks:
+            yield Done(task, *attempt(work, task))
 
 
 def squared(task: tuple[int, str]) -> tuple[int, int]:

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import fsspec
 import pytest
-from s3_server import s3_server
 
 from hybridsep.base.errors import LogError
-from hybridsep.fleet.sources import find_logs, local_copy
+from hybridsep_fleet.sources import find_logs, local_copy
 
 NAMES = ("mill1/2026-03-05/X.csv", "mill1/2026-03-06/X.csv", "saw/X.mat", "20260307_lathe_X.csv", "notes.md")
 
@@ -80,13 +79,6 @@ def store(url: str) -> None:
 
 def test_memory() -> None:
     store("memory://fleet")
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
-def test_s3(monkeypatch: pytest.MonkeyPatch) -> None:
-    with s3_server(monkeypatch, "fleet") as bucket:
-        store(f"{bucket}/logs")
 
 
 def test_an_unknown_store() -> None:

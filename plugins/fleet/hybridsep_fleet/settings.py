@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..base.version import __version__
-from ..logs.log import Log, read_log
+from hybridsep.base.version import __version__
+from hybridsep.logs.log import Log, read_log
+
 from .results import key_of
 from .sources import LogFile
 
@@ -27,9 +28,6 @@ class FleetSettings:
         As of :func:`~hybridsep.logs.log.read_log`.
     axes : tuple of str
         Axes that are read of a log with several; all if empty.
-    resample, fix : bool
-    known : tuple of pairs
-        Entries of ``[predictor]`` that are known.
     machines : str
         Folder of machine files, ``MACHINE.toml`` or ``MACHINE/machine.toml``, or with ``_AXIS``, with which logs are
         replayed; empty to fit.
@@ -42,9 +40,6 @@ class FleetSettings:
     T_s: float | None = None
     columns: tuple[tuple[str, str], ...] = ()
     axes: tuple[str, ...] = ()
-    resample: bool = False
-    fix: bool = False
-    known: tuple[tuple[str, Any], ...] = ()
     machines: str = ""
     fmus: bool = True
     reports: bool = True
@@ -68,7 +63,6 @@ class FleetSettings:
             T_s=self.T_s,
             axis=axis or None,
             uniform=False,
-            resample=self.resample,
         )
 
 

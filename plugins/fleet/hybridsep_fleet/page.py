@@ -14,8 +14,8 @@ from statistics import median_high
 from string import Template
 from typing import Any
 
-from ..base.errors import LogError
-from ..base.output import written_text
+from hybridsep.base.errors import LogError
+from hybridsep.base.output import written_text
 
 __all__ = ["Course", "courses", "write_page"]
 
@@ -100,7 +100,7 @@ def write_page(rows: Sequence[Mapping[str, Any]], page: Path, results: Path) -> 
     Parameters
     ----------
     rows : sequence of mapping
-        As of :meth:`~hybridsep.fleet.results.Results.rows`.
+        As of :meth:`~hybridsep_fleet.results.Results.rows`.
     page : Path
     results : Path
         Folder of the results, to which links lead.

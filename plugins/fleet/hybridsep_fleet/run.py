@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..parallel.engine import Done, Engine
+from .engine import Done, Engine
 from .results import Results
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import find_logs

@@ -1,1 +1,0 @@
-"""Many tasks at once: processes of this machine, or a cluster."""
