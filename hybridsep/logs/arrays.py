@@ -19,16 +19,9 @@ from numpy.lib import format as npy
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .extras import library
-from .source import ArraysSource, check_column
+from .source import N_COLUMNS, ArraysSource, check_column, check_declared
 
 __all__ = ["MatSource", "NpzSource", "ParquetSource"]
-
-_SMALL, _COMPRESSION_MAX = 1 << 28, 100
-"""Bytes that any file may declare, and those that it may declare for each of its own: positions, of which the last
-digits are noise, never compress so far."""
-
-_COLUMNS = 3
-"""Columns that are read of a log."""
 
 _NPY_HEADER_MAX = 10_000
 """Largest header of an array, in bytes, that NumPy reads."""
@@ -44,16 +37,6 @@ _DAY = 86_400
 
 _OWN = (TypeError, AttributeError, LookupError)
 """Errors whose messages tell of the library's own names."""
-
-
-def _check_declared(path: Path, n_bytes: int) -> None:
-    """Raise LogError if a file declares more than its size can hold."""
-    size = path.stat().st_size
-    if n_bytes > max(_SMALL, _COMPRESSION_MAX * size):
-        raise LogError(
-            f"{path}: declares {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
-            "the memory; save the log again, without compression"
-        )
 
 
 @contextmanager
@@ -108,7 +91,7 @@ class NpzSource(ArraysSource):
                 raise LogError(
                     f"{self.path}: column {brief(name)} is truncated: {declared} bytes were expected, got {there}"
                 )
-            _check_declared(self.path, declared)
+            check_declared(self.path, declared)
             with archive.open(member) as stream:
                 values = npy.read_array(stream, allow_pickle=False)
         return np.asarray(values, dtype=np.float64).ravel()
@@ -133,7 +116,7 @@ class MatSource(ArraysSource):
 
         with _reading(path, "a MATLAB file"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of names that occur twice: the last one counts, as in MATLAB
-            _check_declared(path, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in io.whosmat(path)))
+            check_declared(path, sum(8 * int(np.prod(shape, dtype=np.float64)) for _, shape, _ in io.whosmat(path)))
             variables = [item for item in io.loadmat(path).items() if not item[0].startswith("__")]
             self._variables = {name: value for one in variables for name, value in _fields(*one)}
         self.names = list(self._variables)
@@ -189,7 +172,7 @@ class ParquetSource(ArraysSource):
         with _reading(path, "a Parquet file"), self._file() as file:
             groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
             written = sum(group.column(i).total_uncompressed_size for group in groups for i in range(group.num_columns))
-            _check_declared(path, max(written, _COLUMNS * 8 * file.metadata.num_rows))  # a value that repeats is one
+            check_declared(path, max(written, N_COLUMNS * 8 * file.metadata.num_rows))  # a value that repeats is one
             self._leaves = {".".join(place): (place, field) for place, field in self._found(file.schema_arrow, ())}
         types = self._arrow.types
         temporal = (types.is_timestamp, types.is_time, types.is_duration)

@@ -12,19 +12,21 @@ import math
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn
-from xml.parsers import expat
+from xml.etree import ElementTree
 
 import numpy as np
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .source import ArraysSource, Channel
+from .source import N_COLUMNS, ArraysSource, Channel, check_declared
 from .text import is_number
 
 __all__ = ["SinumerikSource"]
 
 _ROOT = b"<traceSession"
+
+_HEAD = 4096
+"""Bytes in which the root, and what stands before it, begins."""
 
 _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")
 """``/Nck/!SD/nckServoDataCmdPos2ndEnc64 [u1, 7]``: a variable of axis 7."""
@@ -32,9 +34,6 @@ _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s
 _COMMANDED = re.compile(r"cmdpos|despos", re.IGNORECASE)
 _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGNORECASE))
 """Names of the signals of positions, the measured ones by precedence."""
-
-_POINTS_MAX = 100_000_000
-"""Most samples of a signal: a day at 1 kHz. A damaged number must not be filled up with held values."""
 
 _NOT_A_NUMBER = 9.2188684e18
 """Values above are the bits of a NaN, written as a whole number: there is none."""
@@ -53,70 +52,46 @@ class _Signal:
     values: list[float] = field(default_factory=list)
 
 
-class _Trace:
-    """Signals of a file, by their attribute in the records, and the last time."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self.signals: dict[str, _Signal] = {}
-        self.last = -math.inf
-        self._frames, self._within = 0, False
-        self._parser: Any = expat.ParserCreate()
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-        self._parser.StartDoctypeDeclHandler = lambda *_: self._refuse("a document type is not read")
-        try:
-            with path.open("rb") as file:
-                self._parser.ParseFile(file)
-        except (expat.ExpatError, LookupError) as error:
-            raise LogError(f"{path}: is truncated, damaged or not XML: {first_line(error)}") from error
-        if not self.signals:
-            raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
-
-    def _refuse(self, what: str) -> NoReturn:
-        raise LogError(f"{self._path}, line {self._parser.CurrentLineNumber}: {what}")
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag == "dataFrame":
-            self._frames += 1
-            self._within = self._frames == 1
-        elif self._within and tag == "dataSignal":
-            self._declare(attributes)
-        elif self._within and tag == "rec":
-            self._record(attributes)
-
-    def _end(self, tag: str) -> None:
-        if tag == "dataFrame":
-            self._within = False
-
-    def _declare(self, given: dict[str, str]) -> None:
+def _signals_of(path: Path) -> tuple[list[_Signal], float]:
+    """Return the signals of a file's first frame with their values, and its last time."""
+    try:
+        frame = ElementTree.parse(path).find(".//dataFrame")
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise LogError(f"{path}: is truncated, damaged or not XML: {first_line(error)}") from error
+    signals: dict[str, _Signal] = {}
+    for given in () if frame is None else frame.iter("dataSignal"):
         name = _ADDRESS.fullmatch(given.get("name", ""))
         if not given.get("id") or name is None:
-            self._refuse(f"dataSignal must have an id and a name, got {brief(given)}")
-        interval, n = (self._number(given, key, "dataSignal") for key in ("interval", "datapointCount"))
-        if not 0.0 < interval < 1e6 or not 0 <= n <= _POINTS_MAX:
-            self._refuse(
-                f"dataSignal must have an interval above 0 s and at most {_POINTS_MAX} points, got {interval:g} s and "
-                f"{n:g}"
+            raise LogError(f"{path}: dataSignal must have an id and a name, got {brief(given.attrib)}")
+        interval, n = (_number(path, given, key) for key in ("interval", "datapointCount"))
+        if not 0.0 < interval < 1e6 or not 0.0 <= n < 1e15:
+            raise LogError(
+                f"{path}: dataSignal must have an interval above 0 s and a number of points, got {brief(given.attrib)}"
             )
         signal = _Signal(name["name"], name["axis"] or "", interval, int(n), given.get("unitsType", ""))
-        self.signals[given["id"]] = signal
+        signals[given.attrib["id"]] = signal
+    if frame is None or not signals:
+        raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
+    last = -math.inf
+    for record in frame.iter("rec"):
+        t = _number(path, record, "time")
+        if not last <= t < 1e12:
+            raise LogError(f"{path}: time of rec must increase, got {t:.9g} s after {last:.9g} s")
+        last = t
+        for key in record.keys() & signals.keys():
+            if (value := _number(path, record, key)) <= _NOT_A_NUMBER:
+                signals[key].t.append(t)
+                signals[key].values.append(value)
+    return list(signals.values()), last
 
-    def _record(self, given: dict[str, str]) -> None:
-        t = self._number(given, "time", "rec")
-        if not self.last <= t < 1e12:
-            self._refuse(f"time of rec must increase, got {t:.9g} s after {self.last:.9g} s")
-        self.last = t
-        for key in given:
-            if key in self.signals and (value := self._number(given, key, "rec")) <= _NOT_A_NUMBER:
-                self.signals[key].t.append(t)
-                self.signals[key].values.append(value)
 
-    def _number(self, given: dict[str, str], key: str, tag: str) -> float:
-        text = given.get(key, "")
-        if not is_number(text):
-            self._refuse(f"{key} of {tag} must be a number, got {brief(text) if text else 'nothing'}")
-        return float(text)
+def _number(path: Path, element: ElementTree.Element, key: str) -> float:
+    text = element.get(key, "")
+    if not is_number(text):
+        at = f" at time {element.get('time'):.20}" if key != "time" and element.get("time") else ""
+        came = brief(text) if text else "nothing"
+        raise LogError(f"{path}: {key} of {element.tag}{at} must be a number, got {came}")
+    return float(text)
 
 
 class SinumerikSource(ArraysSource):
@@ -131,10 +106,12 @@ class SinumerikSource(ArraysSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        trace = _Trace(path)
-        self._last = trace.last
+        with path.open("rb") as file:
+            if b"<!DOCTYPE" in file.read(_HEAD):
+                raise LogError(f"{path}: a document type is not read")
+        signals, self._last = _signals_of(path)
         self._signals: dict[str, _Signal] = {}
-        for signal in trace.signals.values():
+        for signal in signals:
             name = f"{signal.name}|{signal.axis}" if signal.axis else signal.name
             while name in self._signals:
                 name += "'"
@@ -171,7 +148,9 @@ class SinumerikSource(ArraysSource):
             raise LogError(f"{self.path}: column {brief(name)} has no values")
         start, interval = self._clocks[clock]
         most = min(self._signals[one].n for one, own in self.times.items() if own == clock)
-        k = np.arange(min(most, math.floor((self._last - start) / interval + 1.5)), dtype=np.float64)
+        n = min(most, math.floor((self._last - start) / interval + 1.5))
+        check_declared(self.path, N_COLUMNS * 8 * n)  # of values that are held
+        k = np.arange(n, dtype=np.float64)
         if name == clock:
             return start + interval * k
         signal = self._signals[name]

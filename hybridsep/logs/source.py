@@ -17,17 +17,27 @@ from ..base.signals import Array
 
 __all__ = [
     "NEEDS_TRUST",
+    "N_COLUMNS",
     "ArraysSource",
     "Block",
     "Channel",
     "Source",
     "check_column",
+    "check_declared",
     "line_number",
 ]
 
 
 NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
 """End of the message about a measured position that is missing."""
+
+
+_SMALL, _COMPRESSION_MAX = 1 << 28, 100
+"""Bytes that any file may declare, and those that it may declare for each of its own: positions, of which the last
+digits are noise, never compress so far."""
+
+N_COLUMNS = 3
+"""Columns that are read of a log."""
 
 
 @dataclass(frozen=True)
@@ -190,3 +200,13 @@ def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
         raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
     return 0 if 0 in lengths else max(lengths, default=1)
+
+
+def check_declared(path: Path, n_bytes: int) -> None:
+    """Raise LogError if a file declares more than its size can hold."""
+    size = path.stat().st_size
+    if n_bytes > max(_SMALL, _COMPRESSION_MAX * size):
+        raise LogError(
+            f"{path}: declares {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
+            "the memory; save the log again, without compression"
+        )
