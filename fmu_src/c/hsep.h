@@ -23,7 +23,7 @@
  *   hsep_compensator_sample  | as the predictor's with preview for Np but in folds;  | divergence is set, latched
  *                            | at a window's end a plan, m^3 / 6, and a bounded share|
  *                            | of its solution in each of the samples that follow    |
- *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | nothing
+ *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
  * Costs are multiply-adds; n: features, p + q, with trust p and a few more, 74 at least; s: 38 of them at most, without
@@ -137,6 +137,7 @@ typedef struct {
     hsep_predictor_outputs predicted; /* x_h by the model that planned the window; with trust by the trusted model */
     hsep_real x_dm;                   /* m, now */
     hsep_sep_state state;             /* of the plan that x_dm follows now */
+    int no_measurement;               /* whether the change fades, as none came for measurement_timeout */
 } hsep_compensator_outputs;
 
 /* Bytes of the block; 0 as the predictor's, and if spacing does not divide Np, preview < Np + 4 spacing + 3, or a
@@ -156,8 +157,9 @@ HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_p
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
  * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
- * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. */
-HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
+ * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. Return
+ * whether they were taken: not, with nothing changed, where one is out of its range. */
+HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
 
 /* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas);

@@ -46,4 +46,4 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:
     value = getattr(look_ahead, name)
-    return int(value) if name in ("sep_state", "batch", "n_rejected") else float(value)
+    return int(value) if name in ("sep_state", "batch", "n_rejected", "no_measurement") else float(value)

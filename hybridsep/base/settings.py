@@ -334,6 +334,8 @@ class CompensatorSettings(Settings):
         sign. It has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
+    measurement_timeout : float
+        Time without a measurement after which the change of the command fades, until one comes again, s; 0: never.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
@@ -363,6 +365,10 @@ class CompensatorSettings(Settings):
         },
         "best model to compensate with",
         tunable=True,
+    )
+    measurement_timeout: float = real(
+        *(1.0, 0.0, 1e4, "s", "time without a measurement after which the command's change fades; 0: never"),
+        nonzero=1e-5,
     )
 
     def for_window(self, Np: int) -> CompensatorSettings:

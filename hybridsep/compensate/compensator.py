@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError
 from ..base.saved import Saved
-from ..base.settings import CompensatorSettings, PredictorSettings
+from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
 from ..base.threads import one_blas_thread
@@ -103,6 +103,7 @@ class SepCompensator:
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
         self._hybrid_ended = False
+        self._missing = 0  # measurements one after another
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
         self._rest = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
@@ -202,7 +203,8 @@ class SepCompensator:
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
         preview = Preview(command, self._x_d_before, self._delta_before, self._rest)
-        most = min(self.compensate, SepState.PHYSICS) if self._hybrid_ended else self.compensate
+        compensate = SepState.OFF if self.is_lost(np.empty(0)) else self.compensate
+        most = min(compensate, SepState.PHYSICS) if self._hybrid_ended else compensate
         chosen = self._planning.choose(predictor, preview, most)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
@@ -211,7 +213,7 @@ class SepCompensator:
             chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.ends_hybrid
         )
         as_published(prediction.x_pb, "x_pb")
-        x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, self.compensate)
+        x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
         x_d = self._pending.x_d
         return PublishedWindow(
             x_d, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
@@ -235,7 +237,9 @@ class SepCompensator:
         if pending is None:
             raise SignalError("update must follow plan: there is no planned window to measure")
         predictor, Np = self.predictor, self.predictor.Np
-        predictor.update(as_measured(x, "x", Np), learn=predictor.k >= self.lead_in)
+        measured = as_measured(x, "x", Np)
+        predictor.update(measured, learn=predictor.k >= self.lead_in)
+        self._missing = self._missing_after(measured)
         kept = Np // self.spacing
         self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._delta_before, self._x_d_before = (
@@ -245,6 +249,21 @@ class SepCompensator:
         self._state_before = pending.state
         self._hybrid_ended |= pending.ends_hybrid
         self._pending = None
+
+    def is_lost(self, x: Array) -> bool:
+        """Return whether no measurement came for ``measurement_timeout``: the change of the command fades then.
+
+        Parameters
+        ----------
+        x : (n,) array, m
+            Positions measured since the last :meth:`update`, NaN where missing.
+        """
+        return 0 < samples_before(self.settings.measurement_timeout, self.T_s) <= self._missing_after(x)
+
+    def _missing_after(self, x: Array) -> int:
+        """Return the number of measurements that are missing one after another at the end of ``x``, ``(n,)``, m."""
+        came = np.flatnonzero(~np.isnan(x))
+        return len(x) - 1 - int(came[-1]) if len(came) else self._missing + len(x)
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
         return DriveBounds(
@@ -264,6 +283,7 @@ class SepCompensator:
             "lead_in": self.lead_in,
             "state_before": int(self._state_before),
             "hybrid_ended": self._hybrid_ended,
+            "missing": self._missing,
             "pending": pending and [int(pending.state), int(pending.ends_hybrid), pending.prediction.n_warm_up],
         }
         arrays = {
@@ -294,6 +314,7 @@ class SepCompensator:
         compensator.lead_in = saved.whole("lead_in")
         compensator._state_before = SepState(saved.whole("state_before", max(SepState)))
         compensator._hybrid_ended = saved.flag("hybrid_ended")
+        compensator._missing = saved.whole("missing")
         n, Np = len(compensator._rest), predictor.Np
         compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
         compensator._x_d_before = saved.array("x_d_before", 3, finite=False)

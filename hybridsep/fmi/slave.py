@@ -23,6 +23,7 @@ from pythonfmu.enums import Fmi2Status
 
 from ..base.errors import FmuError, HybridSepError, SignalError, StateError
 from ..base.saved import Saved
+from ..base.settings import PARAMETERS
 from ..base.signals import check_position
 from ..base.state import pack, unpack
 from .fmu_table import FmuTable
@@ -265,6 +266,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
                 raise FmuError(f"{name} is an {causality} variable and cannot be set")
             if causality == "parameter" and variable.variability == "fixed" and self.running:
                 raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
+            if causality == "parameter" and self.running:
+                parameter = PARAMETERS[name]
+                parameter.checked(parameter.from_fmi(value))
             self.values[name] = value
 
         return assign

@@ -48,6 +48,9 @@ COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_paramete
 
 _HOLD = "running RMS of hold since t_init: x_pb plus the last residual measured before the window"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
+_NO_MEASUREMENT = (
+    "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
+)
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
     "input": "Inputs",
@@ -238,7 +241,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
     ----------
     parameters : mapping
         Start values of the predictor's parameters and of ``preview``, ``spacing``, ``jerk_weight``, ``v_max``,
-        ``a_max``, ``j_max``, ``change_max``, ``compensate``.
+        ``a_max``, ``j_max``, ``change_max``, ``compensate``, ``measurement_timeout``.
     modes : sequence of mappings
         ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
     """
@@ -288,6 +291,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("rms_hold", "output", _HOLD, display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
+        Variable("no_measurement", "Boolean", "output", "discrete", _NO_MEASUREMENT),
         *_look_ahead_parameters(parameters),
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         *_modes(modes),

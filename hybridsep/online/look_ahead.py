@@ -147,6 +147,11 @@ class LookAhead:
         return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
 
     @property
+    def no_measurement(self) -> bool:
+        """Whether the change of the command fades, as no measurement came for ``measurement_timeout``."""
+        return self.planner.is_lost(self._measured[: self.k % self.Np])
+
+    @property
     def rms_e(self) -> float:
         """Running RMS of the measured servo error ``x_d − x_meas`` since ``t_init``, m; 0 before."""
         return self._rms(0)

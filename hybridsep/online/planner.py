@@ -81,6 +81,15 @@ class WindowPlanner(Protocol):
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
 
+    def is_lost(self, x: Array) -> bool:
+        """Return whether no measurement came for so long that changes of the command fade.
+
+        Parameters
+        ----------
+        x : (n,) array, m
+            Positions measured since the window began, NaN where missing.
+        """
+
     @property
     def is_planned(self) -> bool:
         """Whether a planned window is pending measurement."""
@@ -129,6 +138,10 @@ class Unmodified:
         if not self._at_rest:
             self.predictor.update(x)
         self._at_rest = False
+
+    def is_lost(self, x: Array) -> bool:
+        """Return that no change fades, as there is none."""
+        return False
 
     @property
     def is_planned(self) -> bool:

@@ -31,7 +31,7 @@ MACHINE = load_machine("spring_mass_damper")
 TS = 1e-3
 OUTPUTS = (
     *("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state"),
-    *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
+    *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected", "no_measurement"),
 )
 
 Build = Callable[[str], Path]
@@ -58,6 +58,7 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("sep_state", "output", "Enumeration", None, None),
         *((name, "output", "Real", "m", None) for name in ("rms_e", "rms_pb", "rms_h", "rms_hold")),
         *((name, "output", "Integer", None, None) for name in ("batch", "n_rejected")),
+        ("no_measurement", "output", "Boolean", None, None),
         ("Np", "parameter", "Integer", None, "50"),
         ("p", "parameter", "Integer", None, "50"),
         ("q", "parameter", "Integer", None, "3"),

@@ -94,7 +94,7 @@ def test_a_saved_state_carries_what_was_changed(new_stream: StreamMaker) -> None
     assert column(tail, "sep_state").tolist() == [0] * 50
 
 
-@compensators
+@on_adapters((COMPENSATOR,), needs="setters")
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -103,18 +103,49 @@ def test_a_saved_state_carries_what_was_changed(new_stream: StreamMaker) -> None
         ("change_max", float("nan"), "change_max must be finite, got nan"),
     ],
 )
-def test_a_step_with_a_value_out_of_range_changes_nothing(
+def test_a_value_out_of_range_is_refused_when_it_is_set(
     new_stream: StreamMaker, name: str, value: float, message: str
 ) -> None:
     stream, untroubled = new_stream(), new_stream()
     for each in (stream, untroubled):
         initialise(each)
         steps(each, 0, 50)
-    stream.set(name, value)
-    set_inputs(stream, 0.05)
-    before, outputs = stream.save(), stream.outputs()
     with pytest.raises(RefusedStreamError, match=re.escape(message)):
-        stream.step(0.05, T_S)
-    assert (stream.save(), stream.outputs()) == (before, outputs)
-    stream.set(name, {"compensate": 2, "change_max": 1e-3}[name])
+        stream.set(name, value)
     assert steps(stream, 50, 90) == steps(untroubled, 50, 90)
+
+
+def gap_run(stream: Stream, timeout: float) -> Array:
+    """Step with measurements missing from 130 to 259."""
+    initialise(stream, measurement_timeout=timeout, **LIMITS)
+    outputs = []
+    for k in range(N_RUN):
+        set_inputs(stream, k * T_S)
+        if 130 <= k < 260:
+            stream.set("x_meas", float("nan"))
+        stream.step(k * T_S, T_S)
+        outputs.append(stream.outputs())
+    return np.array(outputs)
+
+
+@cache
+def gap_of_the_library(timeout: float) -> Array:
+    return gap_run(LookAheadStream(COMPENSATOR), timeout)
+
+
+@compensators
+@pytest.mark.parametrize("timeout", [0.05, 0.0])
+def test_the_change_fades_while_no_measurement_comes(new_stream: StreamMaker, timeout: float) -> None:
+    outputs, expected = gap_run(new_stream(), timeout), gap_of_the_library(timeout)
+    x_dm, x_d, lost = (column(outputs, name) for name in ("x_dm", "x_d", "no_measurement"))
+    first = slice(0, 280)  # after so long without a measurement, plans of the rest are more apart than the tolerance
+    np.testing.assert_allclose(x_dm[first], column(expected, "x_dm")[first], rtol=0, atol=TOLERANCE)
+    assert lost.tolist() == column(expected, "no_measurement").tolist()
+    delta = np.abs(x_dm - x_d)
+    # the 50th is missing at 179, before the window from 180 on; 260 is measured, before that from 280 on
+    assert np.flatnonzero(lost).tolist() == (list(range(179, 260)) if timeout else [])
+    assert (np.max(delta[238:279]) < 1e-15) == (timeout > 0.0)
+    assert np.max(delta[290:340]) > 2e-5
+    for order, (name, bound) in enumerate(LIMITS.items(), start=1):
+        largest = np.max(np.abs(np.diff(x_dm[100:], order))) / T_S**order
+        assert largest <= bound * (1 + 1e-6), name

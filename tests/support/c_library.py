@@ -121,7 +121,12 @@ class PredictorOutputs(ctypes.Structure):
 class CompensatorOutputs(ctypes.Structure):
     """hsep_compensator_outputs."""
 
-    _fields_ = (("predicted", PredictorOutputs), ("x_dm", ctypes.c_double), ("state", ctypes.c_int))
+    _fields_ = (
+        ("predicted", PredictorOutputs),
+        ("x_dm", ctypes.c_double),
+        ("state", ctypes.c_int),
+        ("no_measurement", ctypes.c_int),
+    )
 
 
 @cache

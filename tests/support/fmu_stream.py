@@ -34,7 +34,7 @@ class FmuStream:
         return shown
 
     def set(self, name: str, value: Value) -> None:
-        self._fmu.set(name, value)
+        self._refusing(self._fmu.set, name, value)
 
     def set_slope(self, name: str, slope: float) -> None:
         reference = self._fmu.variables[name].valueReference

@@ -33,6 +33,8 @@ CANNOT = {
     (PYTHON, "slopes"): "pythonfmu has no fmi2SetRealInputDerivatives",
     (LIBRARY, "stop time"): "a stop time is the adapter's",
     (CORE, "stop time"): "a stop time is the adapter's",
+    (LIBRARY, "setters"): "its settings are changed together, by change(), which checks them",
+    (CORE, "setters"): "what is set in a run is checked by the adapter",
     (LIBRARY, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
     (CORE, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
     (LIBRARY, "outputs before"): "before its object is made there is nothing to ask",
@@ -57,7 +59,7 @@ OUTPUTS = {
     ),
     COMPENSATOR: (
         *("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state"),
-        *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
+        *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected", "no_measurement"),
     ),
     TRAJECTORY: ("r",),
     DRIVE: ("x", "v", "x_meas"),

@@ -1,6 +1,8 @@
 #include "hsep_calls.h"
 
+#include "hsep_check.h"
 #include "hsep_saved.h"
+#include "hsep_table.h"
 
 #include <math.h>
 
@@ -99,6 +101,19 @@ HSEP_API hsep_instance *hsep_call_access(
     }
     if (status != HSEP_OK) {
         (void)hsep_refuse(instance, "%s", message);
+        return NULL;
+    }
+    return instance;
+}
+
+HSEP_API hsep_instance *
+hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value)
+{
+    const hsep_context *context = &instance->context;
+    char message[HSEP_MESSAGE_SIZE] = "";
+    if (instance->experiment.phase == HSEP_STEPPING && hsep_table_row(context, reference)->causality == HSEP_PARAMETER &&
+        !hsep_check_parameter(context, reference, value, message)) {
+        (void)hsep_refuse(instance, "%s: %s", call->name, message);
         return NULL;
     }
     return instance;

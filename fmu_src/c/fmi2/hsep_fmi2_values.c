@@ -19,6 +19,10 @@
         hsep_instance *self = hsep_call_access(c, HSEP_FMI2(SET_##NAME), 1, type, vr, nvr, value, nvr); \
         for (size_t i = 0; self != NULL && i < nvr; i++) { \
             const fmi2##name number = value[i]; \
+            self = hsep_call_tune(self, HSEP_FMI2(SET_##NAME), vr[i], set); \
+        } \
+        for (size_t i = 0; self != NULL && i < nvr; i++) { \
+            const fmi2##name number = value[i]; \
             self->values[vr[i]] = set; \
         } \
         return (self == NULL) ? fmi2Error : fmi2OK; \

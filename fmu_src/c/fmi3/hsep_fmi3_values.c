@@ -37,6 +37,10 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
             hsep_call_access(instance, HSEP_FMI3(SET_##NAME), 1, type, references, n, values, n_values); \
         for (size_t i = 0; self != NULL && i < n; i++) { \
             const fmi3##name number = values[i]; \
+            self = hsep_call_tune(self, HSEP_FMI3(SET_##NAME), references[i], set); \
+        } \
+        for (size_t i = 0; self != NULL && i < n; i++) { \
+            const fmi3##name number = values[i]; \
             self->values[references[i]] = set; \
         } \
         return (self == NULL) ? fmi3Error : fmi3OK; \

@@ -73,11 +73,10 @@ static int check_allows(const hsep_variable *v, double value)
            (value >= v->minimum && value <= v->maximum && (value == 0.0 || fabs(value) >= v->nonzero));
 }
 
-HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, const double values[], char message[])
+HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double value, char message[])
 {
     char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
     const hsep_variable *v = hsep_table_row(context, i);
-    const double value = values[i];
     const int whole = v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION;
     if (isfinite(value) && !(whole && value != floor(value)) && check_allows(v, value)) {
         return 1;
@@ -100,7 +99,7 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
     int problems = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
         const int is_parameter = hsep_table_row(context, i)->causality == HSEP_PARAMETER;
-        problems += is_parameter && !hsep_check_parameter(context, i, values, message);
+        problems += is_parameter && !hsep_check_parameter(context, i, values[i], message);
     }
     return problems;
 }

@@ -25,7 +25,7 @@ HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...);
 HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
 
 /* Check a parameter alone, by its place in the table; return whether it is in its range, else with a message. */
-HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, const double values[], char message[]);
+HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double value, char message[]);
 
 /* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);

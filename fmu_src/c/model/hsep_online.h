@@ -35,10 +35,7 @@ HSEP_API int hsep_online_check(const double values[], char message[]);
 /* Derive the parameters of this model, after all were checked and the common ones read; its own are read. */
 HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_parameters *common);
 
-/* Check the tunable parameters; return how many are out of their range, each added to message. */
-HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[]);
-
-/* Take them over from the next window on. */
+/* Take the tunable parameters over from the next window on. */
 HSEP_API void hsep_online_tune(hsep_online *self, const double values[]);
 
 /* Begin, after learned weights were loaded. */

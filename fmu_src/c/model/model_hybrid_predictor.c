@@ -19,13 +19,7 @@ HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_p
     return hsep_predictor_derive(common);
 }
 
-HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[])
-{
-    (void)context, (void)values, (void)message; /* it has none */
-    return 0;
-}
-
-HSEP_API void hsep_online_tune(hsep_online *self, const double values[]) { (void)self, (void)values; }
+HSEP_API void hsep_online_tune(hsep_online *self, const double values[]) { (void)self, (void)values; } /* it has none */
 
 HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }
 

@@ -103,8 +103,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     int window = 0;
     hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK || /* of an earlier step */
-        hsep_online_check_tuned(context, values, message) > 0) {
+    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
     const hsep_status status =

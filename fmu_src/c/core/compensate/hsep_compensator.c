@@ -227,16 +227,23 @@ static void compensator_plan_trusted(hsep_compensator *self)
     self->solving = 1;
 }
 
-HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max)
+HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max)
 {
+    if (!(change_max > 0.0 && isfinite(change_max)) || (hsep_word)compensate > HSEP_SEP_HYBRID) {
+        return 0;
+    }
     self->compensate_next = (hsep_word)compensate;
     self->change_max_next = change_max;
+    return 1;
 }
+
+/* Whether no measurement came for so long that the change of the command fades. */
+static int compensator_lost(const hsep_compensator *self) { return self->n_lost > 0 && self->missing == self->n_lost; }
 
 HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 {
     hsep_planner *planner = hsep_compensator_planner(self);
-    self->compensate = self->compensate_next;
+    self->compensate = compensator_lost(self) ? HSEP_SEP_OFF : self->compensate_next;
     if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
         hsep_planner_limit_change(planner, self->change_max_next);
     }
@@ -264,6 +271,7 @@ static void compensator_next_window(hsep_compensator *self)
 
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
+    self->missing = !isnan(x_meas) ? 0 : self->missing < self->n_lost ? self->missing + 1 : self->n_lost;
     if (hsep_predictor_take_in(hsep_compensator_predictor(self), x_d_ahead, x_meas)) {
         compensator_next_window(self);
         return 1;
@@ -286,4 +294,5 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
     }
     outputs->x_dm = hsep_at_const(self, self->x_dm)[i];
     outputs->state = (hsep_sep_state)(follows ? self->before : self->state);
+    outputs->no_measurement = compensator_lost(self);
 }

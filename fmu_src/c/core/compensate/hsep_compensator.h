@@ -35,6 +35,7 @@ typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
     hsep_sep_state compensate;
+    hsep_word n_lost; /* samples without a measurement after which the change fades; 0: never */
 } hsep_compensator_parameters;
 
 struct hsep_compensator {
@@ -44,6 +45,8 @@ struct hsep_compensator {
     hsep_word state;           /* hsep_sep_state of the window, */
     hsep_word before;          /* and of the window before, whose plan the first samples follow with trust */
     hsep_word solving;         /* whether its plan is being solved */
+    hsep_word n_lost;          /* as the parameter */
+    hsep_word missing;         /* measurements that were missing one after another, n_lost at most */
     /* Offsets in words from the beginning of the struct */
     hsep_word x_dm;      /* (Np,) m, the window: modified commands */
     hsep_word trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
@@ -55,7 +58,7 @@ struct hsep_compensator {
     hsep_word trusted; /* the planner on the residual model with trust; 0: the paper's */
 };
 
-HSEP_ASSERT_WORDS(hsep_compensator, 15);
+HSEP_ASSERT_WORDS(hsep_compensator, 17);
 
 HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */

@@ -29,6 +29,7 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     const hsep_real preview = (hsep_real)predictor->preview;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     hsep_real end = HSEP_WORDS(hsep_compensator);
+    self->n_lost = parameters->n_lost;
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
     self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
     self->trial_e = hsep_take(&end, preview + (hsep_real)predictor->settings.p);
@@ -86,6 +87,7 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
     return memcmp(&got, block, sizeof got) == 0 && got.compensate <= HSEP_SEP_HYBRID &&
            got.compensate_next <= HSEP_SEP_HYBRID && got.change_max_next > 0.0 && isfinite(got.change_max_next) &&
            got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.solving <= 1 &&
+           got.missing <= got.n_lost &&
            (got.solving || online.n_published == predictor->settings.Np) &&
            (online.divergence ||
             hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&

@@ -101,10 +101,10 @@ static hsep_real parameters_t_init(const hsep_parameters *parameters)
     return parameters->predictor.t_init < 0.0 ? automatic : parameters->predictor.t_init;
 }
 
-/* How many samples have t < t_init; whole, >= 0. */
-static hsep_real parameters_samples(hsep_real t_init, hsep_real T_s)
+/* How many samples, from the first one at 0, are before t; whole, >= 0. */
+static hsep_real parameters_samples(hsep_real t, hsep_real T_s)
 {
-    return hsep_fmax(0.0, hsep_ceil(t_init / T_s - parameters_warm_up_tolerance));
+    return hsep_fmax(0.0, hsep_ceil(t / T_s - parameters_warm_up_tolerance));
 }
 
 HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters)
@@ -143,6 +143,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
         .no_reversal = settings->no_reversal != 0,
         .pinned = parameters->trust.trust ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER};
     derived.compensate = (hsep_sep_state)settings->compensate;
+    derived.n_lost = (hsep_word)parameters_samples(settings->measurement_timeout, T_s);
     return derived;
 }
 

@@ -34,7 +34,8 @@
     RANGE(hsep_real, j_max, 5000.0, 1e-06, 1000000000000.0, 0.0, 1e-06, 0) \
     RANGE(hsep_real, change_max, 0.001, 1e-12, 10.0, 0.0, 1e-12, 0) \
     RANGE(hsep_word, no_reversal, 1.0, 0.0, 1.0, 0.0, 0.0, 0) \
-    RANGE(hsep_word, compensate, 2.0, 0.0, 2.0, 0.0, 0.0, 0)
+    RANGE(hsep_word, compensate, 2.0, 0.0, 2.0, 0.0, 0.0, 0) \
+    RANGE(hsep_real, measurement_timeout, 1.0, 0.0, 10000.0, 1e-05, 0.0, 0)
 
 #define HSEP_MODE_RANGES(RANGE) \
     RANGE(hsep_real, f_n, 0.0, 0.001, 100000.0, 0.0, 0.001, 1) \

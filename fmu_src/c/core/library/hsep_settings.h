@@ -56,7 +56,9 @@
     /* whether the modified command never turns while the commanded position moves */ \
     SETTING(hsep_word, no_reversal) \
     /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \
-    SETTING(hsep_word, compensate)
+    SETTING(hsep_word, compensate) \
+    /* time without a measurement after which the command's change fades; 0: never, s */ \
+    SETTING(hsep_real, measurement_timeout)
 
 /* clang-format on */
 
