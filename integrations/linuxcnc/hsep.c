@@ -10,11 +10,14 @@
  * (cmd, fb) is processed: cmd is the command that the drive is to have in `look-ahead` periods, fb the position
  * measured at the begin of this period. So a log of out and fb, sampled in one thread, is what hybridsep fit expects.
  *
- * Real time: axis_step allocates nothing, locks nothing and opens no file; it costs as much as hsep_compensator_sample
- * (hsep.h). A begin (active rises, or the command jumps) costs some 100 us more: the state is filled anew.
+ * Never a step: out is the command of look-ahead periods ago plus a change, in every branch but inactive, where it is
+ * fb. The line of commands goes on in all of them. The change is the model's, which keeps the drive's limits, or, where
+ * there is no model, what is left of it fades within them. A run of the model begins at rest alone: when the command
+ * has stood for look-ahead periods, and no change is left. What ends one in motion (reset, another period) ends its
+ * plans, and the model follows the remainder of the last one until then.
  *
- * Never larger than the joint's limits: the plan's limits come from the axis' machine file, a plan that cannot keep
- * them is not used, and where the model fails (fault) the change of the command fades within HSEP_FADE periods.
+ * Real time: axis_step allocates nothing, locks nothing and opens no file; it costs as much as hsep_compensator_sample
+ * (hsep.h). A begin costs some 100 us more: the state is filled anew.
  */
 #pragma GCC optimize("O3") /* LinuxCNC compiles for size */
 
@@ -42,15 +45,27 @@ MODULE_LICENSE("Dual BSD/GPL");
 
 #define HSEP_PATH_SIZE 4096 /* characters */
 #define HSEP_AXES 9         /* as many joints as LinuxCNC has */
-#define HSEP_FADE 500       /* periods within which the change of a command fades after a fault */
-#define HSEP_JUMP 1.5       /* a command that moves by more than so many times the largest step is another position */
+#define HSEP_TURN 6.283185307179586
+#define HSEP_FAST 1.000001  /* of the largest velocity: a command above it is faster, for more than its rounding */
+#define HSEP_ORIGIN 1.5     /* of the largest step: cmd and fb that both step by more are at another origin */
+#define HSEP_ALIKE 0.25     /* of such a step: what fb may differ by from cmd, and what out may move by itself */
+#define HSEP_FADE 0.2       /* 1/periods, rate at which a change without a model fades, if the limits allow it */
+#define HSEP_GONE 1e-3      /* of the largest acceleration and jerk: a change that may end by a step */
 #define HSEP_OTHER_T_S 0.01 /* deviation of the period, relative to the sampling interval, that is another one */
 
 static char *axes[HSEP_AXES];
 RTAPI_MP_ARRAY_STRING(axes, HSEP_AXES, "folders of the axes, written by hybridsep hal");
 
 /* Values of the pin state. */
-enum { AXIS_WRONG_PERIOD = -2, AXIS_FAULT = -1, AXIS_INACTIVE = 0, AXIS_DELAYS = 1, AXIS_PHYSICS = 2, AXIS_HYBRID = 3 };
+enum {
+    AXIS_NO_MEASUREMENT = -3,
+    AXIS_WRONG_PERIOD = -2,
+    AXIS_FAULT = -1,
+    AXIS_INACTIVE = 0,
+    AXIS_DELAYS = 1,
+    AXIS_PHYSICS = 2,
+    AXIS_HYBRID = 3
+};
 
 /* Pins and parameters, in HAL's memory. Positions are in machine units. */
 typedef struct {
@@ -58,23 +73,34 @@ typedef struct {
     hal_bit_t *active, *enable, *reset;                                  /* in */
     hal_float_t *out, *delayed, *fb_joint, *predicted, *error, *std_dev; /* out */
     hal_s32_t *state;                                                    /* out */
-    hal_float_t scale;                                                   /* parameter: machine units in a metre */
+    hal_float_t scale;                                                   /* parameter: machine units in a metre, or a radian */
     hal_u32_t model;                                                     /* parameter: 1 physics, 2 hybrid */
     hal_u32_t look_ahead;                                                /* parameter: periods */
     hal_u32_t rejected;                                                  /* parameter: measurements not believed */
 } axis_pins;
 
+/* Positions are in m, of a rotary axis in rad, and relative to an origin; the newest first where there are several. */
 typedef struct {
     axis_pins *pins;
     hsep_instance instance; /* the model and its memory */
     void *weights;          /* what weights.bin holds; NULL: none */
-    double *ring;           /* (n_ring,) m, the last commands, for the time after a fault */
+    double *ring;           /* (n_ring,) the last commands */
     size_t n_ring, at;
-    double last;     /* m, last command */
-    double change;   /* m, last change of the command that the model made */
-    unsigned fading; /* periods left of the fade after a fault */
-    uint64_t k;      /* sample of this run */
-    int runs, faulty;
+    double limit[3];                             /* m, of the differences of the change of orders 1 to 3 */
+    double scale;                                /* machine units in a metre */
+    double origin;                               /* of a rotary axis whole turns, and what cmd and fb jumped by */
+    double command, step; /* the last one, and what it moved by */
+    double feedback[2], measured; /* the last ones: NaN, and held, where it is missing */
+    double out[4], change, velocity, acceleration; /* of the change of the command, out - delayed, a period */
+    size_t still;                                /* periods since the command has moved, n_ring at most */
+    size_t fast;    /* periods until the model's preview holds no command that is faster than the limits */
+    size_t missing; /* measurements, one after another */
+    uint64_t k;     /* sample of this run */
+    int begun;      /* whether there was a command */
+    int runs;       /* whether the model does */
+    int ending;     /* whether it makes no more plans, to begin anew at rest */
+    int faulty;     /* whether it has refused a sample: it does not begin until reset or inactive */
+    int unknown;    /* whether it was said that the command is no number */
     int was_reset;
 } axis_data;
 
@@ -87,35 +113,14 @@ static char axis_message[HSEP_MESSAGE_SIZE];
 
 static double *axis_value(axis_data *self, size_t place) { return &self->instance.values[place]; }
 
-/* The command of the drive in this sample, m: modified, and as it came. */
-static double axis_out(axis_data *self)
+/* The model's change of the command in this sample. */
+static double axis_planned(axis_data *self)
 {
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    return *axis_value(self, HSEP_VR_x_dm);
-#else
-    return *axis_value(self, HSEP_VR_x_d);
-#endif
-}
-
-/* Largest step of a command, m. */
-static double axis_largest_step(axis_data *self)
-{
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    return *axis_value(self, HSEP_VR_v_max) * *axis_value(self, HSEP_VR_T_s);
+    return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d);
 #else
     (void)self;
-    return HUGE_VAL;
-#endif
-}
-
-/* Say which model may plan the next windows. */
-static void axis_choose(axis_data *self)
-{
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    const hsep_sep_state model = self->pins->model == 1 ? HSEP_SEP_PHYSICS : HSEP_SEP_HYBRID;
-    *axis_value(self, HSEP_VR_compensate) = *self->pins->enable ? (double)model : (double)HSEP_SEP_OFF;
-#else
-    (void)self;
+    return 0.0;
 #endif
 }
 
@@ -130,120 +135,257 @@ static hal_u32_t axis_first_model(axis_data *self)
 #endif
 }
 
-/* Begin another run at rest at a command, m; what the weights hold is kept. */
-static int axis_begin(axis_data *self, double command)
+/* Value of the pin state while the model runs and has measurements. */
+static int axis_state(axis_data *self)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    return AXIS_DELAYS + (int)*axis_value(self, HSEP_VR_sep_state);
+#else
+    return *axis_value(self, HSEP_VR_hybrid_active) > 0.0 ? AXIS_HYBRID : AXIS_PHYSICS;
+#endif
+}
+
+/* Whether no measurement came for measurement_timeout. */
+static int axis_lost(axis_data *self)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    const double timeout = *axis_value(self, HSEP_VR_measurement_timeout), T_s = *axis_value(self, HSEP_VR_T_s);
+    return timeout > 0.0 && (double)self->missing * T_s >= timeout;
+#else
+    (void)self;
+    return 0;
+#endif
+}
+
+/* Limits of the change. A predictor makes none, and knows no limits of the drive: those of a slow one. */
+static void axis_limit(axis_data *self)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    const double v_max = *axis_value(self, HSEP_VR_v_max), a_max = *axis_value(self, HSEP_VR_a_max);
+    const double j_max = *axis_value(self, HSEP_VR_j_max);
+#else
+    const double v_max = 0.1, a_max = 1.0, j_max = 1e3;
+#endif
+    const double T_s = *axis_value(self, HSEP_VR_T_s);
+    self->limit[0] = v_max * T_s;
+    self->limit[1] = a_max * T_s * T_s;
+    self->limit[2] = j_max * T_s * T_s * T_s;
+}
+
+static double axis_within(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
+
+/* The model refuses a sample, or to begin: it is not used until reset, or until the axis becomes active again. */
+static void axis_fail(axis_data *self)
+{
+    rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", self->instance.name, axis_message);
+    self->runs = 0;
+    self->faulty = 1;
+}
+
+/* Say which model may plan the next windows. */
+static void axis_choose(axis_data *self)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    const hsep_sep_state model = self->pins->model == 1 ? HSEP_SEP_PHYSICS : HSEP_SEP_HYBRID;
+    const int plans = *self->pins->enable && !self->ending && self->fast == 0 && !axis_lost(self);
+    *axis_value(self, HSEP_VR_compensate) = plans ? (double)model : (double)HSEP_SEP_OFF;
+#else
+    (void)self;
+#endif
+}
+
+/* Move the origin: what is remembered stays where it is. */
+static void axis_move_origin(axis_data *self, double by)
+{
+    double *const remembered[] = {&self->command, &self->feedback[0], &self->feedback[1], &self->measured,
+                                  &self->out[0],  &self->out[1],      &self->out[2],      &self->out[3]};
+    for (size_t i = 0; i < sizeof remembered / sizeof remembered[0]; i++) {
+        *remembered[i] -= by;
+    }
+    self->origin += by;
+}
+
+/* Begin a run at rest at the last command; what the weights hold is kept. */
+static void axis_begin(axis_data *self)
 {
     hsep_instance *instance = &self->instance;
-    *axis_value(self, HSEP_VR_x_d_ahead) = *axis_value(self, HSEP_VR_x_meas) = command;
+    const double command = self->command + self->origin;
+    axis_move_origin(
+        self, (instance->context.angular ? HSEP_TURN * rint(command / HSEP_TURN) : 0.0) - self->origin);
+    for (size_t i = 0; i < self->n_ring; i++) {
+        self->ring[i] = self->command;
+    }
+    self->k = 0;
+    self->ending = 0;
+    *axis_value(self, HSEP_VR_x_d_ahead) = *axis_value(self, HSEP_VR_x_meas) = self->command;
     axis_choose(self);
     memset(instance->state, 0, instance->state_size);
     axis_message[0] = '\0';
-    if (hsep_model_initialise(
-            &instance->context, instance->state, instance->state_size, instance->values, 0.0, axis_message) ==
-        HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", instance->name, axis_message);
-        return 0;
+    self->runs = hsep_model_initialise(
+                     &instance->context, instance->state, instance->state_size, instance->values, 0.0, axis_message) !=
+                 HSEP_REFUSED;
+    if (!self->runs) {
+        axis_fail(self);
     }
-    for (size_t i = 0; i < self->n_ring; i++) {
-        self->ring[i] = command;
-    }
-    self->k = 0;
-    self->change = 0.0;
-    self->fading = 0;
-    self->faulty = 0;
-    return 1;
 }
 
-/* Process the sample (command, feedback), m; a model that fails is not used again in this run. */
-static void axis_process(axis_data *self, double command, double feedback)
+/* Process the sample of this period. The paper's model misses no measurement: it is given what it predicts. */
+static void axis_process(axis_data *self)
 {
-    const double T_s = *axis_value(self, HSEP_VR_T_s);
-    *axis_value(self, HSEP_VR_x_d_ahead) = command;
-    *axis_value(self, HSEP_VR_x_meas) = feedback;
+    const double T_s = *axis_value(self, HSEP_VR_T_s), t = (double)self->k++ * T_s;
+    const int predicted = isnan(self->feedback[0]) && !(*axis_value(self, HSEP_VR_trust) > 0.0);
+    *axis_value(self, HSEP_VR_x_d_ahead) = self->command;
+    *axis_value(self, HSEP_VR_x_meas) = predicted ? *axis_value(self, HSEP_VR_x_h) : self->feedback[0];
     axis_choose(self);
     axis_message[0] = '\0';
-    const double t = (double)self->k * T_s;
     if (hsep_model_step(&self->instance.context, self->instance.state, self->instance.values, t, T_s, axis_message) ==
         HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", self->instance.name, axis_message);
-        self->faulty = 1;
-        self->fading = HSEP_FADE;
+        axis_fail(self);
     }
-    self->k++;
+}
+
+/* Change the command by so much in this period. */
+static void axis_change(axis_data *self, double change)
+{
+    const double velocity = change - self->change;
+    self->acceleration = velocity - self->velocity;
+    self->velocity = velocity;
+    self->change = change;
+}
+
+/* A change without a model, on its way to 0 by three first-order lags one within the other, which keep the limits. */
+static void axis_fade(axis_data *self)
+{
+    const double *limit = self->limit, size = fabs(self->change), gone = HSEP_GONE * fmin(limit[1], limit[2]);
+    const double rate =
+        fmin(fmin(HSEP_FADE, limit[0] / size), fmin(sqrt(limit[1] / size), cbrt(limit[2] / size))); /* 1/0: inf */
+    const double velocity = axis_within(-rate / 3.0 * self->change, limit[0]);
+    const double acceleration = axis_within(rate * (velocity - self->velocity), limit[1]);
+    const double jerk = axis_within(3.0 * rate * (acceleration - self->acceleration), limit[2]);
+    axis_change(self, self->change + (self->velocity + (self->acceleration + jerk)));
+    if (size < gone && fabs(self->change) < gone) {
+        self->change = self->velocity = self->acceleration = 0.0;
+    }
+}
+
+/* Take in the pins cmd and fb; return the command of look-ahead periods ago. */
+static double axis_take_in(axis_data *self)
+{
+    const axis_pins *pins = self->pins;
+    double command = *pins->cmd / self->scale - self->origin, feedback = *pins->fb / self->scale - self->origin;
+    if (!isfinite(command)) {
+        if (!self->unknown) {
+            rtapi_print_msg(
+                RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: cmd must be finite: the last one is held\n", self->instance.name);
+        }
+        self->unknown = 1;
+        command = self->command;
+    }
+    const double step = command - self->command, jump = step - self->step;
+    /* Another origin: both step alike (fb maybe in the period before, as LinuxCNC answers to it), the drive does not. */
+    const double alike = HSEP_ALIKE * fabs(jump);
+    if (fabs(step) > HSEP_ORIGIN * self->limit[0] && fabs(feedback - self->feedback[1] - jump) <= alike &&
+        fabs(self->out[0] - self->out[3]) <= alike) {
+        self->origin += jump;
+        command -= jump;
+        feedback -= jump;
+        self->feedback[0] = feedback;
+    }
+    self->step = command - self->command;
+    self->command = command;
+    const int is_fast = fabs(self->step) > HSEP_FAST * self->limit[0];
+    self->fast = is_fast ? self->n_ring + 4 : self->fast - (self->fast > 0);
+    self->still = self->step != 0.0 ? 0 : self->still + (self->still < self->n_ring);
+    const int is_missing =
+        hsep_check_position(&self->instance.context, "fb", feedback, "", 0.0, axis_message) != HSEP_OK;
+    self->missing = is_missing ? self->missing + 1 : 0;
+    self->measured = is_missing ? self->measured : feedback;
+    self->feedback[1] = self->feedback[0];
+    self->feedback[0] = is_missing ? NAN : feedback;
+    const double delayed = self->ring[self->at];
+    self->ring[self->at] = command;
+    self->at = (self->at + 1) % self->n_ring;
+    return delayed;
 }
 
 /* Write the pins of this sample. */
-static void axis_write(axis_data *self, double command, double feedback)
+static void axis_write(axis_data *self, double delayed, int state)
 {
     axis_pins *pins = self->pins;
-    const double scale = pins->scale, delayed = self->ring[self->at];
-    double out = delayed;
-    if (self->faulty) {
-        /* A cosine from 1 to 0, whose velocity ends at 0 on both sides */
-        const double share = 0.5 - 0.5 * cos(3.14159265358979323846 * (double)self->fading / HSEP_FADE);
-        out = delayed + share * self->change;
-        self->fading -= self->fading > 0;
-        *pins->state = AXIS_FAULT;
-    } else {
-        out = axis_out(self);
-        self->change = out - delayed;
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-        *pins->state = AXIS_DELAYS + (hal_s32_t)*axis_value(self, HSEP_VR_sep_state);
-#else
-        *pins->state = *axis_value(self, HSEP_VR_hybrid_active) > 0.0 ? AXIS_HYBRID : AXIS_PHYSICS;
-#endif
-    }
-    *pins->out = scale * out;
-    *pins->delayed = scale * delayed;
-    *pins->predicted = scale * *axis_value(self, HSEP_VR_x_h);
-    *pins->error = scale * *axis_value(self, HSEP_VR_e_servo);
-    *pins->std_dev = scale * *axis_value(self, HSEP_VR_x_h_std);
+    const double scale = self->scale, origin = self->origin, out = delayed + self->change;
+    memmove(&self->out[1], &self->out[0], 3 * sizeof self->out[0]);
+    self->out[0] = out;
+    *pins->out = scale * (out + origin);
+    *pins->delayed = scale * (delayed + origin);
+    *pins->predicted = scale * ((self->runs ? *axis_value(self, HSEP_VR_x_h) : out) + origin);
+    *pins->error = self->runs ? scale * *axis_value(self, HSEP_VR_e_servo) : 0.0;
+    *pins->std_dev = self->runs ? scale * *axis_value(self, HSEP_VR_x_h_std) : 0.0;
     /* The joint judges feedback against the command now: shifted by the look-ahead, what it sees is delayed - fb. */
-    *pins->fb_joint = scale * (feedback + command - delayed);
+    *pins->fb_joint = scale * (self->measured + origin + (state == AXIS_INACTIVE ? 0.0 : self->command - delayed));
+    *pins->state = state;
     pins->rejected = (hal_u32_t)*axis_value(self, HSEP_VR_n_rejected);
 }
 
-/* What stands on the pins while nothing is predicted: the command as it came, or, while the axis is switched off, the
- * position where it is: LinuxCNC's command goes there, too, one period later. */
-static void axis_pass(axis_data *self, int state)
+/* Take the first command: the axis rests there. Return whether there is one. */
+static int axis_meet(axis_data *self)
 {
-    axis_pins *pins = self->pins;
-    *pins->out = *pins->delayed = *pins->predicted = state == AXIS_INACTIVE ? *pins->fb : *pins->cmd;
-    *pins->fb_joint = *pins->fb;
-    *pins->error = *pins->std_dev = 0.0;
-    *pins->state = state;
-    self->runs = 0;
+    const double command = *self->pins->cmd / self->scale, feedback = *self->pins->fb / self->scale;
+    self->begun = isfinite(command);
+    self->command = self->begun ? command : 0.0;
+    self->measured = isfinite(feedback) ? feedback : self->command;
+    self->feedback[0] = self->feedback[1] = self->measured;
+    for (size_t i = 0; i < self->n_ring; i++) {
+        self->ring[i] = self->command;
+    }
+    self->out[0] = self->out[1] = self->out[2] = self->out[3] = self->command;
+    self->still = self->n_ring;
+    return self->begun;
 }
 
 /* The function of one axis, in a thread. */
 static void axis_step(void *data, long period)
 {
     axis_data *self = data;
-    axis_pins *pins = self->pins;
-    const double command = *pins->cmd / pins->scale, feedback = *pins->fb / pins->scale;
+    const axis_pins *pins = self->pins;
     const double T_s = *axis_value(self, HSEP_VR_T_s);
-    if (!(fabs(1e-9 * (double)period - T_s) <= HSEP_OTHER_T_S * T_s)) {
-        axis_pass(self, AXIS_WRONG_PERIOD);
-        return;
-    }
-    if (!*pins->active || !isfinite(command)) {
-        axis_pass(self, AXIS_INACTIVE);
-        return;
-    }
-    const int reset = *pins->reset && !self->was_reset;
+    const int is_wrong = !(fabs(1e-9 * (double)period - T_s) <= HSEP_OTHER_T_S * T_s);
+    const int resets = *pins->reset && !self->was_reset;
     self->was_reset = *pins->reset;
-    if (!self->runs || reset || fabs(command - self->last) > HSEP_JUMP * axis_largest_step(self)) {
-        self->runs = axis_begin(self, command);
-        if (!self->runs) {
-            axis_pass(self, AXIS_FAULT);
-            return;
-        }
+    if (!(*pins->active && self->begun) && isfinite(pins->scale) && pins->scale != 0.0) {
+        self->scale = pins->scale; /* in motion, another one would be a step */
     }
-    axis_write(self, command, feedback);
-    self->ring[self->at] = self->last = command;
-    self->at = (self->at + 1) % self->n_ring;
-    if (!self->faulty) {
-        axis_process(self, command, feedback);
+    if (!self->begun && !axis_meet(self)) {
+        axis_change(self, self->measured - self->command);
+        axis_write(self, self->command, AXIS_INACTIVE);
+        return;
+    }
+    if (!*pins->active) {
+        self->runs = self->ending = self->faulty = self->unknown = 0;
+        const double delayed = axis_take_in(self);
+        axis_change(self, self->measured - delayed);
+        self->velocity = axis_within(self->velocity, self->limit[0]);
+        self->acceleration = 0.0;
+        axis_write(self, delayed, AXIS_INACTIVE);
+        return;
+    }
+    if (resets) {
+        self->faulty = self->unknown = 0;
+    }
+    self->ending |= resets || is_wrong;
+    if ((!self->runs || self->ending) && !self->faulty && !is_wrong && self->still >= self->n_ring &&
+        self->change == 0.0) {
+        axis_begin(self);
+    }
+    const double delayed = axis_take_in(self);
+    if (self->runs) {
+        axis_change(self, axis_planned(self));
+    } else {
+        axis_fade(self);
+    }
+    const int works = self->runs ? axis_lost(self) ? AXIS_NO_MEASUREMENT : axis_state(self) : AXIS_DELAYS;
+    axis_write(self, delayed, is_wrong ? AXIS_WRONG_PERIOD : self->faulty ? AXIS_FAULT : works);
+    if (self->runs) {
+        axis_process(self);
     }
 }
 
@@ -341,6 +483,7 @@ static int axis_open(axis_data *self, const char *folder)
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: no memory for its commands\n", name);
         return 0;
     }
+    axis_limit(self);
     return 1;
 }
 
@@ -373,7 +516,7 @@ static int axis_export(axis_data *self)
     bad |= rtapi_snprintf(function, sizeof function, HSEP_COMPONENT ".%s", name) >= (int)sizeof function;
     bad |= hal_export_funct(function, axis_step, self, 1, 0, id);
     if (bad == 0) {
-        pins->scale = 1000.0; /* mm */
+        pins->scale = self->instance.context.angular ? 360.0 / HSEP_TURN : 1000.0; /* degrees, mm */
         pins->model = axis_first_model(self);
         pins->look_ahead = (hal_u32_t)self->n_ring;
         pins->rejected = 0;

@@ -202,6 +202,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "change_max": 1e-3,
         "no_reversal": True,
         "compensate": 2,
+        "measurement_timeout": 1.0,
     }
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
     entries += "no_reversal = false\n"

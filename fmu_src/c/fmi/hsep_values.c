@@ -73,7 +73,7 @@ HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_acc
     if (instance->state != NULL) {
         return HSEP_OK;
     }
-    if (hsep_model_check_start(instance->values, reason) == HSEP_OK) {
+    if (hsep_model_check_start(&instance->context, instance->values, reason) == HSEP_OK) {
         hsep_model_start_values(&instance->context, instance->values);
         return HSEP_OK;
     }

@@ -7,7 +7,7 @@
 #include <stdarg.h>
 #include <string.h>
 
-static const double check_position_max = 1e3; /* m */
+static const double check_position_max[] = {1e3, 1e6}; /* m; rad, as a rotary axis may turn on and on */
 
 HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
 {
@@ -132,16 +132,19 @@ HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char mess
         names[divergence], HSEP_PREDICTION_MAX);
 }
 
-HSEP_API hsep_status hsep_check_position(const char *name, double value, const char *where, double at, char message[])
+HSEP_API hsep_status hsep_check_position(
+    const hsep_context *context, const char *name, double value, const char *where, double at, char message[])
 {
+    const double most = check_position_max[context->angular != 0];
     char number[HSEP_NUMBER_SIZE], end[HSEP_NUMBER_SIZE];
-    if (fabs(value) <= check_position_max) {
+    if (fabs(value) <= most) {
         return HSEP_OK;
     }
     hsep_text(end, sizeof end, where, at);
     if (isfinite(value)) {
         hsep_message_add(
-            message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g%s", name, check_position_max, value, end);
+            message, "%s must be within " HSEP_PLUS_MINUS "%g %s, got %g%s", name, most, context->angular ? "rad" : "m",
+            value, end);
     } else {
         hsep_message_add(message, "%s must be finite, got %s%s", name, hsep_number(number, value, HSEP_REAL), end);
     }

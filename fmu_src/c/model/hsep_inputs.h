@@ -1,7 +1,7 @@
 /* Sampling of a look-ahead's inputs: latched at the instants within a communication step, executed in the step that
  * reaches the next instant. Plain data; reentrant.
  *
- *     if (hsep_inputs_count(&inputs, x_d_ahead, x_meas, may_miss, t, h, &step, message) != HSEP_REFUSED)
+ *     if (hsep_inputs_count(context, &inputs, x_d_ahead, x_meas, may_miss, t, h, &step, message) != HSEP_REFUSED)
  *         while (hsep_inputs_next(&inputs, &step)) { execute the sample inputs.x_d_ahead, inputs.x_meas }
  */
 #ifndef HSEP_INPUTS_H
@@ -41,7 +41,7 @@ HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double 
  * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
  * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 HSEP_API hsep_status hsep_inputs_count(
-    const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
+    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
     hsep_inputs_step *step, char message[]);
 
 /* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is

@@ -91,7 +91,7 @@ HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 
 /* Check the start value of the command: a position, from which outputs and locals follow before initialization. */
-HSEP_API hsep_status hsep_model_check_start(const double values[], char message[]);
+HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[]);
 
 /* Write outputs and locals as they follow from inputs and parameters before hsep_model_initialise.
  * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. What a model that

@@ -51,7 +51,7 @@ HSEP_API hsep_status hsep_model_initialise(
     drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_DRIVE_KIND, needed, size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK || hsep_model_check_start(values, message) != HSEP_OK) {
+        hsep_check_start_time(t_start, message) != HSEP_OK || hsep_model_check_start(context, values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     self->end = t_start;
@@ -67,7 +67,7 @@ static hsep_status drive_check_step(const drive_state *self, double x_d, double 
 {
     char number[HSEP_NUMBER_SIZE];
     const double rate = HSEP_DRIVE(rate)(&self->drive);
-    if (hsep_check_position("x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
+    if (hsep_check_position(context, "x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
         hsep_check_step_size(h, message) != HSEP_OK ||
         hsep_check_point(self->end, t, drive_time_tolerance * h, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -108,10 +108,10 @@ static double drive_first_measurement(double noise_std, double seed, double x)
     return isfinite(measured) ? measured : x;
 }
 
-HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
     message[0] = '\0';
-    return hsep_check_position("the start value of x_d", values[HSEP_VR_x_d], "", 0.0, message);
+    return hsep_check_position(context, "the start value of x_d", values[HSEP_VR_x_d], "", 0.0, message);
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])

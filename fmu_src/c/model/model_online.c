@@ -68,7 +68,7 @@ HSEP_API hsep_status hsep_model_initialise(
     if (online_checked(context, values, &parameters, message) != HSEP_OK ||
         hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
-        hsep_model_check_start(values, message) != HSEP_OK ||
+        hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -85,10 +85,10 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
     message[0] = '\0';
-    return hsep_check_position("the start value of x_d_ahead", values[HSEP_VR_x_d_ahead], "", 0.0, message);
+    return hsep_check_position(context, "the start value of x_d_ahead", values[HSEP_VR_x_d_ahead], "", 0.0, message);
 }
 
 HSEP_API hsep_status
@@ -107,7 +107,8 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     const hsep_status status =
-        hsep_inputs_count(&self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
+        hsep_inputs_count(
+            context, &self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }

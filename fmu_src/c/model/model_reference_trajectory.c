@@ -140,7 +140,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     return hsep_check_moved(&step, message);
 }
 
-HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
     (void)values; /* it has no input */
     message[0] = '\0';
