@@ -73,10 +73,10 @@ typedef struct {
     hal_bit_t *active, *enable, *reset;                                  /* in */
     hal_float_t *out, *delayed, *fb_joint, *predicted, *error, *std_dev; /* out */
     hal_s32_t *state;                                                    /* out */
-    hal_float_t scale;                                                   /* parameter: machine units in a metre, or a radian */
-    hal_u32_t model;                                                     /* parameter: 1 physics, 2 hybrid */
-    hal_u32_t look_ahead;                                                /* parameter: periods */
-    hal_u32_t rejected;                                                  /* parameter: measurements not believed */
+    hal_float_t scale;    /* parameter: machine units in a metre, or a radian */
+    hal_u32_t model;      /* parameter: 1 physics, 2 hybrid */
+    hal_u32_t look_ahead; /* parameter: periods */
+    hal_u32_t rejected;   /* parameter: measurements not believed */
 } axis_pins;
 
 /* Positions are in m, of a rotary axis in rad, and relative to an origin; the newest first where there are several. */
@@ -86,13 +86,13 @@ typedef struct {
     void *weights;          /* what weights.bin holds; NULL: none */
     double *ring;           /* (n_ring,) the last commands */
     size_t n_ring, at;
-    double limit[3];                             /* m, of the differences of the change of orders 1 to 3 */
-    double scale;                                /* machine units in a metre */
-    double origin;                               /* of a rotary axis whole turns, and what cmd and fb jumped by */
-    double command, step; /* the last one, and what it moved by */
-    double feedback[2], measured; /* the last ones: NaN, and held, where it is missing */
+    double limit[3];                               /* m, of the differences of the change of orders 1 to 3 */
+    double scale;                                  /* machine units in a metre */
+    double origin;                                 /* of a rotary axis whole turns, and what cmd and fb jumped by */
+    double command, step;                          /* the last one, and what it moved by */
+    double feedback[2], measured;                  /* the last ones: NaN, and held, where it is missing */
     double out[4], change, velocity, acceleration; /* of the change of the command, out - delayed, a period */
-    size_t still;                                /* periods since the command has moved, n_ring at most */
+    size_t still;                                  /* periods since the command has moved, n_ring at most */
     size_t fast;    /* periods until the model's preview holds no command that is faster than the limits */
     size_t missing; /* measurements, one after another */
     uint64_t k;     /* sample of this run */
@@ -210,8 +210,7 @@ static void axis_begin(axis_data *self)
 {
     hsep_instance *instance = &self->instance;
     const double command = self->command + self->origin;
-    axis_move_origin(
-        self, (instance->context.angular ? HSEP_TURN * rint(command / HSEP_TURN) : 0.0) - self->origin);
+    axis_move_origin(self, (instance->context.angular ? HSEP_TURN * rint(command / HSEP_TURN) : 0.0) - self->origin);
     for (size_t i = 0; i < self->n_ring; i++) {
         self->ring[i] = self->command;
     }
@@ -284,7 +283,7 @@ static double axis_take_in(axis_data *self)
     const double step = command - self->command, jump = step - self->step;
     /* Another origin: both step alike (fb maybe in the period before, as LinuxCNC answers to it), the drive does not. */
     const double alike = HSEP_ALIKE * fabs(jump);
-    if (fabs(step) > HSEP_ORIGIN * self->limit[0] && fabs(feedback - self->feedback[1] - jump) <= alike &&
+    if (fabs(jump) > HSEP_ORIGIN * self->limit[0] && fabs(feedback - self->feedback[1] - jump) <= alike &&
         fabs(self->out[0] - self->out[3]) <= alike) {
         self->origin += jump;
         command -= jump;

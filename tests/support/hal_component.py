@@ -79,7 +79,7 @@ class Component:
         self._axis = ctypes.create_string_buffer(bytes(axis))  # the component keeps the pointer
         assert self._loaded.stub_load(self._axis) == 0, self.message
         self.scale, self.look_ahead = float(self._loaded.stub_scale()), int(self._loaded.stub_look_ahead())
-        self._inputs, self._outputs = np.zeros(5), np.zeros(7)
+        self._inputs, self._outputs = np.zeros(5), np.zeros(7, dtype=np.float64)
 
     def set(self, *, scale: float | None = None, model: int = 2) -> None:
         """Set the parameters."""
@@ -99,7 +99,7 @@ class Component:
         self._inputs[:] = cmd, fb, active, enable, reset
         ns = round(1e9 * period * self.machine.T_s)
         self._loaded.stub_step(ns, self._inputs.ctypes.data, self._outputs.ctypes.data)
-        return self._outputs.copy()
+        return np.array(self._outputs)
 
     @property
     def messages(self) -> int:

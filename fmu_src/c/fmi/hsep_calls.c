@@ -106,12 +106,12 @@ HSEP_API hsep_instance *hsep_call_access(
     return instance;
 }
 
-HSEP_API hsep_instance *
-hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value)
+HSEP_API hsep_instance *hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value)
 {
     const hsep_context *context = &instance->context;
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance->experiment.phase == HSEP_STEPPING && hsep_table_row(context, reference)->causality == HSEP_PARAMETER &&
+    if (instance->experiment.phase == HSEP_STEPPING &&
+        hsep_table_row(context, reference)->causality == HSEP_PARAMETER &&
         !hsep_check_parameter(context, reference, value, message)) {
         (void)hsep_refuse(instance, "%s: %s", call->name, message);
         return NULL;

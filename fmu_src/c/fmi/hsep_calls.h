@@ -33,8 +33,8 @@ HSEP_API hsep_instance *hsep_call_access(
 
 /* The instance if a variable may have a value: a parameter is checked when it is set in a run, before with the others
  * when the initialization ends. Otherwise NULL. */
-HSEP_API hsep_instance *
-hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
+HSEP_API hsep_instance *hsep_call_tune(
+    hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
 
 /* Saved states: a handle is a pointer to one, or NULL. */
 HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void **state);

@@ -26,8 +26,8 @@ static double inputs_last(const hsep_clock_step *counted)
 }
 
 HSEP_API hsep_status hsep_inputs_count(
-    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
-    hsep_inputs_step *step, char message[])
+    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss,
+    double t, double h, hsep_inputs_step *step, char message[])
 {
     *step = (hsep_inputs_step){.x_d_ahead = x_d_ahead, .x_meas = x_meas, .pending = hsep_clock_latched(&self->clock)};
     if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
@@ -43,7 +43,8 @@ HSEP_API hsep_status hsep_inputs_count(
         const double ahead = inputs_at(x_d_ahead, after[i]), measured = inputs_at(x_meas, after[i]);
         const int missing = may_miss && isnan(measured);
         if (hsep_check_position(context, "x_d_ahead", ahead, " at sample %.0f", sample, message) != HSEP_OK ||
-            (!missing && hsep_check_position(context, "x_meas", measured, " at sample %.0f", sample, message) != HSEP_OK)) {
+            (!missing &&
+             hsep_check_position(context, "x_meas", measured, " at sample %.0f", sample, message) != HSEP_OK)) {
             return HSEP_REFUSED;
         }
     }

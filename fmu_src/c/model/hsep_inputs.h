@@ -41,8 +41,8 @@ HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double 
  * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
  * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 HSEP_API hsep_status hsep_inputs_count(
-    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
-    hsep_inputs_step *step, char message[]);
+    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss,
+    double t, double h, hsep_inputs_step *step, char message[]);
 
 /* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is
  * done. */

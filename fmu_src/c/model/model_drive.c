@@ -51,7 +51,8 @@ HSEP_API hsep_status hsep_model_initialise(
     drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_DRIVE_KIND, needed, size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK || hsep_model_check_start(context, values, message) != HSEP_OK) {
+        hsep_check_start_time(t_start, message) != HSEP_OK ||
+        hsep_model_check_start(context, values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     self->end = t_start;
@@ -63,7 +64,8 @@ HSEP_API hsep_status hsep_model_initialise(
 
 /* Check the command x_d, m, and the step from t by h, s; a step is at most 100 s and hsep_plant_step_max long, which
  * bounds its cost. */
-static hsep_status drive_check_step(const drive_state *self, double x_d, double t, double h, char message[])
+static hsep_status drive_check_step(
+    const hsep_context *context, const drive_state *self, double x_d, double t, double h, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     const double rate = HSEP_DRIVE(rate)(&self->drive);
@@ -87,7 +89,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     drive_state *self = state;
     const double x_d = values[HSEP_VR_x_d];
     message[0] = '\0';
-    if (drive_check_step(self, x_d, t, h, message) != HSEP_OK ||
+    if (drive_check_step(context, self, x_d, t, h, message) != HSEP_OK ||
         hsep_drive_step(&self->drive, x_d, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }

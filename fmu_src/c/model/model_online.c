@@ -106,9 +106,8 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
-    const hsep_status status =
-        hsep_inputs_count(
-            context, &self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
+    const hsep_status status = hsep_inputs_count(
+        context, &self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }

@@ -87,8 +87,7 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
     return memcmp(&got, block, sizeof got) == 0 && got.compensate <= HSEP_SEP_HYBRID &&
            got.compensate_next <= HSEP_SEP_HYBRID && got.change_max_next > 0.0 && isfinite(got.change_max_next) &&
            got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.solving <= 1 &&
-           got.missing <= got.n_lost &&
-           (got.solving || online.n_published == predictor->settings.Np) &&
+           got.missing <= got.n_lost && (got.solving || online.n_published == predictor->settings.Np) &&
            (online.divergence ||
             hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
