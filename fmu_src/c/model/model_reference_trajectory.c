@@ -142,7 +142,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
-    (void)values; /* it has no input */
+    (void)context, (void)values; /* it has no input */
     message[0] = '\0';
     return HSEP_OK;
 }
