@@ -27,7 +27,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def initialise(self) -> None:
         """Create the plant, at rest at the start value of x_d, and its encoder."""
-        check_position("the start value of x_d", self.values["x_d"])
+        check_position("the start value of x_d", self.values["x_d"], unit=self.unit)
         self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
         self.plant = self._new_plant()
         self.plant.reset(self.values["x_d"])
@@ -36,7 +36,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Step the plant and measure it."""
-        check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
+        check_position("x_d", self.values["x_d"], f" at t = {t:g} s", self.unit)
         check_step_size(h)
         check_communication_point(t, self.end, _TIME_TOLERANCE * h)
         self.plant.step(self.values["x_d"], h)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +34,7 @@ def hal(
     """
     from ..base.errors import ParameterError
     from ..base.output import written_whole
-    from ..fmi.hal import COMPONENTS, axis_files, component_files
+    from ..fmi.hal import COMPONENTS, axis_files, check_names, component_files
     from ..fmi.warm_start import load_trained
     from ..fmi.weights import WEIGHTS_FILE
     from ..machines.machine import load_machine
@@ -42,11 +43,15 @@ def hal(
     model = "HybridPredictor" if predictor else "SepCompensator"
     axes = [load_machine(source) for source in machine]
     names = [axis.name for axis in axes]
-    if len(set(names)) < len(names):
-        raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
     if weights is not None and len(axes) > 1:
         raise ParameterError(f"--weights belong to one axis, got {len(axes)} machines; write them one by one")
     component = COMPONENTS[model]
+    check_names(model, names)
+    if re.search(r"""[\s,"'#$(\[\\]""", str(out.resolve())):
+        raise ParameterError(
+            "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt takes "
+            f"axes= apart, got {out.resolve()}"
+        )
     trained = None if weights is None else load_trained(weights, axes[0], model)
     files = {out / name: content for name, content in component_files(model).items()}
     for axis in axes:

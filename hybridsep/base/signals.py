@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,9 @@ __all__ = [
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-POSITION_MAX = 1e3
-"""Largest magnitude of a position, m: beyond any axis; a larger value is an error or in another unit."""
+POSITION_MAX: Mapping[str, float] = {"m": 1e3, "rad": 1e6}
+"""Largest magnitude of a position: beyond any axis, though a rotary one may turn on and on; a larger value is an error
+or in another unit."""
 
 PREDICTION_MAX = 1e100
 """Largest magnitude of a published prediction, m, beyond which the learned recursion counts as diverging: sums of
@@ -47,7 +49,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     Raises
     ------
     SignalError
-        If they are not one-dimensional, of the wrong length, not all finite, or no positions in metres.
+        If they are not one-dimensional, of the wrong length, not all finite, or no positions in metres or radians.
     """
     samples: Any = np.asarray(values)
     if samples.dtype != np.float64 or not samples.flags.c_contiguous:
@@ -62,9 +64,10 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     if not np.isfinite(samples).all():
         i = int(np.flatnonzero(~np.isfinite(samples))[0])
         raise SignalError(f"{name} must be finite, got {samples[i]} at sample {i}")
-    if len(samples) and np.abs(samples).max() > POSITION_MAX:
+    most = max(POSITION_MAX.values())
+    if len(samples) and np.abs(samples).max() > most:
         i = int(np.argmax(np.abs(samples)))
-        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {samples[i]:g} at sample {i}")
+        raise SignalError(f"{name} must be within ±{most:g} m or rad, got {samples[i]:g} at sample {i}")
     return samples  # type: ignore[no-any-return]
 
 
@@ -75,12 +78,12 @@ def as_measured(values: ArrayLike, name: str, length: int | None = None) -> Arra
     return np.where(missing, np.nan, as_samples(np.where(missing, 0.0, samples), name, length))
 
 
-def check_position(name: str, value: float, when: str = "") -> None:
-    """Raise SignalError if a position, m, is not finite or beyond :data:`POSITION_MAX`; ``when`` ends the message."""
+def check_position(name: str, value: float, when: str = "", unit: str = "m") -> None:
+    """Raise SignalError if a position is not finite or beyond :data:`POSITION_MAX`; ``when`` ends the message."""
     if not math.isfinite(value):
         raise SignalError(f"{name} must be finite, got {value}{when}")
-    if abs(value) > POSITION_MAX:
-        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")
+    if abs(value) > POSITION_MAX[unit]:
+        raise SignalError(f"{name} must be within ±{POSITION_MAX[unit]:g} {unit}, got {value:g}{when}")
 
 
 def as_published(window: Array, name: str) -> Array:

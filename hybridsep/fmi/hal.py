@@ -7,9 +7,11 @@ of an axis that starts warm, ``weights.bin``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..base.data_files import data_folder
+from ..base.errors import ParameterError
 from ..machines.agree import check_drive_limits
 from ..machines.machine import Machine
 from .c_header import kind_header
@@ -21,10 +23,27 @@ from .table_file import TABLE_FILE, table_file
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-__all__ = ["COMPONENTS", "axis_files", "component_files"]
+__all__ = ["COMPONENTS", "axis_files", "check_names", "component_files"]
 
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}
 """Name of the component of each model."""
+
+
+_NAME_MAX = 47 - len("..look-ahead")
+"""Letters that HAL leaves for the names of component and axis together: 47, less the longest pin's."""
+
+
+def check_names(model: str, names: Sequence[str]) -> None:
+    """Raise ParameterError if the names of a component's axes are too long for HAL, or one is there twice."""
+    if len(set(names)) < len(names):
+        raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
+    most = _NAME_MAX - len(COMPONENTS[model])
+    for name in names:
+        if len(name) > most:
+            raise ParameterError(
+                f"an axis's name must have at most {most} letters, as HAL's names have 47, got {len(name)}: {name}; "
+                "change the machine file's name"
+            )
 
 
 def component_files(model: str) -> dict[str, bytes]:

@@ -55,7 +55,7 @@ class LookAheadSlave(TableSlave):
 
     def new_look_ahead(self) -> LookAhead:
         """Make the look-ahead from the parameters as they are now."""
-        return LookAhead(self.new_model(), self.values["x_d_ahead"])
+        return LookAhead(self.new_model(), self.values["x_d_ahead"], unit=self.unit)
 
     def initialise(self) -> None:
         """Make the look-ahead and start the clock."""

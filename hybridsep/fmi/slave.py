@@ -105,7 +105,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         self.vars = _References()
         described = _read_description(self.resources)
         self.content, table = described["content"], FmuTable.from_json(described)
-        self.modelName, self.table = table.name, table.variables
+        self.modelName, self.table, self.unit = table.name, table.variables, table.unit
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
         self.running = self.terminated = False
         self.warned: set[str] = set()
@@ -253,7 +253,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
     def _value_before(self, name: str) -> float | int | bool:
         """Return an output or local variable at ``t_0``, which the start value of the command must tell."""
         try:
-            check_position(f"the start value of {self.command}", self.values[self.command])
+            check_position(f"the start value of {self.command}", self.values[self.command], unit=self.unit)
         except SignalError as error:
             raise SignalError(f"{name} is not known yet: {error}") from error
         return self.initial_value(name)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief
 from ..base.settings import check
-from ..base.signals import POSITION_MAX, Array
+from ..base.signals import Array
 from .columns import COUNT, Column, choose_columns, on_one_clock
 from .formats import open_source
 from .gaps import row_interval
@@ -21,7 +21,7 @@ from .units import POSITION_UNITS, UNIT_OPTIONS, Shown, position_unit, shown_of,
 
 __all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
-SPAN_MAX: Mapping[str, float] = {"m": 100.0, "rad": POSITION_MAX}
+SPAN_MAX: Mapping[str, float] = {"m": 100.0, "rad": 1e3}
 """Largest plausible travel of an axis, m or rad; a larger one indicates a log in a smaller unit."""
 
 TS_TOLERANCE = 0.01

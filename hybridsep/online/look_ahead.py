@@ -20,7 +20,7 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.saved import Saved
 from ..base.settings import samples_before
-from ..base.signals import Array, as_measured, check_position
+from ..base.signals import POSITION_MAX, Array, as_measured, check_position
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from .planner import Planner, PublishedWindow, Unmodified, WindowPlanner
@@ -41,6 +41,8 @@ class LookAhead:
         Position where the drive is at rest, m.
     t_init : float, optional
         Warm-up after the first fill, s; the predictor's own if left out, 0 for a warm start.
+    unit : {"m", "rad"}
+        Of positions: those of a rotary axis may be larger.
 
     Attributes
     ----------
@@ -64,11 +66,13 @@ class LookAhead:
 
     diverged: str = ""
 
-    def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
-        self.k = 0
+    def __init__(
+        self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None, unit: str = "m"
+    ) -> None:
+        self.k, self.unit = 0, unit
         self._hold(model)
         warm_up = self.predictor.settings.warm_up if t_init is None else t_init
-        check_position("the start value of x_d_ahead", start)
+        check_position("the start value of x_d_ahead", start, unit=unit)
         self.start = start
         late = self.predictor.settings.n_late
         self._next = start  # where measurements come a sample early, that of the next sample
@@ -208,11 +212,12 @@ class LookAhead:
         sample = self.k if k is None else k
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
             if not (name == "x_meas" and math.isnan(x_meas) and self.may_miss):
-                check_position(name, value, f" at sample {sample}")
+                check_position(name, value, f" at sample {sample}", self.unit)
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""
         meta = {
+            "unit": self.unit,
             "start": self.start,
             "k": self.k,
             "first_scored": self._first_scored,
@@ -254,9 +259,12 @@ class LookAhead:
         look_ahead.k = saved.whole("k")
         look_ahead._hold(model_type.from_bytes(saved.part("model")))
         Np = look_ahead.Np
+        look_ahead.unit = saved.text("unit")
+        if look_ahead.unit not in POSITION_MAX:
+            raise saved.error(f"unit must be m or rad, got {look_ahead.unit!r}")
         with saved.consistent():
             look_ahead.start = saved.real("start")
-            check_position("start", look_ahead.start)
+            check_position("start", look_ahead.start, unit=look_ahead.unit)
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 4))

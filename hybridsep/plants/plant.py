@@ -118,5 +118,5 @@ def check_step(h: float, rate: float) -> None:
 
 def check_command(x_d: float) -> None:
     """Raise SignalError if a command, m, is not finite or beyond :data:`POSITION_MAX`."""
-    if not abs(x_d) <= POSITION_MAX:  # NaN too
-        raise SignalError(f"x_d must be within ±{POSITION_MAX:g} m, got {x_d:g}")
+    if not abs(x_d) <= POSITION_MAX["m"]:  # NaN too
+        raise SignalError(f"x_d must be within ±{POSITION_MAX['m']:g} m, got {x_d:g}")

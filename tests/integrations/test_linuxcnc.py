@@ -77,6 +77,22 @@ class TestWithoutLinuxCnc:
                 assert status == 0, err
                 assert ("warning: [drive_limits] of x: estimates" in err) == said, err
 
+    @pytest.mark.parametrize("name", ["my axes", "x,y", "a$b"])
+    def test_a_folder_that_loadrt_takes_apart_is_refused(self, hybridsep: Run, tmp_path: Path, name: str) -> None:
+        status, _, err = hybridsep("hal", AXES[0], "--out", str(tmp_path / name))
+        assert (status, "at which loadrt takes axes= apart" in " ".join(err.split())) == (2, True), err
+        assert not (tmp_path / name).exists()
+
+    def test_a_name_that_hal_has_no_room_for_is_refused(self, hybridsep: Run, tmp_path: Path) -> None:
+        file = tmp_path / "long.toml"
+        for letters, options in ((31, ()), (21, ("--predictor",))):
+            for more in (0, 1):
+                text = Path(AXES[0]).read_text(encoding="utf-8")
+                file.write_text(text.replace('name = "x"', f'name = "{"n" * (letters + more)}"'), encoding="utf-8")
+                status, _, err = hybridsep("hal", str(file), "--out", str(tmp_path / "out"), "--force", *options)
+                assert status == 2 * more, err
+                assert (f"at most {letters} letters" in " ".join(err.split())) == bool(more)
+
     def test_two_axes_of_one_name_are_refused(self, hybridsep: Run, tmp_path: Path) -> None:
         status, _, err = hybridsep("hal", AXES[0], AXES[0], "--out", str(tmp_path))
         assert (status, "each axis must have a name of its own" in err) == (2, True)

@@ -208,7 +208,7 @@ class CModel:
 
     def start_values(self) -> None:
         """Write outputs and locals as they are before the initialization ends, if the command starts at a position."""
-        self._call("check_start", self._values, context=False)
+        self._call("check_start", self._values)
         self.library.hsep_model_start_values(ctypes.byref(self.context), self._values)
 
     def initialise(self, t_start: float = 0.0, *, size: int | None = None) -> CModel:
@@ -242,10 +242,9 @@ class CModel:
     def _state(self) -> Any:
         return self.state.ctypes.data_as(ctypes.c_void_p)
 
-    def _call(self, function: str, *arguments: Any, context: bool = True) -> None:
+    def _call(self, function: str, *arguments: Any) -> None:
         message = ctypes.create_string_buffer(b"\xff" * MESSAGE_SIZE + b"unwritten")
-        before = (ctypes.byref(self.context),) if context else ()
-        status = getattr(self.library, f"hsep_model_{function}")(*before, *arguments, message)
+        status = getattr(self.library, f"hsep_model_{function}")(ctypes.byref(self.context), *arguments, message)
         assert message.raw[MESSAGE_SIZE:] == b"unwritten\0"
         if status == 1:
             raise RefusedError(message.value.decode("utf-8"))

@@ -271,8 +271,10 @@ static void compensator_next_window(hsep_compensator *self)
 
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
-    self->missing = !isnan(x_meas) ? 0 : self->missing < self->n_lost ? self->missing + 1 : self->n_lost;
-    if (hsep_predictor_take_in(hsep_compensator_predictor(self), x_d_ahead, x_meas)) {
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    const int is_missing = isnan(predictor->early ? predictor->next : x_meas);
+    self->missing = is_missing ? self->missing + (self->missing < self->n_lost) : 0;
+    if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas)) {
         compensator_next_window(self);
         return 1;
     }
