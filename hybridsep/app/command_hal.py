@@ -49,8 +49,8 @@ def hal(
     check_names(model, names)
     if re.search(r"""[\s,"'#$(\[\\]""", str(out.resolve())):
         raise ParameterError(
-            "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt takes "
-            f"axes= apart, got {out.resolve()}"
+            "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt "
+            f"takes axes= apart, got {out.resolve()}"
         )
     trained = None if weights is None else load_trained(weights, axes[0], model)
     files = {out / name: content for name, content in component_files(model).items()}

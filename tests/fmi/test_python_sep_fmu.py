@@ -82,6 +82,7 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("change_max", "parameter", "Real", "m", "0.001"),
         ("no_reversal", "parameter", "Boolean", None, "true"),
         ("compensate", "parameter", "Enumeration", None, "2"),
+        ("measurement_timeout", "parameter", "Real", "s", "1.0"),
     ]
     variables = list(compensator.variables.values())
     found = [(v.name, v.causality, v.type, v.unit, v.start) for v in variables]
