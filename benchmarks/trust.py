@@ -206,7 +206,7 @@ def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:
     lag = fitted_lag([(x_d, x)])
     omega = 1.0 / (lag.tau * T_s)
     # 1/(τs + 1) = (ω² + ω s)/(s + ω)²
-    return ModalModel([Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], lag.dead_time)
+    return ModalModel([Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], max(lag.late - 1, 0))
 
 
 def replayed(case: Case) -> Row:

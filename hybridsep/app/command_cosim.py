@@ -71,6 +71,7 @@ def cosim(
 
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
+    from ..compensate.qp import limits_that_bind
     from ..cosim.loop import cosimulate
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
@@ -121,7 +122,10 @@ def cosim(
             prediction_figure(run, title, figure)
         else:
             tracking_figure({compensate: run}, title, figure)
-    print_run(run, as_json, title)
+    limits = None
+    if compensate is not None and predictor is None and axis.drive_limits is not None:
+        limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, axis.compensator_settings)
+    print_run(run, as_json, title, limits)
     if not as_json:
         print_written(out, figure)
 

@@ -166,5 +166,7 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}")
     console.print(table)
     console.print(str(found.judged.verdict()))
+    if found.untimed:
+        console.print(f"the FMU's steps are not timed: {found.untimed}")
     for line in tracking_lines(found.tracking, logs[0].shown) if found.tracking else ():
         console.print(line)

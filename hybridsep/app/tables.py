@@ -161,21 +161,25 @@ def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
     console.print(f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.")
 
 
-def print_run(run: Run, as_json: bool, title: str) -> None:
-    """Print the figures of a run: its prediction errors, or its tracking errors."""
+def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:
+    """Print the figures of a run: its prediction errors, or its tracking errors and the ``limits`` that bind them."""
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
 
     if run.kind == PREDICTOR:
         print_scores(run.summary(), verdict_of(run), as_json, title)
     else:
-        _print_tracking(run.summary(), as_json, title)
+        _print_tracking(run.summary(), as_json, title, limits)
 
 
-def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
+def _print_tracking(
+    summary: Mapping[str, float | int], as_json: bool, title: str, limits: Mapping[str, float] | None
+) -> None:
     """Print tracking errors, change of the command and its peaks."""
+    from ..fitting.compensation import binding_words
+
     if as_json:
-        print_json(summary)
+        print_json({**summary, **({} if limits is None else {"limits_that_bind": limits})})
         return
     table = Table(title=title)
     for column in ("", "RMS [µm]", "max [µm]"):
@@ -193,6 +197,8 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
         f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
         f"not compensated {summary['share_off']:.1%} of the samples"
     )
+    if limits is not None:
+        console.print(binding_words(limits))
 
 
 def print_written(*paths: Path | None) -> None:

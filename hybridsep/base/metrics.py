@@ -63,8 +63,10 @@ def reduction_percent(rms_h: float, rms_pb: float) -> float:
     return 100.0 * (1.0 - rms_h / rms_pb)
 
 
-def rms_ratio(rms_h: float, rms_peer: float) -> float:
-    """Return the RMS error of the hybrid relative to a peer's; 1 if both are 0."""
+def rms_ratio(rms_h: float, rms_peer: float, least: float = 0.0) -> float:
+    """Return the RMS error of the hybrid relative to a peer's: 1 if both are 0, NaN if the peer's is < ``least``."""
+    if rms_peer < least:
+        return math.nan
     if rms_peer == 0.0:
         return 1.0 if rms_h == 0.0 else math.inf
     return rms_h / rms_peer

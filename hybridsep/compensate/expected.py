@@ -8,6 +8,7 @@ so where a modified command turns elsewhere.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,16 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .compensator import SepCompensator
 
-__all__ = ["expected_errors"]
+__all__ = ["Expected", "expected_errors"]
+
+
+class Expected(NamedTuple):
+    """Commanded minus measured position without and with compensation, and the commands of the latter, ``(n,)``, m."""
+
+    without: Array
+    compensated: Array
+    x_d: Array
+    x_dm: Array
 
 
 def expected_errors(
@@ -25,8 +35,8 @@ def expected_errors(
     settings: PredictorSettings,
     compensator: CompensatorSettings,
     recordings: Sequence[tuple[Array, Array]],
-) -> Iterator[tuple[Array, Array]]:
-    """Yield commanded minus measured position, ``(n,)``, m, without and with compensation, of one recording each.
+) -> Iterator[Expected]:
+    """Yield the tracking errors to be expected of one recording each.
 
     Parameters
     ----------
@@ -50,12 +60,14 @@ def expected_errors(
         x_pb = discrete.forced_response(discrete.rest(), x_d - start)[0] + start
         residual = np.concatenate((x[late:] - x_pb[:n], np.zeros(late + Np)))
         state, on_the_way, true = discrete.rest(), np.full(late, start), np.empty(0)
+        x_dm = np.empty(0)
         for k in range(0, n, Np):
             window = planner.plan(command[k : k + planner.preview])
             response, state = discrete.forced_response(state, window.x_dm - start)
+            x_dm = np.concatenate((x_dm, window.x_dm))
             moved = response + start + residual[k : k + Np]
             true = np.concatenate((true, moved))
             arrived = np.concatenate((on_the_way, moved))
             planner.update(arrived[:Np])
             on_the_way = arrived[Np:]
-        yield x_d[:n] - x[late:], x_d[:n] - true[:n]
+        yield Expected(x_d[:n] - x[late:], x_d[:n] - true[:n], x_d[:n], x_dm[:n])

@@ -34,8 +34,8 @@ __all__ = [
     "predict_peers",
 ]
 
-DEAD_TIME_MAX = 20
-"""Largest dead time, samples, that is tried."""
+LATE_MAX = 21
+"""Most samples that a command is tried to be late by."""
 
 TIME_CONSTANTS = (0.05, 1e4)
 """Least and largest time constant that are tried, samples."""
@@ -43,25 +43,25 @@ TIME_CONSTANTS = (0.05, 1e4)
 
 @dataclass(frozen=True)
 class FirstOrderLag:
-    """Lag ``1/(τs + 1)`` behind a dead time, over a zero-order hold.
+    """Lag ``1/(τs + 1)`` of a command that is late by whole samples.
 
     Attributes
     ----------
     tau : float
         Time constant, samples.
-    dead_time : int
-        Whole samples.
+    late : int
+        Whole samples: 1 and the dead time over a zero-order hold, 0 where the axis follows within the sample.
     """
 
     tau: float
-    dead_time: int
+    late: int
 
     def position(self, x_d: Array) -> Array:
         """Return the position under a command ``(n,)``, m, from rest at the first one."""
         u = x_d - x_d[0]
         pole = math.exp(-1.0 / self.tau)
-        delayed = np.concatenate((np.zeros(self.dead_time), u))[: len(u)]
-        return np.asarray(x_d[0] + lfilter([0.0, 1.0 - pole], [1.0, -pole], delayed))
+        delayed = np.concatenate((np.zeros(self.late), u))[: len(u)]
+        return np.asarray(x_d[0] + lfilter([1.0 - pole], [1.0, -pole], delayed))
 
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
@@ -74,18 +74,17 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     """
     known = [~np.isnan(x) for _, x in recordings]
 
-    def misfit(log_tau: float, dead_time: int) -> float:
-        lag = FirstOrderLag(math.exp(log_tau), dead_time)
+    def misfit(log_tau: float, late: int) -> float:
+        lag = FirstOrderLag(math.exp(log_tau), late)
         errors = [(x - lag.position(x_d))[at] for (x_d, x), at in zip(recordings, known, strict=True)]
         return float(sum(error @ error for error in errors))
 
     bounds = [math.log(samples) for samples in TIME_CONSTANTS]
     fits = [
-        (minimize_scalar(misfit, bounds=bounds, args=(dead_time,), method="bounded"), dead_time)
-        for dead_time in range(DEAD_TIME_MAX + 1)
+        (minimize_scalar(misfit, bounds=bounds, args=(late,), method="bounded"), late) for late in range(LATE_MAX + 1)
     ]
-    best, dead_time = min(fits, key=lambda fit: float(fit[0].fun))
-    return FirstOrderLag(math.exp(best.x), dead_time)
+    best, late = min(fits, key=lambda fit: float(fit[0].fun))
+    return FirstOrderLag(math.exp(best.x), late)
 
 
 _BLOCK = 4096
@@ -264,8 +263,8 @@ def predict_peers(
 ) -> tuple[Peer, ...]:
     """Return the peers' predictions of all windows from each piece's ``first`` on.
 
-    The lag and a frozen ARX are fitted to the leading training samples; without any there are none of them. A
-    refitted ARX is fitted before each window to all samples so far.
+    The lag and a frozen ARX are fitted to the leading training samples; without any there are none of them, and no lag
+    without motion there. A refitted ARX is fitted before each window to all samples so far.
 
     Parameters
     ----------
@@ -280,7 +279,8 @@ def predict_peers(
     """
     training = [(one.x_d[: one.n_train], one.x[: one.n_train]) for one in pieces if one.n_train > delay]
     trains = any((~np.isnan(x[delay:])).any() for _, x in training)
-    found = [_lag_hold(pieces, training, Np, delay)] if trains else []
+    moves = any(np.ptp(x_d) > 0.0 for x_d, _ in training)
+    found = [_lag_hold(pieces, training, Np, delay)] if trains and moves else []
     ways = (FROZEN, REFITTED) if trains else (REFITTED,)
     for i, n in enumerate(ARX_LAGS):
         found += [_arx(n, way, pieces, Np, delay) for way in ways]

@@ -58,7 +58,7 @@ class Verdict:
     peers : tuple of str
         Their names, :data:`PEERS` first.
     ratios : tuple of float
-        RMS error of the hybrid relative to each peer's.
+        RMS error of the hybrid relative to each peer's; NaN where the log's resolution does not show the peer's.
     worse : tuple of tuples of str
         Places where it is worse than each peer.
     judged : tuple of str
@@ -96,7 +96,9 @@ class Verdict:
         if self.n_windows < WINDOWS_MIN:
             return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."
         lines = [
-            f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
+            f"Not compared with {peer}: its error is below what the log's resolution shows"
+            if math.isnan(value)
+            else f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(self.peers, self.ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
@@ -125,10 +127,12 @@ class Tally:
         Samples in a window.
     further : sequence of str
         Names of peers besides :data:`PEERS`.
+    least : float
+        Least RMS error, m, that the measurement's resolution shows: no ratio to a smaller one is formed.
     """
 
-    def __init__(self, Np: int, further: Sequence[str] = ()) -> None:
-        self.Np = Np
+    def __init__(self, Np: int, further: Sequence[str] = (), least: float = 0.0) -> None:
+        self.Np, self._least = Np, least
         self._peers = (*PEERS, *further)
         self._squares = np.zeros((len(self._peers) + 1, len(_MOTIONS), _N_THIRDS))
         self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
@@ -182,7 +186,8 @@ class Tally:
             Those that were missing; as many as the windows lack, if left out.
         """
         *peers, h = self._squares
-        ratios = tuple(_ratio(h.sum(), peer.sum()) for peer in peers)
+        least = self._least**2 * self._counts.sum()
+        ratios = tuple(math.nan if peer.sum() < least else _ratio(h.sum(), peer.sum()) for peer in peers)
         n_samples = int(self._counts.sum()) + self._n_missing
         return Verdict(
             self._peers,

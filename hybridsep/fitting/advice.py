@@ -95,7 +95,10 @@ def recommendation(judged: Judged) -> str:
     best = judged.replay.best()
     if best.rms == 0.0:
         return f"There is no error to predict in {judged.part}: record the axis while it works."
-    ratio, peer = hybrid.rms / best.rms, _IN_WORDS.get(best.name, best.name)
+    peer = _IN_WORDS.get(best.name, best.name)
+    if best.rms < judged.replay.least:
+        return f"There is nothing to gain in {judged.part}: the log's resolution does not show the error of {peer}."
+    ratio = hybrid.rms / best.rms
     if n < WINDOWS_ENOUGH or judged.unidentified:
         how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
         but = f"but judged by {counted(n)} only: {_enough(judged)}"

@@ -16,7 +16,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .replay import Recording, replay
+from .replay import Recording, Replay, replay
 
 __all__ = [
     "WORTH",
@@ -158,10 +158,9 @@ def window_sizes(Np: int, n_samples: int) -> list[int]:
 def window_scores(
     model: ModalModel,
     recordings: Sequence[Recording],
+    judged: Replay,
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
-    *,
-    offset: float = 0.0,
 ) -> tuple[WindowScore, ...]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
 
@@ -169,13 +168,15 @@ def window_scores(
     ----------
     model, recordings, settings, progress
         As for :func:`choose_settings`.
-    offset : float
-        As of :class:`~hybridsep.fitting.replay.Replay`, m.
+    judged : Replay
+        With the controller's window.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []
     for i, Np in enumerate(sizes):
-        predictor = HybridPredictor(model, with_window(settings, Np))
-        scores.append(WindowScore(Np, *replace(replay(predictor, recordings), offset=offset).rms()))
+        found = judged
+        if Np != settings.Np:
+            found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
+        scores.append(WindowScore(Np, *replace(found, offset=judged.offset).rms()))
         progress((i + 1) / len(sizes))
     return tuple(scores)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base.data_files import COMMANDS
-from ..base.errors import IdentificationError, ParameterError
+from ..base.errors import FmuError, IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
@@ -39,7 +39,7 @@ from .choice import choose_settings, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, estimated_limits, expected_tracking
 from .period import period_hint
 from .plant import commands_to_try, identified_plant, plant_words
-from .replay import Recording, Replay, replay, split_log
+from .replay import Recording, Replay, around_the_split, replay, split_log
 
 __all__ = ["REPEATS", "SAMPLES_MAX", "Fit", "FitOptions", "fit", "fit_files", "sha256_of", "step_times"]
 
@@ -48,6 +48,10 @@ REPEATS = "the residual repeats every"
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
+
+_TRIED_MAX = 20_000
+"""Samples around the split on which settings, look-aheads and a plant are tried, 20 s at 1 kHz, and a compensator on
+half of them: a fit of a minute's log took twice as long without."""
 
 Progress = Callable[[str, float], object]
 
@@ -84,8 +88,10 @@ class Fit:
     Attributes
     ----------
     machine : Machine
-    identification, choice, windows, steps : plain values
+    identification, choice, windows : plain values
         As in ``fit.json``.
+    steps : dict
+        Of :func:`step_times`; empty where the FMU cannot be run here.
     share : float
         Share of each log's samples that were for training.
     judged : Replay
@@ -97,6 +103,8 @@ class Fit:
         limits.
     plant : dict
         Plant to try with, of :func:`~hybridsep.fitting.plant.identified_plant`.
+    untimed : str
+        Why steps are not timed, though FMUs were built; empty where they are.
     """
 
     machine: Machine
@@ -107,8 +115,9 @@ class Fit:
     share: float
     judged: Replay
     files: tuple[Path, ...]
-    tracking: dict[str, float | None] = field(default_factory=dict)
+    tracking: dict[str, Any] = field(default_factory=dict)
     plant: dict[str, Any] = field(default_factory=dict)
+    untimed: str = ""
 
     def summary(self) -> dict[str, Any]:
         """Return plain values: errors in m over the test samples, settings, identification, step times in s.
@@ -125,7 +134,7 @@ class Fit:
             "rms_h": _known(rms_h),
             "peers": {one.name: "diverged" if one.diverged else _known(one.rms) for one in peers},
             "best": best.name,
-            "ratio": _known(rms_ratio(rms_h, best.rms)),
+            "ratio": _known(rms_ratio(rms_h, best.rms, self.judged.least)),
             "n_windows": verdict.n_windows,
             "verdict": str(verdict),
         }
@@ -207,31 +216,35 @@ def fit(
     default = replace(default, input_hold=found["input_hold"])
     progress("look for what repeats with the position", 0.33)
     found["findings"] = [*found["findings"], *_repeats(model, recordings, default, logs[0])]
-    chosen = choose_settings(model, recordings, default, within(0.35, 0.6, "choose p and q"))
+    tried = around_the_split(recordings, _TRIED_MAX)
+    chosen = choose_settings(model, tried, default, within(0.35, 0.6, "choose p and q"))
     settings = chosen.settings
     choice = [
         {"p": one.settings.p, "q": one.settings.q, "rms_h": _known(one.rms_h), "chosen": one.settings == settings}
         for one in chosen.tried
     ]
-    judge = within(0.6, 0.8, "error over Np")
-    windows = [
-        {name: _known(value) for name, value in asdict(one).items()}
-        for one in window_scores(model, recordings, settings, judge, offset=found["offset"])
-    ]
     predictor = HybridPredictor(model, settings)
-    replayed = replay(predictor, recordings, progress=within(0.8, 0.83, "judge on the second half"))
-    judged = replace(replayed, offset=found["offset"]).with_peers(within(0.83, 0.85, "peers on the second half"))
-    plant = identified_plant(model, settings, recordings)
-    limits = dict(options.drive_limits) or estimated_limits(recordings, T_s)
+    replayed = replay(predictor, recordings, progress=within(0.6, 0.65, "judge on the second half"))
+    judged = replace(replayed, offset=found["offset"]).with_peers(within(0.65, 0.68, "peers on the second half"))
+    over_windows = window_scores(model, tried, judged, settings, within(0.68, 0.8, "error over Np"))
+    windows = [{name: _known(value) for name, value in asdict(one).items()} for one in over_windows]
+    progress("a plant to try with", 0.8)
+    plant = identified_plant(model, settings, tried)
+    limits: dict[str, Any] = dict(options.drive_limits)
+    estimated = estimated_limits(recordings, T_s)
+    if not limits:
+        limits = estimated
+    elif "change_max" not in limits and estimated:
+        limits["change_max"] = estimated["change_max"]
     machine = _machine(options, logs, model, settings, changes, plant["entries"], limits)
     with written_text(files["machine file"]) as file:
         file.write(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)))
     _write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
     predictor.save(files["trained predictor"])
-    tracking: dict[str, float | None] = {}
+    tracking: dict[str, Any] = {}
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
-        tracking = expected_tracking(machine, recordings, estimate)
+        tracking = expected_tracking(machine, around_the_split(recordings, _TRIED_MAX // 2), estimate)
     if not fmus:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
     written = tuple(files.values())
@@ -241,7 +254,10 @@ def fit(
         origin = _origin(result, logs, summary, changes)
         built = _build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
         progress("time the FMU's steps", 0.95)
-        result = replace(result, steps=step_times(built, recordings[0].x_d, recordings[0].x))
+        try:
+            result = replace(result, steps=step_times(built, recordings[0].x_d, recordings[0].x))
+        except FmuError as error:  # as where no library can be loaded from the folder of temporary files
+            result = replace(result, untimed=str(error))
     kept = {"identification": found, "choice": choice, "windows": windows, "plant": plant, "tracking": tracking}
     with written_text(files["results"]) as file:
         file.write(json.dumps({"hybridsep": __version__, **kept, "judged": summary}, indent=2) + "\n")

@@ -45,8 +45,8 @@ _SETTLED = 0.01
 _TRIED_MAX = 20_000
 """Most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for."""
 
-_MOVES = 0.25
-"""Share of the whole way that the test part must have to be tried with."""
+_LEAD_IN = 100
+"""Samples at rest before the commands to try with."""
 
 _AT_REST = 1e-3
 """Velocity at rest, relative to the largest."""
@@ -154,26 +154,17 @@ def plant_words(plant: Mapping[str, Any], shown: Shown) -> str:
 
 
 def commands_to_try(recordings: Sequence[Recording]) -> Array:
-    """Return commands of a log to try with, m: at most 20 000, of one stretch, from rest to rest where it rests.
+    """Return commands of a log to try with, m: its first 20 000 from where it moves, to rest where it rests.
 
-    They are of the test part where there is motion enough.
+    They begin where the log began, as stiffness and what is learned of the position count from there.
     """
-    one = max(recordings, key=lambda one: _path(one.x_d))
-    found = one.x_d[one.judges_from :]
-    if _path(found) < _MOVES * _path(one.x_d):
-        found = one.x_d
+    found = max((one.x_d for one in recordings), key=lambda x_d: float(np.abs(np.diff(x_d)).sum()))
+    moving = np.flatnonzero(np.diff(found))
+    found = found[max(int(moving[0]) - _LEAD_IN, 0) if len(moving) else 0 :][:_TRIED_MAX]
     steps = np.abs(np.diff(found))
-    at_rest = np.flatnonzero(steps <= _AT_REST * steps.max(initial=0.0))
-    begin = int(at_rest[0]) if len(at_rest) else 0
-    found = found[begin : begin + _TRIED_MAX]
-    ends = at_rest[(at_rest > begin) & (at_rest < begin + len(found))] - begin + 1
-    last = int(ends[-1]) if len(ends) else 0
+    at_rest = np.flatnonzero(steps <= _AT_REST * steps.max(initial=0.0)) + 1
+    last = int(at_rest[-1]) + 1 if len(at_rest) else 0
     return found[:last] if last > len(found) // 2 else found
-
-
-def _path(x_d: Array) -> float:
-    """Return how far a command goes in all, m."""
-    return float(np.abs(np.diff(x_d)).sum())
 
 
 def _memory(discrete: DiscreteModel) -> int:

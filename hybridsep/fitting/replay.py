@@ -16,6 +16,7 @@ from ..cosim.run import Run
 from ..evaluate.backtest import Backtest, Batch, Scores, backtest, backtest_stream, replayed_run
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
+from ..intake.samples import resolution
 from ..logs.log import Log, LogReader
 from ..predict.predictor import HybridPredictor
 
@@ -25,6 +26,7 @@ __all__ = [
     "Recording",
     "Replay",
     "Scored",
+    "around_the_split",
     "replay",
     "replay_log",
     "split_log",
@@ -98,6 +100,26 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
     return settled if 2 * left >= most else found
 
 
+def around_the_split(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
+    """Return the samples nearest to the split of recordings: half of ``n_most`` before it, and as many after it.
+
+    Each begins at rest where its command rests within as many samples before.
+    """
+    n = sum(len(one.x) for one in recordings)
+    if n <= n_most:
+        return list(recordings)
+    found = []
+    for one in recordings:
+        half = max(n_most * len(one.x) // (2 * n), 1)
+        begin = max(one.n_train - half, 0)
+        at_rest = np.flatnonzero(np.diff(one.x_d[max(begin - half, 0) : begin + 1]) == 0.0)
+        begin -= min(begin, half) - int(at_rest[-1]) if len(at_rest) else 0
+        part = slice(begin, one.n_train + half)
+        settling = max(one.n_settling - begin, 0)
+        found.append(Recording(one.x_d[part], one.x[part], one.n_train - begin, settling))
+    return found
+
+
 @dataclass(frozen=True)
 class Scored:
     """Errors of a prediction over the test samples.
@@ -150,6 +172,11 @@ class Replay:
     delay: int = 0
     offset: float = 0.0
     peers: tuple[Peer, ...] = ()
+
+    @cached_property
+    def least(self) -> float:
+        """Least RMS error, m, that the measurement's resolution shows: that of rounding to it."""
+        return min((resolution(one.x[~np.isnan(one.x)]) for one in self.recordings), default=0.0) / math.sqrt(12.0)
 
     def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> Replay:
         """Return the replay with the peers' predictions of the test samples."""
@@ -234,7 +261,7 @@ class Replay:
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""
         peers = self.best_ways()
-        tally = Tally(self.Np, [peer.title for peer in peers])
+        tally = Tally(self.Np, [peer.title for peer in peers], self.least)
         for x_d, x, predictions, _ in self._windows(peers):
             tally.add(x_d, x, predictions)
         return tally.verdict()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -202,8 +203,10 @@ def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None
             rows.append([one.name, "diverged" if one.diverged else "–", "", "", ""])
             continue
         figures = (one.rms, np.quantile(size, 0.95), size.max())
-        ratio = rms_ratio(one.rms, scored[0].rms)
-        rows.append([one.name, *(f"{scale * figure:.4g}" for figure in figures), f"{ratio:.3f}"])
+        ratio = rms_ratio(one.rms, scored[0].rms, judged.replay.least)
+        rows.append(
+            [one.name, *(f"{scale * figure:.4g}" for figure in figures), "–" if math.isnan(ratio) else f"{ratio:.3f}"]
+        )
     report.table(["prediction by", f"RMS [{unit}]", "95 % below", "largest", "× physics"], rows)
     report.paragraph(
         f"{how} Each window was predicted before any of its samples was known, as in the machine. "
@@ -327,12 +330,8 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
     """
     names = list(fmus)
     report.heading("Use it")
-    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
-    report.paragraph(
-        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; 99.9 % at "
-        f"most {_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
-        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
-    )
+    if steps:
+        report.paragraph(_times(names[0], steps, T_s))
     report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
     report.bullets(
         [
@@ -352,7 +351,20 @@ _LATE = (
 )
 """What is added where steps do not fit into the sampling interval."""
 
+
+def _times(fmu: str, steps: Mapping[str, float], T_s: float) -> str:
+    """Return how long steps took, in words, and whether they are too long."""
+    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
+    return (
+        f"Through Python on this machine a step of {fmu} took {_duration(steps['median'])} (median; 99.9 % at most "
+        f"{_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
+        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
+    )
+
+
 _REPLAY = """\
+import math
+
 import numpy as np
 from fmpy import simulate_fmu
 

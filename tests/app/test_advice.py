@@ -60,6 +60,26 @@ def test_nothing_is_advised_where_the_axis_rests() -> None:
     assert advice.endswith("record moves in both halves.")
 
 
+def test_no_ratio_is_formed_to_an_error_that_the_resolution_does_not_show() -> None:
+    """It was "71545304172.46 × lag + hold"."""
+    moving = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))
+    found = judged(moving, 2e-6, 1e-12)
+    rounded = 1e-6 * np.round(moving / 1e-6)
+    [result], [peer] = found.replay.results, found.replay.peers
+    shifted = SimpleNamespace(**{name: getattr(result, name) + rounded for name in ("x_pb", "x_hold", "x_h")})
+    peers = (replace(peer, predictions=(peer.predictions[0] + rounded,)),)
+    of_rounded = Recording(moving, rounded, N // 2)
+    found = replace(
+        found, replay=replace(found.replay, recordings=(of_rounded,), results=(cast(Any, shifted),), peers=peers)
+    )
+    assert recommendation(found) == (
+        "There is nothing to gain in the half: the log's resolution does not show the error of ARX20 (refitted)."
+    )
+    words = str(found.replay.verdict())
+    assert "Better than hold: 0.667 × its RMS error" in words
+    assert "Not compared with ARX20 (refitted): its error is below what the log's resolution shows." in words
+
+
 def test_what_would_help_is_said() -> None:
     """A hybrid that is best at first in each window, and gets better over the log."""
     t = np.arange(N) * 1e-3

@@ -17,8 +17,9 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
-from hybridsep.base.errors import LogError, ParameterError
+from hybridsep.base.errors import FmuError, LogError, ParameterError
 from hybridsep.cosim.adapters import FmuController
+from hybridsep.fitting import fit as fitting
 from hybridsep.fitting.advice import recommendation
 from hybridsep.fitting.fit import Fit, FitOptions, fit, fit_files, sha256_of
 from hybridsep.fitting.replay import replay, split_log
@@ -95,6 +96,25 @@ def test_the_fmus_name_the_log_the_settings_and_the_figures(fitted: Fit, log: Pa
         assert float(entries["judged.rms_h"] or "nan") == results["judged"]["rms_h"]
         assert entries["judged.best"] == results["judged"]["best"]
     assert sha256_of(tmp_path / "gone.csv") == "unknown"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick_fit")
+def test_a_fit_is_whole_where_no_library_can_be_loaded(
+    hybridsep: Run, log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the folder of temporary files is mounted noexec."""
+
+    def refused(*_arguments: object) -> None:
+        raise FmuError("HybridPredictor_axis.fmu cannot be loaded: failed to map segment from shared object")
+
+    monkeypatch.setattr(fitting, "FmuController", refused)
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
+    assert status == 0, err
+    assert "the FMU's steps are not timed: HybridPredictor_axis.fmu cannot be loaded" in " ".join(out.split())
+    page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+    assert "Use it" in page
+    assert "Through Python on this machine" not in page
 
 
 def test_step_times_are_of_the_steps(fitted: Fit) -> None:

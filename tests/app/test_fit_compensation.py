@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run, write_rows
 from identification_cases import T_S
+from places import LOOPS
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.errors import ParameterError
@@ -16,7 +19,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import drive_limits
+from hybridsep.fitting.compensation import binding_words, drive_limits
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
@@ -45,7 +48,9 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, *LIMITS)
     assert status == 0, err
     words = " ".join(said.split())
-    assert "by the physics model, with which it starts (compensate = physics), and about" in words
+    assert "by the hybrid (compensate = hybrid), and about" in words
+    assert "The physics model alone may leave more error than no compensation does" in words
+    assert re.search(r"change_max is [\d.]+ µm\. (No limit binds|Limits bind) the compensated command", words)
     assert "An estimate: the compensator plans in closed loop on the identified model" in words
     assert "Compensation" in (out / "report.html").read_text(encoding="utf-8")
     machine = load_machine(out / "machine.toml")
@@ -55,6 +60,8 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
         30,
         2e4,
     )
+    # As large as without the options, where a millimetre applied silently
+    assert machine.drive_limits.change_max == pytest.approx(2 * np.abs(x_d - x).max(), rel=1e-3)
     assert machine.compensator_settings.compensate == "physics"
     fmus = sorted(path.stem for path in out.glob("SepCompensator*.fmu"))
     assert fmus == ["SepCompensator_axis"]
@@ -71,6 +78,29 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
         # The same axis, whose friction does change with the command.
         assert tracking[model] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
         assert tracking[model] < 0.6 * tracking["none"]
+
+
+@pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
+@pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.033}, 15), (0.0022, {}, 0.5)])
+def test_cosim_says_which_limit_binds(
+    hybridsep: Run, tmp_path: Path, change_max: float, bound: dict[str, float], most: float
+) -> None:
+    text = (LOOPS / "axis.toml").read_text(encoding="utf-8")
+    limits = f"[drive_limits]\nchange_max = {change_max}"
+    (tmp_path / "axis.toml").write_text(text.replace("[drive_limits]", limits), encoding="utf-8")
+    with gzip.open(LOOPS / "commands.csv.gz") as commands:
+        (tmp_path / "commands.csv").write_bytes(commands.read())
+    status, out, err = hybridsep("cosim", "-m", tmp_path / "axis.toml", "--compensate", "hybrid", "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert found["limits_that_bind"] == pytest.approx(bound, abs=1e-3)
+    assert found["tracking_rms_um"] < most
+    assert binding_words(bound) == (
+        "Limits bind the compensated command: change_max in 3.3 % of the samples; within larger ones less error would "
+        "be left."
+        if bound
+        else "No limit binds the compensated command."
+    )
 
 
 def test_all_three_limits_are_needed() -> None:

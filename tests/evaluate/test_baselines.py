@@ -130,14 +130,28 @@ def test_an_unstable_model_diverges() -> None:
     assert peer(found, "ARX20", FROZEN).diverged
 
 
+def test_an_axis_without_lag_has_none_in_its_peer() -> None:
+    """It was late by the sample of a hold at least: 9.7 mm beside hold's 0.5."""
+    x_d, _ = axis(2000)
+    held = peer(predict_peers([Piece(x_d, x_d.copy(), 1000, 1000)], 100), LAG_HOLD, "").predictions[0]
+    np.testing.assert_allclose(held[1000:], x_d[1000:], rtol=0, atol=1e-9)
+
+
+def test_a_lag_needs_motion_to_be_fitted_to() -> None:
+    x_d, x = axis()
+    x_d[:300] = x_d[300]
+    found = predict_peers([Piece(x_d, x, 300, 300)], NP)
+    assert {one.title for one in found} == {f"ARX{n} ({way})" for n in (20, 40) for way in (FROZEN, REFITTED)}
+
+
 def test_a_lag_is_found_and_its_last_measured_residual_held() -> None:
     x_d, _ = axis(2000)
-    true = FirstOrderLag(12.0, 3)
+    true = FirstOrderLag(12.0, 4)
     x = true.position(x_d) + 5e-6
     x[1190:1200] = np.nan
     lag = fitted_lag([(x_d[:1000], x[:1000])])
     assert lag.tau == pytest.approx(12.0, rel=1e-2)
-    assert lag.dead_time == 3
+    assert lag.late == 4
     held = peer(predict_peers([Piece(x_d, x, 1000, 1000)], 100), LAG_HOLD, "").predictions[0]
     x_lag = lag.position(x_d)
     np.testing.assert_allclose(held[1200:1300], x_lag[1200:1300] + (x - x_lag)[1189], rtol=0, atol=1e-15)

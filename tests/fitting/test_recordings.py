@@ -11,7 +11,7 @@ import pytest
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fitting.replay import Recording, replay, split_log
+from hybridsep.fitting.replay import Recording, around_the_split, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -36,6 +36,16 @@ def test_a_log_is_split_by_its_samples_across_its_gaps() -> None:
     assert [part.n_train for part in parts] == [100, 200, 0]
     x_d, x = parts[1].training
     assert len(x_d) == len(x) == 200
+
+
+def test_what_is_tried_of_a_long_log_is_around_its_split_and_begins_at_rest() -> None:
+    x_d = np.arange(1000.0)
+    x_d[440:446] = 440.0
+    [one] = around_the_split([Recording(x_d, x_d + 1, 500)], 100)
+    np.testing.assert_array_equal(one.x_d, x_d[444:550])
+    np.testing.assert_array_equal(one.x, x_d[444:550] + 1)
+    assert one.n_train == 56
+    assert around_the_split([one], 106) == [one]
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 1e-9])

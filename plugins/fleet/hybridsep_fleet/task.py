@@ -157,7 +157,7 @@ def _figures(found: _Judged) -> dict[str, Any]:
         "rms_hold": _known(rms_hold),
         "rms_h": _known(rms_h),
         "best": best.name,
-        "ratio": _known(rms_ratio(rms_h, best.rms)),
+        "ratio": _known(rms_ratio(rms_h, best.rms, judged.replay.least)),
         "verdict": str(verdict),
         "advice": recommendation(judged),
         "peers": json.dumps(peers),
