@@ -20,7 +20,7 @@ def example_log(
 
     20 s of a simulated axis at 1 kHz, in mm.
     """
-    from ..logs.example import write_example
+    from ..logs.formats import write_example
     from .outputs import check_outputs
 
     check_outputs([("--out", out, (".csv", ".gz"))], {}, force=force)

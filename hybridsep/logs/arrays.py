@@ -10,6 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,7 +19,6 @@ from numpy.lib import format as npy
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .extras import library
 from .source import N_COLUMNS, ArraysSource, check_column, check_declared
 
 __all__ = ["MatSource", "NpzSource", "ParquetSource"]
@@ -167,8 +167,12 @@ class ParquetSource(ArraysSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._arrow = library(path, "pyarrow", "parquet", "a Parquet file")
-        self._parquet = library(path, "pyarrow.parquet", "parquet", "a Parquet file")
+        try:
+            self._arrow, self._parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+        except ModuleNotFoundError as error:
+            raise LogError(
+                f"{path}: is a Parquet file, which needs the extra parquet: pip install 'hybridsep[parquet]'"
+            ) from error
         with _reading(path, "a Parquet file"), self._file() as file:
             groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
             written = sum(group.column(i).total_uncompressed_size for group in groups for i in range(group.num_columns))

@@ -1,13 +1,16 @@
 """Registry of log formats: which reader a file's content asks for, and how to convert what has none.
 
 A new format is a file with a subclass of :class:`~hybridsep.logs.source.Source` and its entry in :data:`READERS`.
+Beside them lies the example log of the package, made by ``examples/example_log.py`` of the repository.
 """
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 
 from ..base.errors import LogError
+from ..base.output import written_whole
 from .arrays import MatSource, NpzSource, ParquetSource
 from .capture import CaptureSource
 from .halscope import HalscopeCsvSource, HalscopePairsSource
@@ -16,7 +19,10 @@ from .source import Source
 from .text import TextSource
 from .twincat import TwinCatSource
 
-__all__ = ["READERS", "open_source"]
+__all__ = ["EXAMPLE", "READERS", "open_source", "write_example"]
+
+EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")
+"""The example log, 20 s of a simulated axis at 1 kHz."""
 
 READERS: tuple[type[Source], ...] = (
     NpzSource,
@@ -62,10 +68,6 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
         (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"),
         _PANDAS.format("json"),
     ),
-    ("a Python pickle", (b"\x80\x03", b"\x80\x04", b"\x80\x05"), f"{_SAVE} where it was made: a pickle runs code"),
-    ("SQLite", (b"SQLite format 3",), _SAVE),
-    ("a sound file", (b"RIFF", b"fLaC"), _SAVE),
-    ("PDF", (b"%PDF",), _SAVE),
     ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
     ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), f"{_SAVE} in Excel, or unpack it"),
 )
@@ -110,3 +112,10 @@ def _reader(path: Path, head: bytes) -> type[Source]:
     if named:
         return named[-1]  # its message says what is damaged
     raise LogError(f"{path}: is in no format that is read ({known}); {_SAVE}")
+
+
+def write_example(path: Path) -> None:
+    """Write the example log as CSV, or compressed where the name ends in ``.gz``."""
+    packed = EXAMPLE.read_bytes()
+    with written_whole(path) as file:
+        file.write(packed if path.suffix == ".gz" else gzip.decompress(packed))

@@ -11,7 +11,7 @@ from command_line import Run
 
 from hybridsep import read_log
 from hybridsep.intake.check import check
-from hybridsep.logs.example import EXAMPLE
+from hybridsep.logs.formats import EXAMPLE
 
 
 def test_it_is_written_and_read(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

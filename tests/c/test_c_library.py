@@ -24,7 +24,7 @@ from hybridsep import backtest
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 from hybridsep.fmi.weights import weights_file
-from hybridsep.logs.example import write_example
+from hybridsep.logs.formats import write_example
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -13,7 +13,7 @@ from c_library import installed
 from command_line import Run
 
 from hybridsep import backtest, load_machine
-from hybridsep.logs.example import write_example
+from hybridsep.logs.formats import write_example
 from hybridsep.predict.predictor import HybridPredictor
 
 AXIS = "spring_mass_damper"
