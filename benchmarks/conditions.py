@@ -232,7 +232,7 @@ def _at_rate(machine: Machine, path: Callable[[float], Array], rate: float) -> t
     settings = replace(usual, T_s=T_s, Np=Np, p=max(round(usual.p * usual.T_s * rate), 1))
     x_d = path(T_s)
     assert machine.plant is not None
-    plant = machine.model_copy(update={"T_s": T_s}).new_plant()
+    plant = machine.changed("", {"T_s": T_s}).new_plant()
     x = simulate(plant, x_d, T_s)
     predictor = HybridPredictor(machine.model, settings)
     errors = []

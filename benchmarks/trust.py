@@ -140,7 +140,7 @@ def stage_paths() -> Iterator[tuple[str, tuple[Array, Array]]]:
 def with_friction_on(machine: Machine, friction_on: str) -> Machine:
     """Return a stage whose friction follows the command or the motion."""
     assert isinstance(machine.plant, StageSection)
-    return machine.model_copy(update={"plant": machine.plant.model_copy(update={"friction_on": friction_on})})
+    return machine.changed("plant", {"friction_on": friction_on})
 
 
 def simulated(name: str, machine: Machine, x_d: Array) -> Case:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 import typer
-from pydantic import BaseModel
 
 from hybridsep import load_machine
 from hybridsep.app.cli import app
@@ -19,11 +18,12 @@ from hybridsep.base import errors
 from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
+from hybridsep.base.settings import CompensatorSettings
 from hybridsep.fmi.fmu import table_of
 from hybridsep.fmi.tables import grouped_table
 from hybridsep.fmi.terminals import TERMINALS
 from hybridsep.machines.machine import Machine
+from hybridsep.machines.sections import Section, entries
 
 __all__ = ["FMUS", "pages"]
 
@@ -265,41 +265,53 @@ def _described(one: Any) -> str:
     return text + (" Required." if one.required else "")
 
 
-def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, list[str]]]:
+def _sections(section: type[Section], path: str) -> Iterator[tuple[str, list[str]]]:
     """Yield each section's path and tables, its own before those inside it."""
     rows, inner = [], []
-    for name, field in model.model_fields.items():
-        entry = field.alias or name
-        below = list(_models(field.annotation))
+    for entry, field in entries(section).items():
         place = f"{path}.{entry}" if path else entry
-        if below:
-            inner.append((place, below))
+        if "settings" in field.metadata or "sections" in field.metadata:
+            inner.append((place, field.metadata))
             if place in _OWN:
                 rows.append((f"`{entry}`", "table", "", _OWN[place]))
         else:
-            rows.append(_entry(entry, place, field))
-    yield path, [_table(("entry", "type, unit", "if left out", "meaning"), rows)] if rows else []
-    for place, below in inner:
-        if len(below) == 1:
-            yield from _sections(below[0], place)
+            rows.append(_entry(entry, place, field.default, field.metadata))
+    yield path, [_entries_table(rows)] if rows else []
+    for place, found in inner:
+        if "settings" in found:
+            settings = found["settings"].items()
+            yield place, [_entries_table(_setting(entry, f"{place}.{entry}", one) for entry, (_, one) in settings)]
+        elif len(found["sections"]) == 1:
+            yield from _sections(found["sections"][0], place)
         else:
             tables = []
-            for one in below:
-                kind = get_args(one.model_fields["kind"].annotation)[0]
+            for one in found["sections"]:
+                [kind] = entries(one)["kind"].metadata["choices"]
                 tables += [f'`kind = "{kind}"`:', *next(_sections(one, place))[1]]
             yield place, tables
 
 
-def _entry(entry: str, place: str, field: Any) -> tuple[str, str, str, str]:
-    parameter = None if place.startswith("log.") else _parameter(entry, place)
-    default = "required" if field.is_required() else _shown(field.default)
-    if place.startswith("compensator.") and field.default is None:
-        default = "as `[predictor]`" if entry in _PREDICTOR else "automatic"
+def _entries_table(rows: Iterable[tuple[str, ...]]) -> str:
+    return _table(("entry", "type, unit", "if left out", "meaning"), rows)
+
+
+def _setting(entry: str, place: str, parameter: Parameter) -> tuple[str, str, str, str]:
+    """Return the row of an entry of ``[predictor]`` or ``[compensator]``."""
+    row = _entry(entry, place, parameter.default, {"parameter": parameter})
+    if place.startswith("compensator.") and _LIBRARY.get(entry) is None:
+        row = (*row[:2], "automatic" if entry in _LIBRARY else "as `[predictor]`", row[3])
+    return row
+
+
+def _entry(entry: str, place: str, default: Any, found: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    default = "required" if default is MISSING else _shown(default)
+    parameter = found.get("parameter")
     if parameter is None:
-        items = [str(item) for item in get_args(field.annotation)] if get_origin(field.annotation) is Literal else []
+        items = [str(item) for item in found.get("choices", ())]
         return (
             f"`{entry}`",
-            " or ".join(f"`{item}`" for item in items) or ("true or false" if field.annotation is bool else "text"),
+            " or ".join(f"`{item}`" for item in items)
+            or ("true or false" if default in ("`true`", "`false`") else "text"),
             default,
             _OWN.get(place) or _OWN[entry],
         )
@@ -309,27 +321,12 @@ def _entry(entry: str, place: str, field: Any) -> tuple[str, str, str, str]:
     return f"`{entry}`", f"{kind}{unit}{span}", default, _OWN.get(place) or parameter.description
 
 
-def _parameter(entry: str, place: str) -> Parameter | None:
-    if place.startswith(("predictor.", "compensator.")) and entry in _PREDICTOR:
-        return _PREDICTOR[entry]  # the plant's noise_std has another meaning
-    return _DECLARED.get(entry)
-
-
 def _shown(value: Any) -> str:
     if value is None:
         return "none"
     if value == () or value == "":
         return "empty"
     return f"`{str(value).lower() if isinstance(value, bool) else value}`"
-
-
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the sections that an annotation names, inside tuples and unions too."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    if get_origin(annotation) in (Annotated, Union, UnionType, tuple):
-        return [one for part in get_args(annotation) for one in _models(part)]
-    return []
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
@@ -342,5 +339,5 @@ def _page(parts: Iterable[str]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-_PREDICTOR = PredictorSettings.fmi_parameters()
-_DECLARED = {**PARAMETERS, **Limits.parameters()}
+_LIBRARY = {one.name: one.default for one in fields(CompensatorSettings)}
+"""Defaults of a compensator's settings in the library; None: automatic."""

@@ -28,9 +28,8 @@ from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.run import Run
-from hybridsep.machines.machine import Machine
+from hybridsep.machines.machine import Machine, machine_from_table
 from hybridsep.machines.paper import PAPER_SETTINGS
-from hybridsep.machines.sections import CompensatorSection
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
@@ -79,13 +78,12 @@ CASES = {
 
 def with_the_papers_settings(machine: Machine) -> Machine:
     """Return a machine that compensates with the settings of its ``[predictor]``."""
-    section = CompensatorSection.model_validate(PAPER_SETTINGS["spring_mass_damper"])
-    return machine.model_copy(update={"compensator": section})
+    return machine_from_table({**machine.table, "compensator": PAPER_SETTINGS["spring_mass_damper"]})
 
 
 def with_settings(machine: Machine, **changes: float) -> Machine:
     """Return a machine that compensates with other entries of its ``[compensator]``."""
-    return machine.model_copy(update={"compensator": machine.compensator.model_copy(update=changes)})
+    return machine.changed("compensator", changes)
 
 
 def as_published(machine: Machine) -> Machine:
@@ -121,7 +119,7 @@ def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, f
     pairs = [loops.run(machine, r, "hybrid", s, 2) for s in seeds]
     report.most("hybrid, cold", mean_rms([pair[0] for pair in pairs]), 6.5)
     report.most("hybrid, warm", mean_rms([pair[1] for pair in pairs]), 5.2)
-    settings = recommended.compensator.model_dump(by_alias=True, exclude_unset=True)
+    settings = recommended.table["compensator"]
     report.title("2  staircase, recommended settings " + ", ".join(f"{k} = {v:g}" for k, v in settings.items()))
     pairs = [loops.run(recommended, r, "hybrid", s, 2) for s in seeds]
     cold, warm = mean_rms([pair[0] for pair in pairs]), mean_rms([pair[1] for pair in pairs])

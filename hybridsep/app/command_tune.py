@@ -175,7 +175,7 @@ def _write_machine(
 
     best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
     sources = dict.fromkeys((*best.sources, *changes(read.findings)))
-    best = best.model_copy(update={"sources": tuple(sources)} if sources else {})
+    best = best.changed("", {"sources": tuple(sources)} if sources else {})
     comment = f"Settings of [predictor] from hybridsep tune on {', '.join(Path(name).name for name in read.pieces)}."
     with written_text(out) as file:
         file.write(machine_text(best, [comment]))

@@ -28,7 +28,7 @@ DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 errors_console = Console(stderr=True, emoji=False, markup=False, highlight=False)
 
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
-"""What an option takes, by the beginning of a type of pydantic's errors."""
+"""What an option takes, by the beginning of a type of typer's errors."""
 
 
 class Commands(TyperGroup):
@@ -39,13 +39,13 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            from pydantic import ValidationError
-
             if type(error).__name__ == "MissingParameter" and getattr(error.param, "name", "") == "machine":
                 error.message = _machine_files(sys.argv[2:])
             cause = error.__cause__
-            if isinstance(cause, ValidationError):  # in older versions of typer the message has the value
-                first = cause.errors()[0]
+            if (
+                type(cause).__name__ == "ValidationError"
+            ):  # pydantic's; in older versions of typer the message has the value
+                [first, *_] = cause.errors()  # type: ignore[union-attr]
                 wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
                 error.message = f"{wanted}, got {brief(first['input'])}"
             raise

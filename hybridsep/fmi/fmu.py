@@ -110,10 +110,10 @@ def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[st
     if model == "ReferenceTrajectory":
         return {"trajectory": 0, "T_s": machine.T_s}, ()
     assert machine.plant is not None  # by fmu_names
-    parameters: dict[str, object] = machine.plant.model_dump(exclude={"kind", "mode"})
+    parameters: dict[str, object] = machine.plant.values("kind", "mode")
     if isinstance(machine.plant, FeedDriveSection):
         assert machine.physics.spring_mass_damper is not None  # by Machine
-        return parameters | machine.physics.spring_mass_damper.model_dump(), ()
+        return parameters | machine.physics.spring_mass_damper.values(), ()
     identified = isinstance(machine.plant, IdentifiedSection)
     chosen = {
         "friction_on": "command" if isinstance(machine.plant, IdentifiedSection) else machine.plant.friction_on,

@@ -5,11 +5,11 @@ An invalid file is refused with a message that names the file, the entry, what w
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-from pydantic import Field, ValidationError, model_validator
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.data_files import data_folder
 from ..base.errors import MachineError, ParameterError, brief, first_line, listed
@@ -19,91 +19,107 @@ from ..plants.feed_drive import FeedDrive
 from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import (
-    CompensatorSection,
+    COMPENSATOR,
+    PREDICTOR,
     DriveLimitsSection,
     FeedDriveSection,
     IdentifiedSection,
     LimitsSection,
-    Line,
     LogSection,
-    Number,
     Physics,
-    PredictorSection,
+    PlantSection,
     Section,
     StageSection,
+    choice_entry,
+    line_entry,
+    lines_entry,
+    name_entry,
+    parameter_entry,
+    plant_entry,
+    read_section,
+    section_entry,
 )
-from .toml import read_toml
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs neither
     from ..compensate.compensator import SepCompensator
     from ..predict.predictor import HybridPredictor
 
-__all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
-
-NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]{0,99}$"
-"""Names of machines; they become parts of FMUs' names, of which importers make names of files."""
-
-_PLACE_MAX = 60
-"""Largest length of an entry's name in a message; the known ones are shorter."""
+__all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
 
+@dataclass(frozen=True, kw_only=True)
 class Machine(Section):
-    """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad."""
+    """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad.
 
-    name: str = Field(pattern=NAME_PATTERN)
-    title: Line
-    sources: tuple[Line, ...] = Field(default=(), min_length=1)
-    T_s: Number = PARAMETERS["T_s"].default
-    unit: Literal["m", "rad"] = "m"
-    physics: Physics
-    predictor: PredictorSection = PredictorSection()
-    compensator: CompensatorSection = CompensatorSection()
-    plant: Annotated[FeedDriveSection | StageSection | IdentifiedSection, Field(discriminator="kind")] | None = None
-    limits: LimitsSection | None = None
-    drive_limits: DriveLimitsSection | None = None
-    log: LogSection = LogSection()
+    ``predictor`` and ``compensator`` are the entries that were given, by the names of the settings' fields.
+    """
 
-    @model_validator(mode="after")
-    def _plant_fits_physics(self) -> Machine:
+    name: str = name_entry()
+    title: str = line_entry()
+    sources: tuple[str, ...] = lines_entry()
+    T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
+    unit: str = choice_entry("m", "rad", default="m")
+    physics: Physics = section_entry(Physics)
+    predictor: Mapping[str, Any] = PREDICTOR
+    compensator: Mapping[str, Any] = COMPENSATOR
+    plant: PlantSection | None = plant_entry()
+    limits: LimitsSection | None = section_entry(LimitsSection, None)
+    drive_limits: DriveLimitsSection | None = section_entry(DriveLimitsSection, None)
+    log: LogSection = section_entry(LogSection, LogSection())
+
+    def __repr__(self) -> str:
+        settings = self.predictor_settings
+        shown = {"T_s": self.T_s, **{name: getattr(settings, name) for name in ("Np", "p", "q")}}
+        return f"Machine({self.name!r}, {', '.join(f'{name} = {value!r}' for name, value in shown.items())})"
+
+    def check(self) -> None:
+        """Raise ParameterError if plant and physics, or the compensator's entries, are inconsistent."""
+        self._check_plant()
+        if self.drive_limits is not None or "compensator" in self.table:
+            self._check_compensator()
+
+    def _check_plant(self) -> None:
         if isinstance(self.plant, FeedDriveSection) and self.physics.spring_mass_damper is None:
-            raise ValueError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
+            raise ParameterError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
-            raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
+            raise ParameterError("a plant of kind stage needs [[physics.mode]] entries")
         if isinstance(self.plant, FeedDriveSection | StageSection):
             kind = self.plant.kind
             if self.unit != "m":
-                raise ValueError(f"a machine with a plant of kind {kind} must have unit = 'm': it is a linear axis")
+                raise ParameterError(f"a machine with a plant of kind {kind} must have unit = 'm': it is a linear axis")
             if self.physics.dead_time:
-                raise ValueError(f"a machine with a plant of kind {kind} must have physics.dead_time = 0: it has none")
+                raise ParameterError(
+                    f"a machine with a plant of kind {kind} must have physics.dead_time = 0: it has none"
+                )
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
-        return self
 
-    @model_validator(mode="after")
-    def _compensator_fits(self) -> Machine:
-        if self.drive_limits is None and "compensator" not in self.model_fields_set:
-            return self  # no compensator is configured
-        problems, Np = [], self._entry("Np")
-        for fit in (self._compensator_plans, lambda: self._compensation().for_window(Np)):
-            try:
-                fit()
-            except ParameterError as error:
-                problems.append(str(error))
-        if problems:
-            inherited = [name for name in ("Np", "p", "q") if getattr(self.compensator, name) is None]
-            origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
-            raise ValueError(f"compensator: {'; '.join(problems)}{origin}")
-        return self
-
-    def _compensator_plans(self) -> None:
+    def _check_compensator(self) -> None:
         """Raise ParameterError if the compensator's predictor is out of range, or cannot plan by its own entries.
 
         A delay of the predictor's is refused where a compensator is made: the file may be for a predictor alone.
         """
-        settings = self.compensator_predictor
-        if "measurement_delay" in self.compensator.given():
-            settings.check_planning()
+        problems, Np = [], {**self.predictor, **self.compensator}.get("Np", PredictorSettings().Np)
+        try:
+            settings = self.compensator_predictor
+            if "measurement_delay" in self.compensator:
+                settings.check_planning()
+        except ParameterError as error:
+            problems.append(str(error))
+        try:
+            self._compensation().for_window(Np)
+        except ParameterError as error:
+            problems.append(str(error))
+        if problems:
+            inherited = [name for name in ("Np", "p", "q") if name not in self.compensator]
+            origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
+            raise ParameterError(f"compensator: {'; '.join(problems)}{origin}")
 
     @property
     def model(self) -> ModalModel:
@@ -111,42 +127,42 @@ class Machine(Section):
         smd = self.physics.spring_mass_damper
         if smd is not None:
             return ModalModel.spring_mass_damper(smd.m, smd.c, smd.k, self.physics.dead_time)
-        return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
+        return ModalModel([Mode(**mode.values()) for mode in self.physics.mode], self.physics.dead_time)
 
     @property
     def plant_model(self) -> ModalModel:
         """Linear part of the plant: ``G_pb``, or an identified plant's own modes."""
         if isinstance(self.plant, IdentifiedSection) and self.plant.mode:
-            return ModalModel([Mode(**mode.model_dump()) for mode in self.plant.mode], self.physics.dead_time)
+            return ModalModel([Mode(**mode.values()) for mode in self.plant.mode], self.physics.dead_time)
         return self.model
 
     @property
     def predictor_settings(self) -> PredictorSettings:
         """Settings of the predictor."""
-        return PredictorSettings(**self.predictor.given(), **self._sampling)
+        return PredictorSettings(**self.predictor, **self._sampling)
 
     @property
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: the predictor's where the section has none."""
         own = self._compensator_entries(PredictorSettings)
-        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling)
+        return PredictorSettings(**{**self.predictor, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
         return self._compensation().for_window(self.compensator_predictor.Np)
 
-    def changed(self, section: Literal["predictor", "compensator"], values: Mapping[str, Any]) -> Machine:
-        """Return a copy with other entries of a section, by their names in the file.
+    def changed(self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]) -> Machine:
+        """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
 
         Raises
         ------
         ParameterError
             If they are out of range or inconsistent.
         """
-        table = self.model_dump(by_alias=True, exclude_unset=True)
-        table[section] = {**table.get(section, {}), **values}
-        return machine_from_table(table)
+        if section:
+            values = {section: {**self.table.get(section, {}), **values}}
+        return machine_from_table({**self.table, **values})
 
     def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
@@ -183,10 +199,10 @@ class Machine(Section):
             raise MachineError(
                 f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
-        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed", "mode"}), **changes}
+        values = {**self.plant.values("kind", "noise_std", "seed", "mode"), **changes}
         if isinstance(self.plant, FeedDriveSection):
-            assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
-            return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
+            assert self.physics.spring_mass_damper is not None  # by _check_plant
+            return FeedDrive(**self.physics.spring_mass_damper.values(), **values)
         if isinstance(self.plant, IdentifiedSection):
             values = {"input_hold": self.physics.input_hold, **values}
         return StageDrive(self.plant_model, **values, T_s=self.T_s)
@@ -222,11 +238,6 @@ class Machine(Section):
     def _sampling(self) -> dict[str, Any]:
         return {"T_s": self.T_s, "input_hold": self.physics.input_hold}
 
-    def _entry(self, name: str) -> Any:
-        """Return an entry of the compensator's section, by default the predictor's."""
-        own = getattr(self.compensator, name)
-        return getattr(self.predictor, name) if own is None else own
-
     def _compensation(self) -> CompensatorSettings:
         limits, change_max = self.command_limits()
         own = self._compensator_entries(CompensatorSettings)
@@ -235,7 +246,7 @@ class Machine(Section):
     def _compensator_entries(self, kind: type[Settings]) -> dict[str, Any]:
         """Return the entries of the compensator's section that are fields of one class of settings."""
         names = kind.parameters()
-        return {name: value for name, value in self.compensator.given().items() if name in names}
+        return {name: value for name, value in self.compensator.items() if name in names}
 
     def trajectory_limits(self) -> Limits:
         """Return the limits of the reference trajectory.
@@ -247,13 +258,13 @@ class Machine(Section):
         """
         if self.limits is None:
             raise MachineError(f"machine {self.name} has no [limits] section")
-        return Limits(**self.limits.model_dump())
+        return Limits(**self.limits.values())
 
     def command_limits(self) -> tuple[Limits | None, float | None]:
         """Return the drive's limits and the bound on the change of the command, m; None without ``[drive_limits]``."""
         if self.drive_limits is None:
             return None, None
-        return Limits(**self.drive_limits.model_dump(exclude={"change_max", "estimated"})), self.drive_limits.change_max
+        return Limits(**self.drive_limits.values("change_max", "estimated")), self.drive_limits.change_max
 
 
 def machine_names() -> list[str]:
@@ -298,7 +309,7 @@ def load_machine(machine: str | Path) -> Machine:
     """
     path = machine_path(machine)
     try:
-        content = read_toml(path)
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {first_line(error)}") from error
     try:
@@ -309,32 +320,8 @@ def load_machine(machine: str | Path) -> Machine:
 
 def machine_from_table(content: Mapping[str, Any]) -> Machine:
     """Return the machine of a file's content, its tables as mappings; ParameterError if it is invalid."""
-    try:
-        return Machine(**content)
-    except ValidationError as error:
-        raise ParameterError(listed(error.errors(), _describe, "; ")) from error
-    except TypeError as error:
-        raise ParameterError(first_line(error)) from error
-
-
-def _describe(problem: Any) -> str:
-    """Return the message for one of pydantic's errors: entry, what was expected, what was found."""
-    steps = [step for step in problem["loc"] if step not in ("feed_drive", "stage", "identified")]
-    where = ""
-    for step in steps:
-        where += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if where else str(step)
-    where = where if len(where) <= _PLACE_MAX and where.isprintable() else brief(where)
-    kind = problem["type"]
-    if kind == "tuple_type" and where.endswith(".mode"):
-        return f"{where} must be a list of modes: write [[{where}]], with double brackets"
-    if kind == "union_tag_not_found":
-        return f"{where}.kind is missing: feed_drive, stage or identified"
-    if kind == "string_pattern_mismatch" and where != "name":
-        return f"{where} must be one line of printable text that XML 1.0 allows, got {brief(problem['input'])}"
-    if kind == "missing":
-        return f"{where} is missing"
-    if kind == "extra_forbidden":
-        return f"{where} is not an entry of a machine file; check its spelling"
-    if kind == "value_error":
-        return f"{where}: {problem['ctx']['error']}" if where else str(problem["ctx"]["error"])
-    return f"{where}: {problem['msg']}, got {brief(problem.get('input'))}"
+    problems: list[str] = []
+    machine = read_section(Machine, content, "", problems)
+    if machine is None:
+        raise ParameterError(listed(problems, str, "; "))
+    return machine

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from ..base.errors import ParameterError, brief
-from .machine import NAME_PATTERN
+from .sections import NAME_PATTERN
 
 __all__ = ["checked_name", "machine_name"]
 

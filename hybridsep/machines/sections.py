@@ -1,211 +1,404 @@
-"""Sections of a machine file; their entries' ranges come from :mod:`hybridsep.base.settings`."""
+"""Sections of a machine file: their entries, with the ranges of :mod:`hybridsep.base.settings`, and how one is read."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
-
+from ..base.errors import ParameterError, brief
 from ..base.parameters import Parameter
-from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
+from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
 
 __all__ = [
-    "CompensatorSection",
+    "COMPENSATOR",
+    "NAME_PATTERN",
+    "PREDICTOR",
     "DriveLimitsSection",
-    "Entries",
     "FeedDriveSection",
     "IdentifiedSection",
     "LimitsSection",
-    "Line",
     "LogSection",
-    "Number",
+    "ModeSection",
     "Physics",
-    "PredictorSection",
+    "PlantSection",
     "Section",
     "SpringMassDamper",
     "StageSection",
+    "choice_entry",
+    "entries",
+    "line_entry",
+    "lines_entry",
+    "name_entry",
+    "parameter_entry",
+    "plant_entry",
+    "read_section",
+    "section_entry",
 ]
 
+NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]{0,99}"
+"""Names of machines; they become parts of FMUs' names, of which importers make names of files."""
+
+_LINE = re.compile("[^\x00-\x1f\x7f\ufffe\uffff]+")
+"""One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
+
+_LINE_WORDS = "one line of printable text that XML 1.0 allows"
+
+_PLACE_MAX = 60
+"""Largest length of an entry's name in a message; the known ones are shorter."""
 
 _DECLARED = {**PARAMETERS, **Limits.parameters()}
 """Parameters by the names of their entries; a drive's and a trajectory's limits have the range of the compensator's."""
 
+_S = TypeVar("_S", bound="Section")
 
-def _checked(value: Any, info: ValidationInfo) -> Any:
-    """Check an entry against the parameter of its name."""
-    name = str(info.field_name)
-    return _DECLARED[name].checked(value, name)
-
-
-Number = Annotated[float, BeforeValidator(_checked)]
-Whole = Annotated[int, BeforeValidator(_checked)]
-
-Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
-"""One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
+Read = Callable[[Any, str, list[str]], Any]
+"""Reader of an entry: its value, its place in the file and the list of problems → what the section has of it."""
 
 
-class Section(BaseModel):
-    """Table of a machine file; unknown entries are refused."""
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """Table of a machine file; unknown entries are refused.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    Attributes
+    ----------
+    table : mapping
+        The entries that were given, plain values in their types.
+    """
 
+    table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
-class ModeSection(Section):
-    """One mode of eq. (15)."""
+    def values(self, *without: str) -> dict[str, Any]:
+        """Return all entries but some, by the names of the fields."""
+        return {name: getattr(self, name) for name in entries(type(self)) if name not in without}
 
-    f_n: Number
-    zeta: Number
-    alpha: Number
-    beta: Number = 0.0
-
-
-class SpringMassDamper(Section):
-    """Eq. (11)."""
-
-    m: Number
-    c: Number
-    k: Number
+    def check(self) -> None:
+        """Raise ParameterError if entries that are in their ranges are inconsistent."""
 
 
-class Physics(Section):
-    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
-
-    mode: tuple[ModeSection, ...] = ()
-    spring_mass_damper: SpringMassDamper | None = None
-    dead_time: Whole = PARAMETERS["dead_time"].default
-    input_hold: Literal["zoh", "foh"] = "zoh"
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Physics:
-        if bool(self.mode) == (self.spring_mass_damper is not None):
-            raise ValueError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
-        return self
+def entries(kind: type[Section]) -> dict[str, Any]:
+    """Return the fields of a section that are entries of the file."""
+    return {one.name: one for one in fields(kind) if "read" in one.metadata}
 
 
-def _validator(parameter: Parameter) -> BeforeValidator:
-    def checked(value: Any) -> Any:
-        return parameter.checked(value)
-
-    return BeforeValidator(checked)
-
-
-def _settings_section(settings: type[Settings], *, inherits: bool = False) -> dict[str, Any]:
-    """Return pydantic fields for a section, by the names of the settings' fields.
+def read_section(kind: type[_S], table: Any, place: str, problems: list[str]) -> _S | None:
+    """Return a section of a file's table.
 
     Parameters
     ----------
-    settings : type of Settings
-    inherits : bool
-        Whether a missing entry is taken from another section.
+    kind : type of Section
+    table : mapping
+    place : str
+        Path of the section in the file; empty for the file itself.
+    problems : list of str
+        What is wrong is appended to; then there is no section.
     """
-    entries: dict[str, Any] = {}
-    for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
-        if parameter is not None and field.name not in settings.ELSEWHERE:
-            default = None if inherits else field.default
-            kind: Any = parameter.kind if default is not None else parameter.kind | None
-            kind = Annotated[kind, _validator(parameter)]
-            alias = None if parameter.name == field.name else parameter.name
-            entries[field.name] = (kind, Field(default=default, alias=alias))
-    return entries
+    if not isinstance(table, Mapping):
+        problems.append(f"{place} must be a table, got {brief(table)}")
+        return None
+    known, before = entries(kind), len(problems)
+    _refuse_unknown(table, known, place, problems)
+    values, given = {}, {}
+    for name, one in known.items():
+        where = f"{place}.{name}" if place else name
+        if table.get(name) is not None:
+            values[name] = one.metadata["read"](table[name], where, problems)
+            given[name] = _plain(values[name])
+        elif one.default is MISSING and one.default_factory is MISSING:
+            problems.append(f"{where} is missing")
+    if len(problems) > before:
+        return None
+    section = kind(**values, table=given)
+    try:
+        section.check()
+    except ParameterError as error:
+        problems.append(f"{place}: {error}" if place else str(error))
+        return None
+    return section
 
 
-class Entries(Section):
-    """A section whose entries may be left out."""
-
-    def given(self) -> dict[str, Any]:
-        """Return the entries that the file has or that have a default, by the names of their fields."""
-        return self.model_dump(exclude_none=True)
-
-
-class _PredictorEntries(Entries):
-    @model_validator(mode="after")
-    def _lags_fit(self) -> _PredictorEntries:
-        PredictorSettings(**self.given())
-        return self
+def _refuse_unknown(table: Mapping[str, Any], known: Mapping[str, Any], place: str, problems: list[str]) -> None:
+    for name in table:
+        if name not in known:
+            where = f"{place}.{name}" if place else str(name)
+            where = where if len(where) <= _PLACE_MAX and where.isprintable() else brief(where)
+            problems.append(f"{where} is not an entry of a machine file; check its spelling")
 
 
-if TYPE_CHECKING:  # no checker of types follows create_model
+def _plain(value: Any) -> Any:
+    """Return what a section has as plain values."""
+    if isinstance(value, Section):
+        return dict(value.table)
+    if isinstance(value, _Settings):
+        return value.table
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
+    return value
 
-    class PredictorSection(Entries):  # noqa: D101
-        ...
 
-    class CompensatorSection(Entries):  # noqa: D101
-        ...
+# Entries -----------------------------------------------------------------------------------------------------------
 
-else:
-    PredictorSection = create_model(
-        "PredictorSection",
-        __base__=_PredictorEntries,
-        __doc__="Parameters of the hybrid predictor.",
-        **_settings_section(PredictorSettings),
+
+def _entry(read: Read, default: Any = MISSING, **more: Any) -> Any:
+    return field(default=default, metadata={"read": read, **more})
+
+
+def parameter_entry(name: str, default: Any = MISSING) -> Any:
+    """Declare an entry that has the range of a parameter."""
+    parameter = _DECLARED[name]
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        return _checked(parameter, value, name, place, problems)
+
+    return _entry(read, default, parameter=parameter)
+
+
+def _checked(parameter: Parameter, value: Any, label: str, place: str, problems: list[str]) -> Any:
+    try:
+        return parameter.checked(value, label)
+    except ParameterError as error:
+        problems.append(f"{place}: {error}")
+
+
+def _text_entry(allows: Callable[[Any], bool], what: str, default: Any = MISSING, **more: Any) -> Any:
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        if not allows(value):
+            problems.append(f"{place} must be {what}, got {brief(value)}")
+        return value
+
+    return _entry(read, default, **more)
+
+
+def _is_line(value: Any) -> bool:
+    return isinstance(value, str) and _LINE.fullmatch(value) is not None
+
+
+def name_entry() -> Any:
+    """Declare the entry of a machine's name."""
+    return _text_entry(
+        lambda value: isinstance(value, str) and re.fullmatch(NAME_PATTERN, value) is not None,
+        "a letter, then at most 99 letters, digits and _",
     )
-    CompensatorSection = create_model(
-        "CompensatorSection",
-        __base__=Entries,
-        __doc__="Parameters of the compensator; the predictor's count where they are left out.",
-        **{**_settings_section(PredictorSettings, inherits=True), **_settings_section(CompensatorSettings)},
-    )
 
 
+def line_entry(default: Any = MISSING) -> Any:
+    """Declare an entry of one line of text."""
+    return _text_entry(_is_line, _LINE_WORDS, default)
+
+
+def lines_entry() -> Any:
+    """Declare an entry that is a list of lines, none by default."""
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        if not isinstance(value, list | tuple) or not value:
+            problems.append(f"{place} must be a list of lines of text, got {brief(value)}")
+            return ()
+        for i, line in enumerate(value, 1):
+            if not _is_line(line):
+                problems.append(f"{place}[{i}] must be {_LINE_WORDS}, got {brief(line)}")
+        return tuple(value)
+
+    return _entry(read, ())
+
+
+def choice_entry(*choices: str, default: Any = MISSING) -> Any:
+    """Declare an entry that is one of some words."""
+    return _text_entry(lambda value: value in choices, " or ".join(choices), default, choices=choices)
+
+
+def _flag_entry(default: bool) -> Any:
+    return _text_entry(lambda value: isinstance(value, bool), "true or false", default)
+
+
+def section_entry(kind: type[Section], default: Any = MISSING) -> Any:
+    """Declare an entry that is a section."""
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        return read_section(kind, value, place, problems)
+
+    return _entry(read, default, sections=(kind,))
+
+
+def _modes_entry() -> Any:
+    """Declare an entry that is a list of modes, none by default."""
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        if not isinstance(value, list | tuple):
+            problems.append(f"{place} must be a list of modes: write [[{place}]], with double brackets")
+            return ()
+        return tuple(read_section(ModeSection, one, f"{place}[{i}]", problems) for i, one in enumerate(value, 1))
+
+    return _entry(read, (), sections=(ModeSection,))
+
+
+class _Settings(dict[str, Any]):
+    """Settings that were given, by the names of their fields; ``table`` by their entries."""
+
+    table: dict[str, Any]
+
+
+def _settings_entry(known: Mapping[str, Parameter], check: Callable[[dict[str, Any]], object]) -> Any:
+    """Declare an entry that is a section of settings: field → value, of those that are given."""
+    by_entry = {parameter.name: (name, parameter) for name, parameter in known.items()}
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        if not isinstance(value, Mapping):
+            problems.append(f"{place} must be a table, got {brief(value)}")
+            return _Settings()
+        before = len(problems)
+        _refuse_unknown(value, by_entry, place, problems)
+        found, found.table = _Settings(), {}
+        for entry, (name, parameter) in by_entry.items():
+            if value.get(entry) is not None:
+                found[name] = found.table[entry] = _checked(
+                    parameter, value[entry], entry, f"{place}.{entry}", problems
+                )
+        if len(problems) == before:
+            try:
+                check(found)
+            except ParameterError as error:
+                problems.append(f"{place}: {error}")
+        return found
+
+    return field(default_factory=dict, metadata={"read": read, "settings": by_entry})
+
+
+# Sections ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeSection(Section):
+    """One mode of eq. (15)."""
+
+    f_n: float = parameter_entry("f_n")
+    zeta: float = parameter_entry("zeta")
+    alpha: float = parameter_entry("alpha")
+    beta: float = parameter_entry("beta", 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringMassDamper(Section):
+    """Eq. (11)."""
+
+    m: float = parameter_entry("m")
+    c: float = parameter_entry("c")
+    k: float = parameter_entry("k")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Physics(Section):
+    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
+
+    mode: tuple[ModeSection, ...] = _modes_entry()
+    spring_mass_damper: SpringMassDamper | None = section_entry(SpringMassDamper, None)
+    dead_time: int = parameter_entry("dead_time", PARAMETERS["dead_time"].default)
+    input_hold: str = parameter_entry("input_hold", "zoh")
+
+    def check(self) -> None:
+        """Raise ParameterError unless there is one of both."""
+        if bool(self.mode) == (self.spring_mass_damper is not None):
+            raise ParameterError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
+
+
+@dataclass(frozen=True, kw_only=True)
 class FeedDriveSection(Section):
     """The drive of eq. (13); its linear part is ``[physics.spring_mass_damper]``."""
 
-    kind: Literal["feed_drive"]
-    c_nl: Number = PARAMETERS["c_nl"].default
-    k_nl: Number = PARAMETERS["k_nl"].default
-    noise_std: Number = PARAMETERS["noise_std"].default
-    seed: Whole = PARAMETERS["seed"].default
+    kind: str = choice_entry("feed_drive")
+    c_nl: float = parameter_entry("c_nl", PARAMETERS["c_nl"].default)
+    k_nl: float = parameter_entry("k_nl", PARAMETERS["k_nl"].default)
+    noise_std: float = parameter_entry("noise_std", PARAMETERS["noise_std"].default)
+    seed: int = parameter_entry("seed", PARAMETERS["seed"].default)
 
 
+@dataclass(frozen=True, kw_only=True)
 class StageSection(Section):
     """The stage: ``[[physics.mode]]`` with friction and cable stiffness on the command."""
 
-    kind: Literal["stage"]
-    f: Number = PARAMETERS["f"].default
-    kappa: Number = PARAMETERS["kappa"].default
-    friction_on: Literal["command", "motion"] = "command"
-    noise_std: Number = PARAMETERS["noise_std"].default
-    seed: Whole = PARAMETERS["seed"].default
+    kind: str = choice_entry("stage")
+    f: float = parameter_entry("f", PARAMETERS["f"].default)
+    kappa: float = parameter_entry("kappa", PARAMETERS["kappa"].default)
+    friction_on: str = parameter_entry("friction_on", "command")
+    noise_std: float = parameter_entry("noise_std", PARAMETERS["noise_std"].default)
+    seed: int = parameter_entry("seed", PARAMETERS["seed"].default)
 
 
+@dataclass(frozen=True, kw_only=True)
 class IdentifiedSection(Section):
     """A plant to try with, no measurement: modes, by default ``[physics]``'s, and the disturbances of a log."""
 
-    kind: Literal["identified"]
-    f: Number = PARAMETERS["f"].default
-    kappa: Number = PARAMETERS["kappa"].default
-    v_friction: Number = PARAMETERS["v_friction"].default
-    noise_std: Number = PARAMETERS["noise_std"].default
-    seed: Whole = PARAMETERS["seed"].default
-    mode: tuple[ModeSection, ...] = ()
+    kind: str = choice_entry("identified")
+    f: float = parameter_entry("f", PARAMETERS["f"].default)
+    kappa: float = parameter_entry("kappa", PARAMETERS["kappa"].default)
+    v_friction: float = parameter_entry("v_friction", PARAMETERS["v_friction"].default)
+    noise_std: float = parameter_entry("noise_std", PARAMETERS["noise_std"].default)
+    seed: int = parameter_entry("seed", PARAMETERS["seed"].default)
+    mode: tuple[ModeSection, ...] = _modes_entry()
 
 
+PlantSection = FeedDriveSection | StageSection | IdentifiedSection
+
+_PLANTS: Mapping[str, type[PlantSection]] = {
+    "feed_drive": FeedDriveSection,
+    "stage": StageSection,
+    "identified": IdentifiedSection,
+}
+
+
+def plant_entry() -> Any:
+    """Declare the entry of a plant, whose section its ``kind`` names; none by default."""
+
+    def read(value: Any, place: str, problems: list[str]) -> Any:
+        kind = value.get("kind") if isinstance(value, Mapping) else None
+        if kind is None or kind not in _PLANTS:
+            said = "is missing:" if kind is None else f"must not be {brief(kind)}, but"
+            problems.append(f"{place}.kind {said} {', '.join(_PLANTS)}")
+            return None
+        return read_section(_PLANTS[kind], value, place, problems)
+
+    return _entry(read, None, sections=tuple(_PLANTS.values()))
+
+
+@dataclass(frozen=True, kw_only=True)
 class LimitsSection(Section):
     """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
 
-    velocity: Number
-    acceleration: Number
-    jerk: Number
+    velocity: float = parameter_entry("velocity")
+    acceleration: float = parameter_entry("acceleration")
+    jerk: float = parameter_entry("jerk")
 
 
+@dataclass(frozen=True, kw_only=True)
 class DriveLimitsSection(LimitsSection):
     """Limits of the drive for the modified command, wider than the trajectory's; ``estimated``: from a log's motion."""
 
-    change_max: Number = PARAMETERS["change_max"].default
-    estimated: bool = False
+    change_max: float = parameter_entry("change_max", PARAMETERS["change_max"].default)
+    estimated: bool = _flag_entry(False)
 
 
-class LogSection(Entries):
+@dataclass(frozen=True, kw_only=True)
+class LogSection(Section):
     """How a recorded log is read; as by :func:`hybridsep.logs.log.open_log` where an entry is left out."""
 
-    t: str | None = None
-    x_d: str | None = None
-    x: str | None = None
-    unit: str | None = None
-    axis: str | None = None
+    t: str | None = line_entry(None)
+    x_d: str | None = line_entry(None)
+    x: str | None = line_entry(None)
+    unit: str | None = line_entry(None)
+    axis: str | None = line_entry(None)
 
     @property
     def columns(self) -> dict[str, str]:
         """Names of the columns by role."""
-        return {name: value for name, value in self.given().items() if name in ("t", "x_d", "x")}
+        return {name: value for name, value in self.table.items() if name in ("t", "x_d", "x")}
+
+
+def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, Parameter]:
+    return {name: one for name, one in settings.parameters().items() if name not in settings.ELSEWHERE}
+
+
+PREDICTOR = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
+"""Parameters of the hybrid predictor."""
+
+COMPENSATOR = _settings_entry({**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None)
+"""Parameters of the compensator; the predictor's count where they are left out."""

@@ -25,8 +25,7 @@ def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: b
     annotated : bool
         Whether each entry says what it is, besides its unit.
     """
-    table = machine.model_dump(by_alias=True, exclude_unset=True, exclude_none=True)
-    table.setdefault("T_s", machine.T_s)
+    table = {**machine.table, "T_s": machine.T_s}
     head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
     lines = [*head, *_entries(table, annotated)]
     for name, value in table.items():

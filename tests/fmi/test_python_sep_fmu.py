@@ -215,7 +215,7 @@ def needs_nothing_else(path: Path, folder: Path) -> None:
     """Import an FMU's slave where NumPy and SciPy are all there is of what the library needs."""
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder)
-    absent: Sequence[str] = ("hybridsep", "ruckig", "pydantic", "matplotlib", "fmpy", "control", "typer", "rich")
+    absent: Sequence[str] = ("hybridsep", "ruckig", "matplotlib", "fmpy", "control", "typer", "rich")
     script = f"""
 import importlib, sys
 sys.modules.update(dict.fromkeys({absent!r}))

@@ -127,7 +127,7 @@ def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> 
 @pytest.mark.slow
 def test_windows_that_no_short_run_can_show_have_no_reference(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
-    large = machine.model_copy(update={"predictor": machine.predictor.model_copy(update={"Np": 1001})})
+    large = machine.changed("predictor", {"Np": 1001})
     path = build_fmu(large, "HybridPredictor", tmp_path, targets=("host",))
     with zipfile.ZipFile(path) as archive:
         files = archive.namelist()

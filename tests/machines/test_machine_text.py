@@ -8,8 +8,7 @@ import pytest
 
 from hybridsep import load_machine, machine_names
 from hybridsep.base.settings import PARAMETERS
-from hybridsep.machines.machine import Machine
-from hybridsep.machines.sections import Physics, SpringMassDamper
+from hybridsep.machines.machine import machine_from_table
 from hybridsep.machines.text import machine_text
 
 
@@ -23,8 +22,8 @@ def test_a_written_machine_is_read_again(name: str, tmp_path: Path) -> None:
 
 
 def test_text_with_quotes_and_no_sources(tmp_path: Path) -> None:
-    physics = Physics(spring_mass_damper=SpringMassDamper(m=2.0, c=30.0, k=2e4))
-    machine = Machine(name="a", title='the "old" axis \\ Y', physics=physics)
+    physics = {"spring_mass_damper": {"m": 2.0, "c": 30.0, "k": 2e4}}
+    machine = machine_from_table({"name": "a", "title": 'the "old" axis \\ Y', "physics": physics})
     path = tmp_path / "axis.toml"
     path.write_text(machine_text(machine), encoding="utf-8")
     assert load_machine(path) == machine

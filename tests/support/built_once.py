@@ -95,7 +95,7 @@ class BuiltFmus:
         """
         own, flavour, fmi = _FMUS[name]
         machine = machine or own
-        content = machine.model_dump_json().encode() + (weights.read_bytes() if weights else b"")
+        content = repr(machine.table).encode() + (weights.read_bytes() if weights else b"")
         folder = self.folder / hashlib.sha256(content).hexdigest()[:16]
         targets = ("host",) if flavour == "native" else None
 
