@@ -42,10 +42,8 @@ class Commands(TyperGroup):
             if type(error).__name__ == "MissingParameter" and getattr(error.param, "name", "") == "machine":
                 error.message = _machine_files(sys.argv[2:])
             cause = error.__cause__
-            if (
-                type(cause).__name__ == "ValidationError"
-            ):  # pydantic's; in older versions of typer the message has the value
-                [first, *_] = cause.errors()  # type: ignore[union-attr]
+            if type(cause).__name__ == "ValidationError":  # of typer's converter; older versions name the value
+                first = cause.errors()[0]  # type: ignore[union-attr]
                 wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
                 error.message = f"{wanted}, got {brief(first['input'])}"
             raise

@@ -105,7 +105,9 @@ def test_a_nested_header_in_an_npz(hybridsep: Run, tmp_path: Path, n: int) -> No
     with zipfile.ZipFile(log, "w") as archive:
         for name, member in (members | {"t.npy": deep_header(n)}).items():
             archive.writestr(name, member)
-    assert "log.npz: column 't' is truncated, damaged or not an array" in refusal(hybridsep, "backtest", log, "-m", MACHINE)
+    assert "log.npz: column 't' is truncated, damaged or not an array" in refusal(
+        hybridsep, "backtest", log, "-m", MACHINE
+    )
 
 
 # What nobody foresaw -----------------------------------------------------------------------------------------------
