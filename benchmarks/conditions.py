@@ -15,20 +15,15 @@ RMS is against the measured position.
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
-
 import numpy as np
+from random_drives.generator import SEED, random_drives
+from random_drives.simulation import simulate as simulate_many
 
-from benchmarks.random_drives.generator import SEED, random_drives
-from benchmarks.random_drives.simulation import simulate as simulate_many
 from benchmarks.trust import SEEDS, Case, cases, simulated
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings

@@ -1,6 +1,6 @@
 """``hybridsep fit`` over logs of several machines, judged on their second halves beside what needs no hybrid.
 
-    python benchmarks/fit.py [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
+    python -m benchmarks.fit [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
 
 RMS of the second half, which is held out, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
 the first half by least squares, and its last residual held over the window; the physics model's last residual held;
@@ -13,15 +13,10 @@ better by 2 %.
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 from hybridsep.base.errors import HybridSepError
 from hybridsep.evaluate.verdict import ALIKE

@@ -1,6 +1,6 @@
 """Coverage of the intervals ``x_h ± z·x_h_std`` of the predictor with trust.
 
-    python benchmarks/intervals.py [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1] [--cache FILE]
+    python -m benchmarks.intervals [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1] [--cache FILE]
 
 Percent of the measured positions within the intervals of 50, 90 and 95 %, over the whole window and over each third of
 it: of the warm runs of ``benchmarks/trust.py``, and pooled over cold runs of random drives.
@@ -9,19 +9,13 @@ it: of the warm runs of ``benchmarks/trust.py``, and pooled over cold runs of ra
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
-
 import numpy as np
 
-from benchmarks.random_drives.cache import read_positions
-from benchmarks.random_drives.generators import GENERATORS
+from benchmarks.random_drives import GENERATORS, read_positions
 from benchmarks.trust import cases
 from hybridsep.base.metrics import coverage
 from hybridsep.base.signals import Array
@@ -39,9 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--n", type=int, default=0, help="number of random drives")
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="modal", help="of the random drives")
     parser.add_argument("--seed", type=int, help="the generator's own if left out")
-    parser.add_argument(
-        "--cache", type=Path, help="file (.npz) of positions that benchmarks.random_drives.run has written"
-    )
+    parser.add_argument("--cache", type=Path, help="file (.npz) of positions that benchmarks.random_drives has written")
     chosen = parser.parse_args(arguments)
     print(f"{'% within 50, 90, 95 %':40}" + "".join(f"{part:>22}" for part in THIRDS))
     for name, error, std in warm_runs(chosen.emps):

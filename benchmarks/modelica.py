@@ -9,21 +9,17 @@ makes their own error of integration vanish. The exit code is 1 if a limit is mi
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
-
 import numpy as np
 import rumoca
 
-from benchmarks.common import Array
 from hybridsep.base.data_files import data_folder
+from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_name
 from hybridsep.machines.machine import load_machine

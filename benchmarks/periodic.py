@@ -1,6 +1,6 @@
 """Benchmark of a drive whose force repeats with the position, predicted with its period known and unknown.
 
-    python benchmarks/periodic.py
+    python -m benchmarks.periodic
 
 RMS error of the hybrid in µm on random moves, cold, and in a second run with other moves from another start. The drive
 is the staircase's without its cubic terms, plus a force that moves its position of rest by a sine of the position; the
@@ -10,12 +10,6 @@ noise is 1 µm.
 from __future__ import annotations
 
 import math
-import os
-import sys
-from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 import numpy as np
 from rich.console import Console

@@ -1,6 +1,6 @@
 """Paper's model and predictor with trust beside the physics model and the hold, cold and warm.
 
-    python benchmarks/trust.py [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
+    python -m benchmarks.trust [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
 
 RMS of the prediction error against the measured position, µm, over the whole run from its first sample. A warm run goes
 on with what the cold one has learned, under other noise; over a recording it is a second pass. The stage's friction
@@ -12,14 +12,9 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 import numpy as np
 

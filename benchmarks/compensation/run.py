@@ -1,6 +1,6 @@
 """Benchmark of compensation with the paper's model: tracking errors in closed loop, with and without it, beside peers.
 
-    python benchmarks/compensation/run.py [--seeds 5] [--first-seed 0] [--fmu native|python|none]
+    python -m benchmarks.compensation.run [--seeds 5] [--first-seed 0] [--fmu native|python|none]
 
 SepCompensator FMU against FeedDrive FMU, or with ``--fmu none`` the library's compensator and plant with the same
 timing. Tracking RMS of the true position in µm, mean over the seeds; a warm run is the second one, with the weights
@@ -10,20 +10,15 @@ kept. Each figure has its limit beside it; the exit code is 1 if one is missed.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from contextlib import ExitStack
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
 import numpy as np
 
 from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops, paper_machine
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
-from benchmarks.compensation.report import Report
 from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
@@ -33,6 +28,31 @@ from hybridsep.machines.paper import PAPER_SETTINGS
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
+
+__all__ = ["Report"]
+
+
+@dataclass
+class Report:
+    """Prints figures beside their limits and remembers those that are missed."""
+
+    missed: list[str] = field(default_factory=list)
+
+    def title(self, text: str) -> None:
+        """Begin a table."""
+        print(f"\n{text}")
+
+    def line(self, name: str, figure: float, limit: str = "", held: bool = True, note: str = "") -> None:
+        """Print a figure; remember it if its limit is not held."""
+        verdict = "" if not limit else "ok" if held else "MISSED"
+        print(f"  {name:<52}{figure:9.2f}  {limit:<18}{verdict:<8}{note}")
+        if not held:
+            self.missed.append(f"{name}: {figure:.2f} µm, {limit}")
+
+    def most(self, name: str, figure: float, limit: float, note: str = "") -> None:
+        """Print a figure that must not exceed its limit."""
+        self.line(name, figure, f"at most {limit:.2f}", figure <= limit, note)
+
 
 UM = 1e6
 STAGE_SHARES = (1 / 2, 2 / 3)

@@ -1,6 +1,6 @@
 """Benchmark of compensation with the trusted model, by the settings of the machine files.
 
-    python benchmarks/compensation/trusted.py [--seeds 1] [--first-seed 0] [--only TEXT]      (15 minutes a seed)
+    python -m benchmarks.compensation.trusted [--seeds 1] [--first-seed 0] [--only TEXT]      (15 minutes a seed)
 
 Tracking RMS of the true position in µm, cold and warm, mean over the seeds, beside the physics model's plans and the
 limits; the exit code is 1 if one is missed. The stage's friction follows the command, or the actual velocity.
@@ -9,21 +9,15 @@ limits; the exit code is 1 if one is missed. The stage's friction follows the co
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
 import numpy as np
 
 from benchmarks.compensation.loops import Case, LibraryLoops
-from benchmarks.compensation.report import Report
-from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, excess
+from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, Report, excess
 from benchmarks.trust import circle, random_moves, short_staircase, with_friction_on
 from hybridsep.base.metrics import largest
 from hybridsep.base.signals import Array

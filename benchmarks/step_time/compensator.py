@@ -20,8 +20,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
-
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instructions, longest_step, timed, warm
 from hybridsep.base.settings import CompensatorSettings, Limits
 from hybridsep.cosim.loop import cosimulate

@@ -15,8 +15,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from random_drives.generator import RandomDrive, random_drives
 
-from benchmarks.random_drives.generator import RandomDrive, random_drives
 from benchmarks.targets.targets import C_SOURCES, FLOAT32, core_sources, include_options
 
 WINDOWS = (20, 100)

@@ -1,7 +1,7 @@
 """Limit of one BLAS thread for sequences of small matrix operations.
 
 More threads are slower, above all on busy cores, and change the order of summation, so that results would depend on
-the number of cores; ``benchmarks/blas_threads.py`` measures both.
+the number of cores.
 """
 
 from __future__ import annotations

@@ -66,7 +66,9 @@ def test_commands_and_tests_on_the_page_exist() -> None:
     commands = re.findall(r"`((?:python|pytest) [^`]+)`", PAGE)
     assert len(commands) > 8
     for command in commands:
-        _, path, *options = re.sub(r"-m benchmarks\.(\w+)", r"benchmarks/\1.py", command).split()
+        _, path, *options = re.sub(
+            r"-m (benchmarks\S+)", lambda name: f"{name[1].replace('.', '/')}.py", command
+        ).split()
         text = (ROOT / path).read_text(encoding="utf-8")
         for option in options:
             if options[0] == "-k" and option != "-k":

@@ -21,7 +21,7 @@ from hybridsep.intake.relation import shifted
 from hybridsep.logs.log import Log, read_log
 
 SPOILED = ("staircase", pytest.param("cnc_a_axis2.csv", marks=pytest.mark.nightly))
-"""Logs that every fault is made in; ``benchmarks/intake.py`` does so in more."""
+"""Logs that every fault is made in."""
 
 MACHINES = {"staircase": "spring_mass_damper", "stage x": "als25010_x", "EMPS": "emps"}
 

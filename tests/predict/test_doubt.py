@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from random_drives.generator import RandomDrive, random_drives
+from random_drives.simulation import simulate
 from trusted_cases import PERIOD, cycles, friction, physics, run, trusted, trusted_model
 
-from benchmarks.random_drives.generator import RandomDrive, random_drives
-from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS

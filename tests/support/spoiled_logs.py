@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import staircase_data
 from places import EMPS, RECORDINGS
+from random_drives.generator import random_drive
 
-from benchmarks.random_drives.generator import random_drive
 from hybridsep import load_machine, simulate, spiral
 from hybridsep.base.signals import Array
 from hybridsep.intake.relation import shifted

@@ -1,6 +1,6 @@
 """Constants of the residual model with trust: all of them, each with its reason and the experiment that chose it.
 
-The C core's header is generated from here. ``benchmarks/ablation.py`` switches each rule off; its tables are in
+The C core's header is generated from here. ``benchmarks/ablation`` switches each rule off; its tables are in
 ``docs/experiments``. Constants were chosen on the recordings ``cnc_a_*`` and ``xl330_sin_sin_*``, the simulated cases
 and drives of one seed; other recordings and seeds judge.
 """

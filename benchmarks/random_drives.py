@@ -1,0 +1,193 @@
+"""Benchmark of trust: the predictor replayed on random nonlinear drives whose physics model is 20 or 40 % wrong.
+
+    python -m benchmarks.random_drives [--n 1000] [--faults] [--predictor default] [--core] [--cache FILE]
+    python -m benchmarks.random_drives --generator two_mass [--peers] …
+
+Drives are of 1 to 4 modes with a model 20 % wrong, at 1 kHz, or of two masses in a cascaded position loop with a model
+40 % wrong, at 250 Hz to 8 kHz. RMS against the measured position over the whole run, relative to the physics model
+alone, to the hold (the physics model plus the last measured residual, in every window from the first) and with
+``--peers`` to the best of hold and two ARX models in hindsight.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from random_drives import generator as modal
+from random_drives.drive import Drive
+from random_drives.faults import FAULTS, JITTER
+from random_drives.replay import PREDICTORS, FaultyReplay, Replay, library_replay, replay, replay_faults
+from two_mass import generator as two_mass
+
+from hybridsep.base.signals import Array
+
+__all__ = ["GENERATORS", "Generator", "print_faults", "print_replays", "read_positions", "write_positions"]
+
+
+@dataclass(frozen=True)
+class Generator:
+    """A generator of random drives.
+
+    Attributes
+    ----------
+    seed, n, chunk : int
+        Seed and number of the drives that figures are given for; drives of one task.
+    true_positions : callable
+        Returns the true positions, m, of drives, from their indices and ``seed=``.
+    drives_at : callable
+        Returns drives from their indices, true positions and seed.
+    """
+
+    seed: int
+    n: int
+    chunk: int
+    true_positions: Callable[..., list[Array]]
+    drives_at: Callable[[Sequence[int], Sequence[Array], int], Sequence[Drive]]
+
+
+GENERATORS = {
+    "modal": Generator(modal.SEED, 1000, modal.CHUNK, modal.true_positions, modal.drives_at),
+    "two_mass": Generator(two_mass.SEED, 250, two_mass.CHUNK, two_mass.true_positions, two_mass.drives_at),
+}
+
+
+def write_positions(path: Path, generator: str, seed: int, positions: Sequence[Array]) -> None:
+    """Write the true positions, m, of the first drives of a generator and a seed."""
+    np.savez(path, generator=generator, seed=seed, lengths=[len(x) for x in positions], x=np.concatenate(positions))
+
+
+def read_positions(path: Path, generator: str, seed: int, n: int) -> list[Array] | None:
+    """Return the true positions of the first ``n`` drives; None if the file is missing or of others."""
+    if not path.exists():
+        return None
+    with np.load(path) as data:
+        made_by = str(data["generator"]), int(data["seed"])
+        if made_by != (generator, seed) or len(data["lengths"]) < n:
+            return None
+        return np.split(data["x"], np.cumsum(data["lengths"])[:-1])[:n]
+
+
+QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.995, 1.0)
+N_WORST = 10
+UM = 1e6
+
+
+def print_replays(replays: Sequence[Replay], predictor: str) -> None:
+    """Print ratios of RMS errors, over all drives and by kind of trajectory, and the worst drives."""
+    print(f"{len(replays)} random drives, predictor: {predictor}")
+    quantiles = (0.01, 0.1, 0.5, 0.9, 0.99)
+    print(f"RMS at quantiles of {', '.join(f'{q:g}' for q in quantiles)}, µm")
+    for name in ("rms_pb", "rms_hold", "rms_h"):
+        values = _quantiles([getattr(r, name) for r in replays], quantiles)
+        print(f"  {name:9}" + "".join(f"{UM * value:12.4g}" for value in values))
+    columns = ("mean", "median", "90 %", "95 %", "99 %", "99.5 %", "max", "> 1.02", "> 1.10")
+    print(f"{'ratio to (mean: geometric)':28}" + "".join(f"{column:>9}" for column in columns))
+    _print_ratios("physics", [r.ratio for r in replays])
+    _print_ratios("hold", [r.hold_ratio for r in replays])
+    if any(r.rms_arx for r in replays):
+        _print_ratios("best of hold, ARX20, ARX40", [r.peer_ratio for r in replays])
+    for kind in sorted({r.kind for r in replays}):
+        group = [r.ratio for r in replays if r.kind == kind]
+        _print_ratios(f"physics, {kind} ({len(group)})", group)
+    print(f"diverged: {sum(r.diverged for r in replays)}")
+    print("worst:")
+    for r in sorted(replays, key=lambda r: -r.ratio)[:N_WORST]:
+        print(f"  {r.ratio:.4g} × physics {UM * r.rms_pb:.3g} µm, {r.hold_ratio:.3g} × hold: drive {r.index}, {r.text}")
+
+
+def print_faults(replays: Sequence[FaultyReplay]) -> None:
+    """Print the ratios after each fault, and the largest change of the prediction."""
+    print("after a fault of the sensor, ratio to physics (jitter: to the run without)")
+    print("change: largest |x_h − x_pb| above 2 × the largest residual of the sound measurement")
+    columns = ("median", "90 %", "99 %", "max", "> 1.05", "> 1.10", "change", "refused")
+    print(f"{'fault':28}" + "".join(f"{column:>10}" for column in columns))
+    for fault in FAULTS:
+        group = [r for r in replays if r.fault == fault]
+        ratios, changes = np.array([r.ratio for r in group]), np.array([r.change for r in group])
+        values = [f"{value:.3g}" for value in _quantiles(ratios, (0.5, 0.9, 0.99, 1.0))]
+        values += [_share(ratios, 1.05), _share(ratios, 1.10), _share(changes, 2.0), str(sum(r.refused for r in group))]
+        print(f"{fault:28}" + "".join(f"{value:>10}" for value in values))
+    jittered = [r for r in replays if r.fault == JITTER]
+    own = np.array([r.own_noise for r in jittered])
+    print(
+        f"the run without jitter, judged by the jittered samples: {_share(own, 1.10)} above 1.10, max {own.max():.3g};"
+    )
+    beyond = np.array([r.ratio for r in jittered]) / own
+    print(f"  jitter relative to that: {_share(beyond, 1.10)} above 1.10, max {beyond.max():.3g}")
+    true = np.array([r.true_ratio for r in jittered])
+    print(f"  both judged by the samples without jitter: {_share(true, 1.10)} above 1.10, max {true.max():.3g}")
+
+
+def _print_ratios(name: str, ratios: Sequence[float]) -> None:
+    values = np.array(ratios)
+    quantiles = "".join(f"{value:9.3g}" for value in _quantiles(values, QUANTILES))
+    mean = float(np.exp(np.mean(np.log(values))))
+    print(f"{name:28}{mean:9.3g}{quantiles}{_share(values, 1.02):>9}{_share(values, 1.10):>9}")
+
+
+def _quantiles(values: Sequence[float] | Array, quantiles: Sequence[float]) -> Array:
+    """Return quantiles that are values; infinite ones count as the largest."""
+    return np.quantile(values, quantiles, method="inverted_cdf")
+
+
+def _share(values: Array, limit: float) -> str:
+    return f"{100 * np.mean(~(values <= limit)):.2f} %"
+
+
+Results = tuple[list[Replay], list[FaultyReplay]]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--generator", choices=tuple(GENERATORS), default="modal", help="of the drives")
+    parser.add_argument("--seed", type=int, help="the generator's own if left out")
+    parser.add_argument("--n", type=int, help="number of drives, 1000 or 250")
+    parser.add_argument("--faults", action="store_true", help="with each fault of the sensor too")
+    parser.add_argument("--predictor", choices=tuple(PREDICTORS), default="default")
+    parser.add_argument("--core", action="store_true", help="the C core instead of the library")
+    parser.add_argument("--peers", action="store_true", help="beside ARX models of 20 and 40 lags, too")
+    parser.add_argument("--cache", type=Path, help="file (.npz) of simulated positions, written if there is none")
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    chosen = parser.parse_args(arguments)
+    generator = GENERATORS[chosen.generator]
+    seed = generator.seed if chosen.seed is None else chosen.seed
+    n = generator.n if chosen.n is None else chosen.n
+    size = min(generator.chunk, -(-n // chosen.processes))
+    groups = [range(i, min(i + size, n)) for i in range(0, n, size)]
+    with ProcessPoolExecutor(chosen.processes, get_context("spawn")) as pool:
+        x = read_positions(chosen.cache, chosen.generator, seed, n) if chosen.cache else None
+        if x is None:
+            x = [one for group in pool.map(partial(generator.true_positions, seed=seed), groups) for one in group]
+            if chosen.cache:
+                write_positions(chosen.cache, chosen.generator, seed, x)
+        chosen.seed = seed
+        task = partial(_results, chosen=chosen)
+        results = list(pool.map(task, groups, [x[group.start : group.stop] for group in groups]))
+    print_replays([replayed for group, _ in results for replayed in group], chosen.predictor)
+    if chosen.faults:
+        print_faults([replayed for _, group in results for replayed in group])
+
+
+def _results(indices: range, x: Sequence[Array], *, chosen: argparse.Namespace) -> Results:
+    """Return the results of drives whose true positions are known."""
+    run = library_replay
+    if chosen.core:
+        from random_drives.replay import core_replay as run
+    drives, predictor = GENERATORS[chosen.generator].drives_at(indices, x, chosen.seed), chosen.predictor
+    faulty = (
+        [one for drive in drives for one in replay_faults(drive, chosen.seed, predictor, run)] if chosen.faults else []
+    )
+    return [replay(drive, predictor, run, peers=chosen.peers) for drive in drives], faulty
+
+
+if __name__ == "__main__":
+    main()

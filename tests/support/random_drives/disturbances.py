@@ -1,0 +1,144 @@
+"""Random nonlinearities of a drive: friction, backlash, cubic stiffness, cogging, drift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from random_drives.drive import Draws
+
+__all__ = ["Disturbances", "random_disturbances"]
+
+PRESLIDING_SLOPE = 2.0
+"""Largest stiffness of the presliding friction relative to the drive's: rolling guides are below 1."""
+
+CUBIC_SHARE = 0.05
+"""Largest effect of the cubic stiffness relative to the stroke."""
+
+COGGING_SLOPE = 0.05
+"""Largest amplitude of the cogging relative to its pitch: a stiffness of 0.3 of the drive's."""
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Nonlinearities as equivalent offsets of the command, m; zero where there is none.
+
+    Attributes
+    ----------
+    at_command : bool
+        Whether they offset the command, and so pass through its zeros, or act as a force on the modes.
+    coulomb : float, m
+        Sliding friction.
+    static : float
+        Friction at low velocity (Stribeck), relative to the sliding friction.
+    v_stribeck : float, m/s
+    presliding : float, m
+        Distance over which friction builds up (Dahl).
+    bristle : float
+        Deflection at the start, relative to its limit.
+    cubic, range, centre : float, m
+        Offset at ``range`` from ``centre``; positions relative to the start.
+    cogging, pitch : float, m
+        Amplitude and period.
+    phase : float
+        Of the cogging at the start, periods.
+    drift : float, m
+        Final drift of the position.
+    time_constant : float, s
+        Of the drift.
+    play, command_play : float, m
+        Backlash behind the drive and before it.
+    play_start : float
+        Place within the backlash at the start, −1 to 1.
+    """
+
+    at_command: bool = False
+    coulomb: float = 0.0
+    static: float = 1.0
+    v_stribeck: float = 1e-3
+    presliding: float = 1e-5
+    bristle: float = 0.0
+    cubic: float = 0.0
+    range: float = 1e-3
+    centre: float = 0.0
+    cogging: float = 0.0
+    pitch: float = 1e-2
+    phase: float = 0.0
+    drift: float = 0.0
+    time_constant: float = 1.0
+    play: float = 0.0
+    command_play: float = 0.0
+    play_start: float = 0.0
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Names of the nonlinearities that there are."""
+        present = {
+            "friction": self.coulomb,
+            "backlash": self.play + self.command_play,
+            "cubic": self.cubic,
+            "cogging": self.cogging,
+            "drift": self.drift,
+        }
+        return tuple(kind for kind, size in present.items() if size)
+
+    @property
+    def text(self) -> str:
+        """Description with sizes in µm."""
+        sizes = {
+            "friction": self.coulomb,
+            "backlash": self.play,
+            "backlash of the command": self.command_play,
+            "cubic": self.cubic,
+            "cogging": self.cogging,
+            "drift": self.drift,
+        }
+        parts = [f"{name} {1e6 * size:.3g} µm" for name, size in sizes.items() if size]
+        place = "offset of the command" if self.at_command else "force"
+        return f"{', '.join(parts)} ({place})" if parts else "linear"
+
+
+def random_disturbances(draws: Draws, stroke: float, in_antiphase: bool) -> Disturbances:
+    """Return a random mixture; one in ten drives is linear.
+
+    Parameters
+    ----------
+    draws : Draws
+    stroke : float, m
+        Of the trajectory.
+    in_antiphase : bool
+        Whether modes are in antiphase. A stiffness that offsets the command would make such a drive oscillate by
+        itself, so it acts as a force there.
+    """
+    if draws.chance(0.1):
+        return Disturbances()
+    level = draws.log_uniform(1e-7, 4e-4)
+    values: dict[str, float] = {}
+
+    def size() -> float:
+        return level * draws.log_uniform(0.3, 1.0)
+
+    if draws.chance(0.7):
+        coulomb = size()
+        values |= {
+            "coulomb": coulomb,
+            "static": draws.uniform(1.0, 1.6),
+            "v_stribeck": draws.log_uniform(5e-4, 2e-2),
+            "presliding": max(draws.log_uniform(1e-6, 5e-5), coulomb / PRESLIDING_SLOPE),
+            "bristle": draws.uniform(-1.0, 1.0) if draws.chance(0.5) else 0.0,
+        }
+    if draws.chance(0.3):
+        behind = draws.chance(0.5)
+        values |= {"play" if behind else "command_play": min(size(), 1e-4), "play_start": draws.uniform(-1.0, 1.0)}
+    if draws.chance(0.3):
+        values |= {
+            "cubic": draws.sign() * min(size(), CUBIC_SHARE * stroke),
+            "range": stroke,
+            "centre": draws.uniform(-1.0, 1.0) * stroke,
+        }
+    if draws.chance(0.35):
+        pitch = draws.log_uniform(1e-3, 3e-2)
+        values |= {"cogging": min(size(), COGGING_SLOPE * pitch), "pitch": pitch, "phase": draws.uniform(0.0, 1.0)}
+    if draws.chance(0.3):
+        values |= {"drift": draws.sign() * min(size(), 1e-4), "time_constant": draws.log_uniform(2.0, 100.0)}
+    at_command = draws.chance(0.5) and not in_antiphase
+    return Disturbances(at_command=at_command, **values)
