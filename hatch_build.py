@@ -57,8 +57,7 @@ class ReleaseHook(BuildHookInterface[Any]):
         """Return the libraries: path → place; none where they cannot be compiled."""
         try:
             from hybridsep.fmi.c_header import KINDS
-            from hybridsep.fmi.compiler import TARGETS
-            from hybridsep.fmi.libraries import chosen_targets, library_paths
+            from hybridsep.fmi.compile import TARGETS, chosen_targets, library_paths
 
             targets = chosen_targets()
             with self._lively(f"libraries of the native FMUs for {', '.join(targets) or 'no platform'}"):

@@ -19,9 +19,9 @@ from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import CompensatorSettings
-from hybridsep.fmi.fmu import table_of
-from hybridsep.fmi.tables import grouped_table
-from hybridsep.fmi.terminals import TERMINALS
+from hybridsep.fmi.description import TERMINALS
+from hybridsep.fmi.pages import grouped_table
+from hybridsep.fmi.spec import table_of
 from hybridsep.machines.machine import Machine
 from hybridsep.machines.sections import Section, entries
 

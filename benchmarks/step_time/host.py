@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.compiler import compile_flags
-from hybridsep.fmi.fmu_table import FmuTable
+from hybridsep.fmi.compile import compile_flags
+from hybridsep.fmi.variables import FmuTable
 from hybridsep.fmi.weights import WEIGHTS_FILE, weights_file
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.feed_drive import FeedDrive

@@ -57,7 +57,7 @@ def backtest(
     """
     from ..fitting.advice import partly_used, whole_log_words
     from ..fitting.replay import replay_log
-    from ..fmi.warm_start import warm_predictor
+    from ..fmi.weights import warm_predictor
     from ..intake.finding import findings_table
     from ..intake.repair import changed_by
     from ..logs.log import Log

@@ -23,7 +23,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..fmi.libraries import Library
+    from ..fmi.compile import Library
     from ..machines.machine import Machine
 
     Job = tuple[Machine, str, str, str]
@@ -84,7 +84,7 @@ def build(
     The same machine gives the same bytes.
     """
     from ..fmi.archive import build_fmu
-    from ..fmi.libraries import library_paths, missing
+    from ..fmi.compile import library_paths, missing
     from ..fmi.twincat import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
     from .outputs import check_outputs
@@ -138,7 +138,7 @@ def _jobs_of(
 ) -> list[Job]:
     """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
     from ..fmi.archive import fmu_name, fmu_names
-    from ..fmi.libraries import check_available
+    from ..fmi.compile import check_available
     from ..machines.machine import load_machine, machine_names
 
     versions = versions_of(fmi, flavour)
@@ -168,9 +168,8 @@ def _jobs_of(
 
 def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
     """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
-    from ..fmi.compiler import expanded
-    from ..fmi.fmu import table_of
-    from ..fmi.libraries import default_targets
+    from ..fmi.compile import default_targets, expanded
+    from ..fmi.spec import table_of
 
     kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model, _ in jobs)
     return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
@@ -191,7 +190,7 @@ def _extras_of(
     Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them;
     ``windows=False`` for all that have windows.
     """
-    from ..fmi.warm_start import load_trained
+    from ..fmi.weights import load_trained
     from ..logs.log import check_reading
     from ..machines.agree import check_interval
     from ..plants.trajectory import read_trajectory

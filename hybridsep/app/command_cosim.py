@@ -73,7 +73,7 @@ def cosim(
     """
     from ..compensate.qp import limits_that_bind
     from ..cosim.loop import cosimulate
-    from ..fmi.builds import build_here
+    from ..fmi.archive import build_here
     from ..machines.machine import load_machine, machine_path
     from .outputs import RUNS, check_outputs
     from .progress import progress_bar
@@ -188,7 +188,7 @@ def _check_pair(
     from ..cosim.adapters import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
     from ..fmi.archive import fmu_names
-    from ..fmi.libraries import check_available
+    from ..fmi.compile import check_available
 
     models = fmu_names(axis, flavour).values()
     if plant is None and "FeedDrive" not in models:

@@ -35,7 +35,7 @@ def demo(
     from ..demo.cases import read_recorded
     from ..demo.demo import demo as run_demo
     from ..demo.demo import demo_files, processor_time
-    from ..fmi.builds import default_flavour
+    from ..fmi.archive import default_flavour
     from .log_intake import show
     from .outputs import check_outputs
     from .progress import progress_bar

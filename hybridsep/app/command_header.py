@@ -29,7 +29,7 @@ def header(
     """
     from ..base.output import written_text
     from ..fmi.axis_header import axis_header
-    from ..fmi.warm_start import load_trained
+    from ..fmi.weights import load_trained
     from ..machines.machine import load_machine, machine_path
     from .outputs import check_outputs
 

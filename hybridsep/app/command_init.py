@@ -68,9 +68,8 @@ def init(
 
     What no option says is asked.
     """
-    from ..fmi.archive import fmu_name
-    from ..fmi.builds import build_here, other_platforms
-    from ..fmi.libraries import check_available
+    from ..fmi.archive import build_here, fmu_name, other_platforms
+    from ..fmi.compile import check_available
     from ..identify.model import machine_of
     from ..machines.machine import load_machine
     from ..machines.text import machine_text

@@ -49,7 +49,7 @@ def report(
     from ..fitting.fit import SAMPLES_MAX, step_times
     from ..fitting.replay import Recording, replay
     from ..fitting.report import write_changes, write_errors, write_findings, write_use
-    from ..fmi.warm_start import warm_predictor
+    from ..fmi.weights import warm_predictor
     from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of

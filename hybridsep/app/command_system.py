@@ -52,8 +52,8 @@ def system(
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
-    from ..fmi.libraries import check_available
-    from ..fmi.system import build_system, check_system
+    from ..fmi.compile import check_available
+    from ..fmi.ssp import build_system, check_system
     from ..machines.machine import load_machine, machine_path
     from .outputs import check_outputs
     from .progress import progress_bar

@@ -18,7 +18,7 @@ from ..base.data_files import COMMANDS
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
-from ..fmi.compiler import TARGET_NAMES
+from ..fmi.compile import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
 __all__ = [

@@ -14,7 +14,7 @@ from ..cosim.run import Run
 from ..evaluate.backtest import backtest, replayed_run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
-from ..fmi.builds import build_pair
+from ..fmi.archive import build_pair
 from ..fmi.flavours import FMI_VERSIONS
 from ..logs.log import Log, read_log
 from ..machines.machine import load_machine

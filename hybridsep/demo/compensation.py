@@ -13,7 +13,7 @@ from ..base.settings import PARAMETERS
 from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
-from ..fmi.builds import build_here
+from ..fmi.archive import build_here
 from ..fmi.flavours import FMI_VERSIONS
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder

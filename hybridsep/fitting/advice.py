@@ -14,7 +14,7 @@ import numpy as np
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
-from ..fmi.builds import other_platforms
+from ..fmi.archive import other_platforms
 from ..identify.operation import LITTLE_MOTION
 from ..logs.log import Log
 from ..logs.units import Shown

@@ -1,12 +1,13 @@
 """FMU archives, reproducible byte for byte from the sources and the machine.
 
-The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` takes libraries of the C sources,
-:mod:`hybridsep.fmi.python_flavour` wraps this library.
+The content follows from the flavour: :mod:`hybridsep.fmi.native` takes libraries of the C sources,
+:mod:`hybridsep.fmi.python` wraps this library.
 """
 
 from __future__ import annotations
 
 import io
+import shlex
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,13 +18,22 @@ from numpy.typing import ArrayLike
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
-from ..fmi import native_flavour, python_flavour
+from ..fmi import native, python
 from ..machines.machine import Machine
-from .flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .fmu import Fmu
-from .warm_start import load_trained
+from .compile import ALL_TARGETS, default_targets, expanded, has_native
+from .flavours import FLAVOURS, FMI_VERSIONS, check_version, versions_of
+from .spec import Fmu
 
-__all__ = ["archived", "build_fmu", "fmu_name", "fmu_names"]
+__all__ = [
+    "archived",
+    "build_fmu",
+    "build_here",
+    "build_pair",
+    "default_flavour",
+    "fmu_name",
+    "fmu_names",
+    "other_platforms",
+]
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
@@ -92,7 +102,7 @@ def build_fmu(
     flavour : {"native", "python"}
         Flavour of the FMU.
     targets : sequence of str, optional
-        Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
+        Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compile.TARGET_NAMES`, ``"host"`` being this
         machine. If left out: all platforms where their libraries are there, else this machine.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
@@ -137,12 +147,16 @@ def build_fmu(
         raise FmuError("embed_weights is for a native FMU with weights")
     path = Path(out) / f"{name}.fmu"
     with written_whole(path) as file:
-        trained = None if weights is None else load_trained(weights, machine, model)
+        trained = None
+        if weights is not None:
+            from .weights import load_trained  # which loads slowly
+
+            trained = load_trained(weights, machine, model)
         fmu = Fmu.of(machine, model, name, fmi=fmi, samples=samples, trained=trained, origin=origin, windows=windows)
         if flavour == "native":
-            files = native_flavour.files(fmu, targets=targets, embed_weights=embed_weights)
+            files = native.files(fmu, targets=targets, embed_weights=embed_weights)
         else:
-            files = python_flavour.files(fmu)
+            files = python.files(fmu)
         file.write(archived(files))
     return path
 
@@ -163,3 +177,69 @@ def archived(files: Mapping[str, bytes]) -> bytes:
             how = zipfile.ZIP_STORED if arcname.endswith(_COMPRESSED) else zipfile.ZIP_DEFLATED
             archive.writestr(entry, files[arcname], how, _LEVEL)
     return file.getvalue()
+
+
+def default_flavour() -> str:
+    """Return the flavour of the demo's FMUs: native where their libraries can be had, Python otherwise."""
+    return "native" if has_native() else "python"
+
+
+def build_here(
+    machine: Machine,
+    model: str,
+    out: Path,
+    flavour: str,
+    *,
+    weights: Path | None = None,
+    fmi: str = FMI_VERSIONS[0],
+    origin: Mapping[str, Any] | None = None,
+) -> Path:
+    """Build one of a machine's FMUs, for this machine, or for all platforms where their libraries are there.
+
+    Parameters
+    ----------
+    machine, out, flavour, weights, origin
+        As in :func:`~hybridsep.fmi.archive.build_fmu`.
+    model : str
+        ``HybridPredictor``, ``FeedDrive``, …
+    fmi : str
+        Of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both versions the first one's path is returned.
+    """
+    paths = [
+        build_fmu(
+            *(machine, fmu_name(model, machine.name, flavour, version), out, flavour),
+            weights=weights,
+            fmi=version,
+            origin=origin,
+        )
+        for version in versions_of(fmi, flavour)
+    ]
+    return paths[0]
+
+
+def build_pair(machine: Machine, out: Path, flavour: str, fmi: str = FMI_VERSIONS[0]) -> tuple[Path, Path]:
+    """Build a machine's predictor and plant FMU; arguments as of :func:`build_here`."""
+    return (
+        build_here(machine, "HybridPredictor", out, flavour, fmi=fmi),
+        build_here(machine, "FeedDrive", out, flavour, fmi=fmi),
+    )
+
+
+def other_platforms(fmu: Path, machine: Path, weights: Path | None = None, fmi: str = FMI_VERSIONS[0]) -> str:
+    """Return which platforms a native FMU was built for here and the line that builds it for all; empty if it was.
+
+    Parameters
+    ----------
+    fmu, machine, weights : Path
+        The archive, its machine file, and what it has learned.
+    fmi : str
+        As in :func:`build_here`.
+    """
+    targets = expanded(default_targets())
+    if set(targets) == set(ALL_TARGETS):
+        return ""
+    line: list[object] = ["hybridsep", "build", fmu.stem, "--target", "all", "-m", machine]
+    line += [] if weights is None else ["--weights", weights]
+    line += ["--fmi", fmi] if fmi in FMI_VERSIONS[1:] else []
+    line += ["--out", fmu.parent]
+    return f"native FMUs are for {', '.join(targets)}; for all platforms: {shlex.join(map(str, line))}"

@@ -16,7 +16,9 @@ from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-__all__ = ["axis_header"]
+__all__ = [
+    "axis_header",
+]
 
 _PARTS = {"predictor": PREDICTOR_SETTINGS, "trust": TRUST_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
 

@@ -1,23 +1,44 @@
-"""C header ``hsep_fmu.h``: the interface of a kind of FMU, and in source FMUs the table of one of them.
+"""C header, sources and table of a native FMU, all from the table that modelDescription.xml is made of.
 
 FMUs of a kind differ in their GUID, the number of modes, the length of the windows and start values. In a source FMU
-the header has them; a library that serves all FMUs of a kind reads them from the resources
-(:mod:`hybridsep.fmi.table_file`). Both follow from the table that modelDescription.xml is made of.
+the header ``hsep_fmu.h`` has them; a library that serves all FMUs of a kind reads them from
+``resources/variables.bin``.
+
+Layout of that file, little-endian: ``HSEPVAR2``; as u64 the size of the file in bytes, the number of the kind's
+interface, the number of modes, whether the axis is rotary, and the samples of each window, 0 if it has none; the GUID
+in 48 bytes, filled with zeros; as float64 the start values of single variables and of the modes' numbers; the CRC-32 of
+all before as u64.
 """
 
 from __future__ import annotations
 
 import hashlib
+import struct
+import zlib
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 
-from .angular_units import angular_unit
+from ..base.data_files import data_folder
+from ..base.errors import FmuError
 from .flavours import FMI_VERSIONS
-from .fmu_table import FmuTable
-from .variables import INTERPOLATED, Value, Variable
+from .variables import INTERPOLATED, FmuTable, Value, Variable, angular_unit
 
-__all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "layout_of"]
+__all__ = [
+    "FMI_HEADERS",
+    "KINDS",
+    "TABLE_FILE",
+    "all_c",
+    "c_header",
+    "c_sources",
+    "fmi_headers",
+    "kind_header",
+    "layout_of",
+    "table_file",
+]
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)
@@ -44,7 +65,7 @@ _MACROS = {
 
 
 @dataclass(frozen=True)
-class Layout:
+class _Layout:
     """The parts of an FMU's table: single variables, then the modes' variables, then windows.
 
     Attributes
@@ -69,7 +90,7 @@ class Layout:
         return [float(variable.start or 0.0) for variable in (*self.scalars, *self.modes)]
 
 
-def layout_of(table: Sequence[Variable]) -> Layout:
+def layout_of(table: Sequence[Variable]) -> _Layout:
     """Return the parts of a table, which the C core finds by their places."""
     arrays: dict[str, list[Variable]] = defaultdict(list)
     for variable in table:
@@ -77,7 +98,7 @@ def layout_of(table: Sequence[Variable]) -> Layout:
         arrays[array if bracket else ""].append(variable)
     scalars, modes = arrays.pop("", []), arrays.pop("mode", [])
     windows = tuple(map(tuple, arrays.values()))
-    layout = Layout(tuple(scalars), tuple(modes), windows)
+    layout = _Layout(tuple(scalars), tuple(modes), windows)
     flat = [*layout.scalars, *layout.modes, *(sample for window in windows for sample in window)]
     assert flat == list(table), "single variables come first, then modes, then windows"
     assert len({len(window) for window in windows}) <= 1, "windows are of one length"
@@ -142,7 +163,7 @@ static const double hsep_starts[HSEP_N_STARTS] = {{
     return _header(table.kind, table.name, text)
 
 
-def interface_number(kind: str) -> int:
+def _interface_number(kind: str) -> int:
     """Return a number of 64 bits that tells the interface of a kind from all others, and from other versions'."""
     return int.from_bytes(hashlib.sha256(_interface(kind).encode()).digest()[:8], "little")
 
@@ -158,7 +179,7 @@ def _header(kind: str, whose: str, table: str) -> str:
 #include "hsep_model.h"
 
 #define HSEP_MODEL_{_MACROS[kind]} 1
-#define HSEP_INTERFACE UINT64_C(0x{interface_number(kind):016X}) /* of all below, up to the table of one FMU */
+#define HSEP_INTERFACE UINT64_C(0x{_interface_number(kind):016X}) /* of all below, up to the table of one FMU */
 {_interface(kind)}
 {table}
 #endif
@@ -242,3 +263,75 @@ def _double(value: float) -> str:
 
 def _string(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+FMI_HEADERS = {
+    "2": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    "3": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+"""Headers of each version of FMI, the one that includes the others first."""
+
+
+@cache
+def c_sources(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
+    """Return our C files by name, with ``all.c`` first; ``hsep_fmu.h`` and the FMI headers are not among them.
+
+    Parameters
+    ----------
+    versions : collection of str
+        Versions of FMI whose functions they have: a library has both, a source FMU its own.
+    """
+    root = data_folder("fmu_src") / "c"
+    others = [f"fmi{version}" for version in FMI_VERSIONS if version not in versions]
+    paths = sorted(path for path in root.rglob("*.[ch]") if path.parent.name not in ("examples", *others))
+    ours = {path.name: path.read_bytes() for path in paths}
+    return {"all.c": all_c([file for file in ours if file.endswith(".c")]).encode(), **ours}
+
+
+def all_c(files: Sequence[str]) -> str:
+    """Return the C file that includes all others, in which the FMI functions alone have external linkage."""
+    includes = "".join(f'#include "{file}"\n' for file in files)
+    return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI headers. */
+#define HSEP_API static inline /* see hsep_api.h */
+
+{includes}"""
+
+
+def fmi_headers(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
+    """Return the FMI headers for shared libraries, as fmpy carries them, with the line ends of a text file.
+
+    Raises
+    ------
+    FmuError
+        If fmpy is not installed.
+    """
+    found = find_spec("fmpy")
+    if found is None or found.origin is None:
+        raise FmuError("the FMI headers come with fmpy, which is not installed: pip install fmpy")
+    folder = Path(found.origin).parent / "c-code"
+    files = [file for version in versions for file in FMI_HEADERS[version]]
+    return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in files}
+
+
+TABLE_FILE = "variables.bin"
+_HEAD = struct.Struct("<8s5Q48s")
+_CHECKSUM = struct.Struct("<Q")
+_MAGIC = b"HSEPVAR2"
+
+
+def table_file(table: FmuTable, guid: str) -> bytes:
+    """Return the content of the file.
+
+    Parameters
+    ----------
+    table : FmuTable
+    guid : str
+        The modelDescription's.
+    """
+    layout = layout_of(table.variables)
+    starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
+    size = _HEAD.size + len(starts) + _CHECKSUM.size
+    n_modes = len(layout.modes) // 4
+    numbers = size, _interface_number(table.kind), n_modes, int(table.is_angular), layout.window
+    content = _HEAD.pack(_MAGIC, *numbers, guid.encode()) + starts
+    return content + _CHECKSUM.pack(zlib.crc32(content))

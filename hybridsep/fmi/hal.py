@@ -14,11 +14,8 @@ from ..base.data_files import data_folder
 from ..base.errors import ParameterError
 from ..machines.agree import check_drive_limits
 from ..machines.machine import Machine
-from .c_header import kind_header
-from .c_sources import c_sources
-from .content import content_guid
-from .fmu import table_of
-from .table_file import TABLE_FILE, table_file
+from .c_header import TABLE_FILE, c_sources, kind_header, table_file
+from .spec import content_guid, table_of
 
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import html
+import re
+from collections.abc import Iterable
 from pathlib import Path
 from string import Template
 
-from .content import fmu_title, paper_note
-from .fmi3_variables import fmi3_variables
-from .fmu import Fmu
-from .fmu_table import FmuTable
-from .related_files import AGREEMENT, RELATED_FOLDER
-from .tables import grouped_table
+from .description import fmi3_variables
+from .extras import AGREEMENT, RELATED_FOLDER
+from .spec import Fmu, fmu_title, paper_note
+from .variables import FmuTable, Variable
 
-__all__ = ["compile_note", "dependencies_note", "filled", "icon", "index_page", "reference_note"]
+__all__ = [
+    "compile_note",
+    "dependencies_note",
+    "filled",
+    "grouped_table",
+    "icon",
+    "index_page",
+    "reference_note",
+]
 
 _HERE = Path(__file__).parent
 
@@ -127,3 +135,45 @@ def reference_note(table: FmuTable) -> dict[str, bytes]:
 
 def _rows(group: list[tuple[str, str, str, str, str, str]]) -> str:
     return "\n".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in group)
+
+
+def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, str, str, str, str]]]:
+    """Return ``(name, type and unit, display unit, start, range, meaning)`` by heading; items with what they mean."""
+    groups: dict[str, list[tuple[str, str, str, str, str, str]]] = {}
+    for name, variable in _in_one_row(table).items():
+        pairs = enumerate(zip(variable.items, variable.item_meanings, strict=True))
+        items = ", ".join(f"{number} {item} ({meaning})" for number, (item, meaning) in pairs)
+        meaning = f"{variable.description}: {items}" if items else variable.description
+        row = (name, _kind(variable), variable.display_unit or "", _start(variable), _range(variable), meaning)
+        groups.setdefault(variable.heading, []).append(row)
+    return groups
+
+
+def _in_one_row(table: Iterable[Variable]) -> dict[str, Variable]:
+    """Return the variables by name, of a window the first one as ``name[i]``."""
+    rows: dict[str, Variable] = {}
+    for variable in table:
+        rows.setdefault(re.sub(r"^(\w+_window)\[\d+\]", r"\1[i]", variable.name), variable)
+    return rows
+
+
+def _kind(variable: Variable) -> str:
+    return variable.kind if variable.unit in (None, "1") else f"{variable.kind}, {variable.unit}"
+
+
+def _start(variable: Variable) -> str:
+    if variable.start is None:
+        return ""
+    return str(variable.start).lower() if variable.kind == "Boolean" else f"{variable.start:.10g}"
+
+
+def _range(variable: Variable) -> str:
+    """Return the allowed values, an automatic choice and the least value that is not 0 included."""
+    if variable.minimum is None or variable.maximum is None or variable.kind == "Boolean":
+        return ""
+    least = f"0 or {variable.nonzero:g}" if variable.nonzero else f"{variable.minimum:.10g}"
+    if variable.minimum == variable.maximum:
+        return least
+    if variable.automatic is not None:
+        least = f"{variable.automatic:g} or {least}"
+    return f"{least} … {variable.maximum:.10g}"

@@ -26,10 +26,11 @@ from ..base.saved import Saved
 from ..base.settings import PARAMETERS
 from ..base.signals import check_position
 from ..base.state import pack, unpack
-from .fmu_table import FmuTable
-from .variables import Variable
+from .variables import FmuTable, Variable
 
-__all__ = ["DESCRIPTION_FILE", "TableSlave"]
+__all__ = [
+    "TableSlave",
+]
 
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and GUID of the FMU's content."""

@@ -14,7 +14,11 @@ from zipfile import ZipFile
 from ..base.output import written_whole
 from ..base.version import __version__
 
-__all__ = ["CONFIGURATION_FILE", "DEFINITIONS", "write_configuration"]
+__all__ = [
+    "CONFIGURATION_FILE",
+    "DEFINITIONS",
+    "write_configuration",
+]
 
 CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"
 """Beside the archives; another name than the template's, which lies where the file goes."""

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,11 +22,22 @@ from ..base.errors import SignalError, StateError
 from ..base.records import numbers_of, unsound, with_numbers
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
 from ..predict.uncertainty import Uncertainty
 
-__all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
+if TYPE_CHECKING:  # as this module is packed, and machines are not
+    from ..machines.machine import Machine
+
+__all__ = [
+    "WEIGHTS_FILE",
+    "learned_settings",
+    "load_trained",
+    "restore_weights",
+    "warm_predictor",
+    "weights_file",
+]
 
 WEIGHTS_FILE = "weights.bin"
 _MAGIC = b"HSEPWG14"
@@ -36,20 +48,20 @@ _MODE = ("f_n", "zeta", "alpha", "beta")
 _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or truncated"
 
 
-def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
-    """Return all settings on which the weights depend, by their names in the FMU."""
-    numbers = predictor.settings.to_fmi()
+def learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str, float]:
+    """Return all settings on which a predictor's weights depend, by their names in the FMU."""
+    numbers = settings.to_fmi()
     learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
     values: dict[str, float] = {name: numbers[name] for name in learned}
-    values["dead_time"] = predictor.model.dead_time
-    for i, mode in enumerate(predictor.model.modes, start=1):
+    values["dead_time"] = model.dead_time
+    for i, mode in enumerate(model.modes, start=1):
         values |= {f"mode[{i}].{name}": getattr(mode, name) for name in _MODE}
     return values
 
 
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
-    settings = learned_settings(predictor)
+    settings = learned_settings(predictor.settings, predictor.model)
     learned = numbers_of(_learned(predictor))
     content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), len(learned))
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
@@ -84,7 +96,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         for name, value in _SETTING.iter_unpack(body[_HEAD.size : start])
     }
     problems = _differences("the number of modes", n_modes, len(predictor.model.modes))
-    settings = learned_settings(predictor)
+    settings = learned_settings(predictor.settings, predictor.model)
     for name, then in learned.items():
         if name in settings or not name.startswith("mode["):
             problems += _differences(name, then, settings.get(name, 0.0))
@@ -125,3 +137,64 @@ def _differences(name: str, then: float, now: float) -> list[str]:
     shown = int(then) if whole and then == int(then) else then
     came = int(now) if whole else now
     return [f"{name} must be {shown!r}, with which this FMU was trained ({WEIGHTS_FILE}), got {came!r}"]
+
+
+def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
+    """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
+
+    Raises
+    ------
+    StateError
+        As :func:`load_trained`.
+    """
+    if weights is None:
+        return machine.new_predictor()
+    predictor = load_trained(weights, machine, "HybridPredictor")
+    predictor.restart()
+    return predictor
+
+
+def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredictor:
+    """Return the predictor that :meth:`HybridPredictor.save` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+    machine : Machine
+        Machine that it must have been trained for: ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
+        ``dead_time`` and modes.
+    model : {"HybridPredictor", "SepCompensator"}
+        Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
+
+    Raises
+    ------
+    StateError
+        If the file is not a saved predictor, one of another machine, naming all that differs, or has learned nothing.
+    """
+    path = Path(path)
+    try:
+        trained = HybridPredictor.load(path)
+    except StateError as error:
+        raise StateError(f"{path.name}: {error}") from error
+    compensates = model == "SepCompensator"
+    settings = machine.compensator_predictor if compensates else machine.predictor_settings
+    found, expected = _parameters(trained.settings, trained.model), _parameters(settings, machine.model)
+    differing = [
+        f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
+        for name in {**expected, **found}
+        if found.get(name) != expected.get(name)
+    ]
+    if differing:
+        subject = "'s compensator" if compensates else ""
+        raise StateError(
+            f"{path.name} was not trained for machine {machine.name}{subject}: it has {', '.join(differing)}; "
+            "train it with that machine, or correct the machine file"
+        )
+    if trained.regression.n_rows == 0:
+        raise StateError(f"{path.name} has learned no sample; save the predictor after a run")
+    return trained
+
+
+def _parameters(settings: PredictorSettings, model: ModalModel) -> dict[str, object]:
+    """Return the settings that must agree, by their names in the machine file."""
+    return {"Np": settings.Np, **learned_settings(settings, model), "input_hold": settings.input_hold}

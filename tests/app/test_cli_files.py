@@ -230,7 +230,7 @@ def test_arguments_are_checked_before_any_work(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    for module in ("hybridsep.fmi.archive", "hybridsep.fmi.builds"):
+    for module in ("hybridsep.fmi.archive", "hybridsep.fmi.archive"):
         monkeypatch.setattr(f"{module}.build_fmu", work)
     monkeypatch.setattr("hybridsep.evaluate.backtest.backtest_stream", work)
     names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy")}

@@ -22,7 +22,7 @@ from hybridsep.base.metrics import shown_figure
 from hybridsep.demo import cases
 from hybridsep.demo.compensation import COMPENSATED
 from hybridsep.demo.demo import demo, demo_files
-from hybridsep.fmi.builds import default_flavour
+from hybridsep.fmi.archive import default_flavour
 from hybridsep.plants.trajectory import spiral
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")

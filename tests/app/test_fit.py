@@ -24,7 +24,7 @@ from hybridsep.fitting.advice import recommendation
 from hybridsep.fitting.fit import Fit, FitOptions, fit, fit_files, sha256_of
 from hybridsep.fitting.replay import replay, split_log
 from hybridsep.fitting.report import fit_report, judged_by
-from hybridsep.fmi.resource_data import RESOURCE_DATA_FILE
+from hybridsep.fmi.extras import RESOURCE_DATA_FILE
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.naming import machine_name

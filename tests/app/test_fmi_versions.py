@@ -17,7 +17,7 @@ from hybridsep.cosim.fmu import read_description
 from hybridsep.demo import cases
 from hybridsep.demo.demo import demo, demo_files
 from hybridsep.fitting.fit import fit_files
-from hybridsep.fmi.libraries import ready_targets
+from hybridsep.fmi.compile import ready_targets
 
 NP = 20
 

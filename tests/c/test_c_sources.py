@@ -17,7 +17,7 @@ from c_compiler import C_SOURCES, build_folder, include_flags, needs_sanitisers,
 from c_core import write_trajectory
 from places import ROOT
 
-from hybridsep.fmi.c_sources import all_c
+from hybridsep.fmi.c_header import all_c
 
 SUFFIXES = (".c", ".h", ".cpp")
 SANITISED = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")

@@ -17,7 +17,7 @@ from places import ROOT
 
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.fmi.compiler import compile_flags
+from hybridsep.fmi.compile import compile_flags
 
 ROLES = {"REFERENCE": "ReferenceTrajectory", "PREDICTOR": "HybridPredictor", "PLANT": "FeedDrive"}
 MODELS = (*ROLES.values(), "SepCompensator")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from places import SUPPORT
 
 from hybridsep import paper_machine
-from hybridsep.fmi.fmu import table_of
+from hybridsep.fmi.spec import table_of
 
 N_INSTANCES = 1000
 N_SAMPLES = 350  # the hybrid predicts from sample 200 on, if t_init is 0

@@ -19,7 +19,7 @@ from importers_closed_system import exists_here
 
 from hybridsep import FmuInstance, load_machine, staircase
 from hybridsep.fmi.archive import build_fmu
-from hybridsep.fmi.system import build_system
+from hybridsep.fmi.ssp import build_system
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"

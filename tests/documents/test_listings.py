@@ -9,7 +9,7 @@ import pytest
 from places import ROOT
 
 from hybridsep.fmi.flavours import FMI_VERSIONS
-from hybridsep.fmi.system_structure import SSP_VERSIONS
+from hybridsep.fmi.ssp import SSP_VERSIONS
 
 FOLDER = ROOT / "integrations" / "listings"
 

@@ -18,8 +18,8 @@ from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitise
 from c_core import STAGE_DRIVE
 from places import ROOT
 
-from hybridsep.fmi.fmu_table import FmuTable
-from hybridsep.fmi.native_flavour import sources
+from hybridsep.fmi.native import sources
+from hybridsep.fmi.variables import FmuTable
 from hybridsep.machines.machine import load_machine
 
 FUZZED = {

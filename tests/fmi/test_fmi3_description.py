@@ -17,11 +17,9 @@ from fmpy.validation import validate_fmu
 
 from hybridsep.base.data_files import data_folder
 from hybridsep.fmi.archive import fmu_names
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, placed
-from hybridsep.fmi.fmi3_description import fmi3_description
-from hybridsep.fmi.fmu import Fmu
-from hybridsep.fmi.model_description import build_description
-from hybridsep.fmi.terminals import ICON_FILE, TERMINALS, terminals_and_icons
+from hybridsep.fmi.compile import ALL_TARGETS, TARGETS, placed
+from hybridsep.fmi.description import ICON_FILE, TERMINALS, build_description, fmi3_description, terminals_and_icons
+from hybridsep.fmi.spec import Fmu
 from hybridsep.machines.machine import load_machine
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types

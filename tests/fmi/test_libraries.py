@@ -15,15 +15,20 @@ from command_line import Run
 from places import ROOT
 
 from hybridsep.base.errors import FmuError
-from hybridsep.fmi import libraries as module
-from hybridsep.fmi.builds import other_platforms
-from hybridsep.fmi.c_header import KINDS
-from hybridsep.fmi.c_sources import c_sources
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, Compiler, compiler_for, expanded, host_target
-from hybridsep.fmi.libraries import (
+from hybridsep.fmi import compile as module
+from hybridsep.fmi.archive import other_platforms
+from hybridsep.fmi.c_header import KINDS, c_sources
+from hybridsep.fmi.compile import (
+    ALL_TARGETS,
+    TARGETS,
+    ZIG,
+    Compiler,
     chosen_targets,
+    compiler_for,
     default_targets,
+    expanded,
     has_native,
+    host_target,
     kept,
     libraries,
     library_paths,
@@ -36,7 +41,7 @@ ALL = [(kind, target) for kind in KINDS for target in ALL_TARGETS]
 @pytest.fixture
 def without(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A machine without compilers and kept libraries; the folder where they would be kept."""
-    monkeypatch.setattr("hybridsep.fmi.compiler.find_spec", lambda name: None)
+    monkeypatch.setattr("hybridsep.fmi.compile.find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.delenv("HYBRIDSEP_TARGETS")
@@ -124,7 +129,7 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w').write(sys.argv[-1])"
     compiler = Compiler((sys.executable, "-c", program), ZIG)
     monkeypatch.setattr(module, "compiler_for", lambda target: compiler)
-    monkeypatch.setattr("hybridsep.fmi.compiler._understands", lambda command, flag: False)
+    monkeypatch.setattr("hybridsep.fmi.compile._understands", lambda command, flag: False)
     wanted = [(kind, target) for target in ALL_TARGETS[:3] for kind in ("FeedDrive", "StageDrive")]
     began: list[tuple[str, str]] = []
     paths = library_paths(wanted, began.append)
@@ -137,7 +142,7 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
 def test_a_library_is_kept_where_a_later_one_is_interrupted(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w')"
     monkeypatch.setattr(module, "compiler_for", lambda target: Compiler((sys.executable, "-c", program), ZIG))
-    monkeypatch.setattr("hybridsep.fmi.compiler._understands", lambda command, flag: False)
+    monkeypatch.setattr("hybridsep.fmi.compile._understands", lambda command, flag: False)
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     wanted = [("FeedDrive", target) for target in ALL_TARGETS[:3]]
 

@@ -33,6 +33,6 @@ def test_the_notices_are_those_of_the_compiler() -> None:
 
 
 def test_pythonfmu_without_its_licence_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.fmi.python_flavour.metadata.files", lambda name: [])
+    monkeypatch.setattr("hybridsep.fmi.python.metadata.files", lambda name: [])
     with pytest.raises(FmuError, match=r"pythonfmu's LICENSE, .* is not installed: reinstall it"):
         build_fmu(load_machine("spring_mass_damper"), "FeedDrivePy", tmp_path, "python")

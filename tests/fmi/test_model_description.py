@@ -15,9 +15,9 @@ from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
 from hybridsep.fmi.archive import fmu_names
+from hybridsep.fmi.description import model_description
 from hybridsep.fmi.flavours import FLAVOURS
-from hybridsep.fmi.fmu import Fmu
-from hybridsep.fmi.model_description import model_description
+from hybridsep.fmi.spec import Fmu
 from hybridsep.machines.machine import Machine, load_machine
 
 

@@ -24,11 +24,9 @@ from fmpy.validation import validate_fmu
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import archived, build_fmu, fmu_names
-from hybridsep.fmi.compiler import ALL_TARGETS, compile_flags, host_target
+from hybridsep.fmi.compile import ALL_TARGETS, compile_flags, host_target, universal
 from hybridsep.fmi.flavours import FLAVOURS
-from hybridsep.fmi.fmu_table import FmuTable
-from hybridsep.fmi.macho import universal
-from hybridsep.fmi.variables import Variable
+from hybridsep.fmi.variables import FmuTable, Variable
 from hybridsep.machines.machine import load_machine
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types

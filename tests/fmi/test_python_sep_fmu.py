@@ -20,11 +20,10 @@ from hybridsep.compensate.compensator import SepState
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.fmu import Fmu
-from hybridsep.fmi.fmu_table import FmuTable
-from hybridsep.fmi.reference import reference_files
-from hybridsep.fmi.reference_models import library_models
-from hybridsep.fmi.related_files import RELATED_FOLDER
+from hybridsep.fmi.extras import RELATED_FOLDER
+from hybridsep.fmi.reference import library_models, reference_files
+from hybridsep.fmi.spec import Fmu
+from hybridsep.fmi.variables import FmuTable
 from hybridsep.machines.machine import load_machine
 
 MACHINE = load_machine("spring_mass_damper")

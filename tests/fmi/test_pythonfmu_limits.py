@@ -22,7 +22,7 @@ from pythonfmu_calls import CAUGHT, KILLING
 
 from hybridsep import FmuInstance, build_fmu, load_machine
 from hybridsep.base.errors import FmuError
-from hybridsep.fmi.python_flavour import checked_version
+from hybridsep.fmi.python import checked_version
 
 Fmu = Callable[[str], Path]
 

@@ -15,10 +15,9 @@ from built_once import BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.fmu import Fmu
-from hybridsep.fmi.reference import reference_files
-from hybridsep.fmi.reference_models import library_model, library_models
-from hybridsep.fmi.related_files import RELATED_FOLDER
+from hybridsep.fmi.extras import RELATED_FOLDER
+from hybridsep.fmi.reference import library_model, library_models, reference_files
+from hybridsep.fmi.spec import Fmu
 from hybridsep.machines.machine import load_machine, machine_names
 
 NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]

@@ -22,8 +22,8 @@ from ls_ref_rules import FOLDER, findings
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.errors import FmuError
-from hybridsep.fmi.content import generation_time
-from hybridsep.fmi.resource_data import RESOURCE_DATA_FILE
+from hybridsep.fmi.extras import RESOURCE_DATA_FILE
+from hybridsep.fmi.spec import generation_time
 
 RUN = ["HybridPredictor", *(name for name in (*FMI3, *PYTHON) if "_" not in name)]
 """FMUs of the default machine; ``test_reference_result`` runs all native ones of FMI 2.0."""

@@ -10,7 +10,7 @@ import pytest
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import MachineError
-from hybridsep.fmi.fmu import table_of
+from hybridsep.fmi.spec import table_of
 
 
 def rotary(folder: Path, machine: str = "emps") -> Path:

@@ -16,8 +16,8 @@ from c_compiler import needs_sanitisers
 from fmi2_driving import library_of, steps
 from fmi2_library import OK, Library
 
-from hybridsep.fmi.c_sources import c_sources, fmi_headers
-from hybridsep.fmi.compiler import TARGETS, compiled, compiler_for, host_target
+from hybridsep.fmi.c_header import c_sources, fmi_headers
+from hybridsep.fmi.compile import TARGETS, compiled, compiler_for, host_target
 
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 

@@ -113,7 +113,7 @@ def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
     n_numbers = len(numbers_of(predictor.state.uncertainty))
-    first = 32 + 32 * len(learned_settings(predictor)) + 8 * (n_numbers + 1)  # of the triangle
+    first = 32 + 32 * len(learned_settings(predictor.settings, predictor.model)) + 8 * (n_numbers + 1)
     zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
     infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
     longer = sealed(content[:-8] + bytes(8))
@@ -212,7 +212,7 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
     predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
     model, file = CModel("predictor", TRUST, tmp_path), tmp_path / WEIGHTS_FILE
-    first = 32 + 32 * len(learned_settings(predictor))
+    first = 32 + 32 * len(learned_settings(predictor.settings, predictor.model))
     body = content[:-8]
     record = (predictor.residual.learned, predictor.state.uncertainty)
     sizes = [np.size(leaf.value) for leaf in leaves(record)]

@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.fmi.compiler import TARGETS, host_target
+from hybridsep.fmi.compile import TARGETS, host_target
 
 WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")
 FLAVOURS = [("HybridPredictor", "native", "2"), ("HybridPredictorFmi3", "native", "3")]

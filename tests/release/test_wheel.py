@@ -17,10 +17,9 @@ from places import ROOT
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.version import version_text
-from hybridsep.fmi import libraries
+from hybridsep.fmi import compile as compiling
 from hybridsep.fmi.c_header import KINDS
-from hybridsep.fmi.compiler import TARGETS, expanded
-from hybridsep.fmi.libraries import ready_targets
+from hybridsep.fmi.compile import TARGETS, expanded, ready_targets
 
 WINDOWS = sys.platform == "win32"
 SCRIPTS = "Scripts" if WINDOWS else "bin"
@@ -36,7 +35,7 @@ def run(*command: object, cwd: Path, env: dict[str, str] | None = None) -> str:
 
 def built(kind: str, source: Path, out: Path) -> Path:
     """Build a wheel or an sdist offline, with the libraries that this checkout has kept."""
-    kept = {"HYBRIDSEP_LIBRARIES": str(libraries._cache()), "HYBRIDSEP_TARGETS": ",".join(ready_targets())}
+    kept = {"HYBRIDSEP_LIBRARIES": str(compiling._cache()), "HYBRIDSEP_TARGETS": ",".join(ready_targets())}
     env = {**os.environ, **kept}
     run(sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", out, cwd=source, env=env)
     (archive,) = out.iterdir()
@@ -120,7 +119,7 @@ def test_the_wheel_runs_without_a_compiler(scripts: Path, environment: dict[str,
     python = scripts / "python"
     where = run(python, "-c", "import hybridsep; print(hybridsep.__file__)", cwd=tmp_path, env=environment)
     assert Path(where.strip()).is_relative_to(scripts.parent)
-    with_compiler = "from hybridsep.fmi.compiler import compiler_for, host_target; compiler_for(host_target())"
+    with_compiler = "from hybridsep.fmi.compile import compiler_for, host_target; compiler_for(host_target())"
     done = subprocess.run([python, "-c", with_compiler], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert "no C compiler" in done.stderr
     assert hybridsep("--version").strip() == f"hybridsep {version_text()}"

@@ -15,7 +15,7 @@ from properties import LEFT_OUT
 from ruamel.yaml import YAML
 
 from hybridsep.base.version import __version__
-from hybridsep.fmi.compiler import ALL_TARGETS
+from hybridsep.fmi.compile import ALL_TARGETS
 
 GITHUB = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 GITLAB = ROOT / ".gitlab-ci.yml"

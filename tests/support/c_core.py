@@ -24,12 +24,12 @@ from hybridsep.base.parameters import Parameter
 from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.fmu_table import FmuTable
 from hybridsep.fmi.variables import (
     COMPENSATOR_SETTINGS,
     INTERPOLATED,
     PREDICTOR_SETTINGS,
     TRUST_SETTINGS,
+    FmuTable,
 )
 from hybridsep.machines.machine import load_machine
 from hybridsep.predict.uncertainty import Uncertainty

@@ -29,9 +29,9 @@ exec gcc "$@" -O0 --coverage -fprofile-update=atomic -Wno-missing-profile -dumpd
 
 def count_in(folder: Path) -> None:
     """Let all that this process and its children compile for this machine count in a folder, which must be new."""
-    from hybridsep.fmi import libraries
+    from hybridsep.fmi import compile as compiling
     from hybridsep.fmi.c_header import KINDS
-    from hybridsep.fmi.compiler import ZIG, host_target
+    from hybridsep.fmi.compile import ZIG, host_target
 
     folder.mkdir(parents=True)
     wrapper = folder.absolute() / "gcc"
@@ -39,14 +39,14 @@ def count_in(folder: Path) -> None:
     wrapper.chmod(0o755)
     os.environ["CC"] = str(wrapper)
     kept = folder.absolute() / "libraries"
-    if libraries._cache().is_dir():
-        shutil.copytree(libraries._cache(), kept)
+    if compiling._cache().is_dir():
+        shutil.copytree(compiling._cache(), kept)
     os.environ["HYBRIDSEP_LIBRARIES"] = str(kept)
     for kind in KINDS:
-        library = libraries._place(ZIG, (kind, host_target()))
+        library = compiling._place(ZIG, (kind, host_target()))
         library.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory() as place:
-            for name, content in libraries._sources(kind).items():
+            for name, content in compiling._sources(kind).items():
                 (Path(place) / name).write_bytes(content)
             flags = ["-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-D_GNU_SOURCE", "-fPIC", "-shared", "-I."]
             subprocess.run([wrapper, *flags, "all.c", "-o", library, "-lm"], cwd=place, check=True)

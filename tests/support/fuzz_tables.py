@@ -20,8 +20,7 @@ from c_compiler import run_compiler, sanitising_compiler
 from places import ROOT
 
 from hybridsep import build_fmu, load_machine
-from hybridsep.fmi.c_header import KINDS, kind_header
-from hybridsep.fmi.c_sources import c_sources, fmi_headers
+from hybridsep.fmi.c_header import KINDS, c_sources, fmi_headers, kind_header
 
 __all__ = ["MACHINES", "fuzz"]
 

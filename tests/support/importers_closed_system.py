@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hybridsep import FmuInstance, load_machine, staircase
-from hybridsep.fmi.system import build_system
+from hybridsep.fmi.ssp import build_system
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from c_core import COMPENSATOR, TABLES, TS, CModel
 from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
-from hybridsep.fmi.fmu import table_of
+from hybridsep.fmi.spec import table_of
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import load_machine, paper_machine
-from hybridsep.fmi.fmu import table_of
-from hybridsep.fmi.fmu_table import FmuTable
+from hybridsep.fmi.spec import table_of
+from hybridsep.fmi.variables import FmuTable
 from hybridsep.machines.machine import Machine
 
 Array = NDArray[np.float64]

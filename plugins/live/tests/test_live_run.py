@@ -18,7 +18,7 @@ from hybridsep.base.errors import FmuError, ParameterError, SignalError
 from hybridsep.cosim.adapters import FmuController
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.fmi.warm_start import warm_predictor
+from hybridsep.fmi.weights import warm_predictor
 from hybridsep.logs.log import open_log
 from hybridsep_live.core import Row, StepTimes
 from hybridsep_live.run import LiveRun, run_live

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import Encoder, build_fmu, cosimulate, load_machine, simulate, staircase
-from hybridsep.fmi.compiler import TARGETS
+from hybridsep.fmi.compile import TARGETS
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Platform:
     Attributes
     ----------
     target : str
-        Key of :data:`hybridsep.fmi.compiler.TARGETS`.
+        Key of :data:`hybridsep.fmi.compile.TARGETS`.
     runner : tuple of str
         What the command begins with; empty for this machine's own binaries.
     packages : str

@@ -1,20 +1,34 @@
-"""Reference experiment of an FMU as FMI's layered standard LS-REF has it: ``extra/org.fmi-standard.fmi-ls-ref/``.
+"""Files of an FMU's ``extra/``: the manifest of its reference experiment (LS-REF) and where it comes from (SRMD).
 
-The manifest names the files beside the model and what each is for, as fmi-ls-ref 1.0.0-beta.1 has it. The experiment
-is one of the Modelica Association's format of experiments (MA-HS-Experiments), to which fmi-ls-ref leaves it: times,
-inputs and expected outputs. Both are written as their schemas are.
+The manifest names the files beside the model and what each is for, as FMI's layered standard fmi-ls-ref 1.0.0-beta.1
+has it. The experiment is one of the Modelica Association's format of experiments (MA-HS-Experiments), to which
+fmi-ls-ref leaves it: times, inputs and expected outputs. Both are written as their schemas are.
+
+``resourceMetaData.srmd`` (Simulation Resource Meta Data, SSP Traceability 1.0) says from which log a fitted FMU is; its
+keywords are classified under a name of our own, since the standard leaves them to whoever writes one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
+from typing import Any
 from xml.etree import ElementTree as ET
 
-from .model_description import document, xml_text
-from .resource_data import RESOURCE_DATA_FILE
+from ..base.version import __version__
+from .description import document, xml_text
+from .spec import author, generation_time
 
-__all__ = ["AGREEMENT", "EXPERIMENT_FILE", "MANIFEST_FILE", "RELATED_FOLDER", "experiment", "manifest"]
+__all__ = [
+    "AGREEMENT",
+    "EXPERIMENT_FILE",
+    "MANIFEST_FILE",
+    "RELATED_FOLDER",
+    "RESOURCE_DATA_FILE",
+    "experiment",
+    "manifest",
+    "resource_data",
+]
 
 RELATED_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST_FILE = f"{RELATED_FOLDER}/fmi-ls-manifest.xml"
@@ -29,6 +43,7 @@ _NAMED = {
     "version": "1.0.0-beta.1",
     "description": "Layered Standard providing information on related files included in an FMU.",
 }
+RESOURCE_DATA_FILE = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
 _ELSEWHERE = {
     RESOURCE_DATA_FILE: ("application/x-srmd-meta-data", "meta-data", "log, settings and figures of the fit"),
 }
@@ -91,3 +106,50 @@ def _own(file: str) -> tuple[str, str, str]:
 
 def _add(root: ET.Element, source: str, kind: str, role: str, description: str) -> None:
     ET.SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": description})
+
+
+_CLASSIFICATION = "hybridsep.fit"
+"""Type of the classification whose entries describe a fit."""
+
+_SRMD = "http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData"
+_STC = "http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon"
+
+
+def resource_data(name: str, guid: str, origin: Mapping[str, Any]) -> bytes:
+    """Return the document.
+
+    Parameters
+    ----------
+    name : str
+        Model identifier.
+    guid : str
+        The modelDescription's.
+    origin : mapping
+        What the FMU was made from, plain values; tables and lists in it become keywords with dots and numbers.
+    """
+    ET.register_namespace("srmd", _SRMD)
+    ET.register_namespace("stc", _STC)
+    attributes = {
+        "version": "1.0.0",
+        "name": f"{name}: origin",
+        "description": "log, settings and figures of the fit that the FMU comes from; lengths in m, times in s",
+        "author": author(),
+        "generationTool": f"hybridsep {__version__}",
+        "generationDateAndTime": generation_time(),
+    }
+    root = ET.Element(f"{{{_SRMD}}}SimulationResourceMetaData", attributes)
+    entries = ET.SubElement(root, f"{{{_STC}}}Classification", type=_CLASSIFICATION)
+    for keyword, text in (("model.guid", guid), *_flat("", origin)):
+        ET.SubElement(entries, f"{{{_STC}}}ClassificationEntry", keyword=keyword).text = text
+    return document(root)
+
+
+def _flat(prefix: str, value: Any) -> list[tuple[str, str]]:
+    """Return keywords and texts of a value."""
+    if isinstance(value, Mapping):
+        inner = list(value.items())
+    elif isinstance(value, list | tuple):
+        inner = list(enumerate(value, start=1))
+    else:
+        return [(prefix, str(value).lower() if isinstance(value, bool) else str(value))]
+    return [pair for key, one in inner for pair in _flat(f"{prefix}.{key}" if prefix else str(key), one)]

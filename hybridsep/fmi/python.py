@@ -7,9 +7,11 @@ share every module of the same name, and the one loaded first would silently ser
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import re
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -18,17 +20,16 @@ import pythonfmu
 from ..base.data_files import data_folder
 from ..base.errors import FmuError
 from ..base.version import __version__
-from .content import content_guid
-from .fmu import Fmu
-from .imported import imported_modules
-from .model_description import model_description
+from .description import model_description
+from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .pages import dependencies_note, filled, icon, index_page, reference_note
-from .reference import has_reference
-from .reference_run import reference_run
-from .related_files import MANIFEST_FILE, manifest
-from .resource_data import RESOURCE_DATA_FILE, resource_data
+from .reference import has_reference, reference_run
+from .spec import Fmu, content_guid
 
-__all__ = ["checked_version", "files"]
+__all__ = [
+    "checked_version",
+    "files",
+]
 
 _SERIES = "0.7."
 """Series of pythonfmu whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
@@ -106,7 +107,7 @@ def files(fmu: Fmu) -> dict[str, bytes]:
 def _resources(model: str) -> dict[str, bytes]:
     """Return the Python side of an FMU: slave, library and pythonfmu, under names with a hash of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
-    library = imported_modules(slave)
+    library = _imported_modules(slave)
     launcher = slave.with_name(_LAUNCHER).read_text(encoding="utf-8")
     digest = hashlib.sha256(slave.read_bytes() + launcher.encode())
     for module, text in library.items():
@@ -148,3 +149,51 @@ def _license() -> bytes:
     if not found:
         raise FmuError("pythonfmu's LICENSE, which an FMU with a copy of it must carry, is not installed: reinstall it")
     return found[0].read_binary()
+
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def _imported_modules(script: Path) -> dict[str, bytes]:
+    """Return the modules that a script needs when it is loaded: path within the package → source.
+
+    Followed are the imports at the top level of a module; one inside a function is not needed to load it. The
+    ``__init__.py`` of the folders are among them, empty: the top level's public names would import the whole library.
+
+    Parameters
+    ----------
+    script : Path
+        It names this package ``hybridsep``.
+    """
+    found: dict[str, bytes] = {}
+    waiting = list(_imports(script.read_bytes(), ()))
+    while waiting:
+        module = waiting.pop()
+        if module.as_posix() in found:
+            continue
+        source = (_PACKAGE / module).read_bytes()
+        found[module.as_posix()] = source
+        waiting += _imports(source, module.parent.parts)
+    folders = {parent / "__init__.py" for module in found for parent in Path(module).parents}
+    return dict(sorted({**found, **{folder.as_posix(): b"" for folder in folders}}.items()))
+
+
+@cache
+def _imports(source: bytes, place: tuple[str, ...]) -> tuple[Path, ...]:
+    """Return the modules of this package that a module in the folder ``place`` names at its top level."""
+    found: list[Path] = []
+    for statement in ast.parse(source).body:
+        if not isinstance(statement, ast.ImportFrom):
+            continue
+        parts = tuple(statement.module.split(".")) if statement.module else ()
+        if statement.level:
+            parts = (*place[: len(place) + 1 - statement.level], *parts)
+        elif parts[:1] == ("hybridsep",):
+            parts = parts[1:]
+        else:
+            continue
+        if (_PACKAGE / Path(*parts)).with_suffix(".py").is_file():
+            found.append(Path(*parts).with_suffix(".py"))
+        else:
+            found += [Path(*parts, alias.name).with_suffix(".py") for alias in statement.names]
+    return tuple(found)

@@ -13,12 +13,14 @@ both kinds of Mac, as importers look nowhere else on either.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import shutil
+import struct
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -27,31 +29,42 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from ..base.data_files import data_folder
 from ..base.errors import FmuError
-from ..base.output import named_errors
+from ..base.output import named_errors, written_whole
+from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
-from .macho import universal
 
 __all__ = [
     "ALL_TARGETS",
-    "FLAGS",
     "TARGETS",
     "TARGET_NAMES",
     "ZIG",
     "Compiler",
-    "Target",
+    "Library",
+    "check_available",
+    "chosen_targets",
     "compile_flags",
     "compiled",
     "compiler_for",
+    "default_targets",
     "expanded",
+    "has_native",
     "host_target",
+    "is_kept_here",
+    "kept",
+    "libraries",
+    "library_paths",
+    "missing",
     "placed",
+    "ready_targets",
+    "universal",
 ]
 
 ZIG = "ziglang 0.17.1"
 """The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
 
-FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
+_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
 """Options of every compiler. Never ``-ffast-math``: every platform is to give the same numbers."""
 
 _STACK_PROTECTOR = "-fstack-protector-strong"
@@ -59,7 +72,7 @@ _STACK_PROTECTOR = "-fstack-protector-strong"
 
 
 @dataclass(frozen=True)
-class Target:
+class _Target:
     """A platform an FMU can have a binary for.
 
     Attributes
@@ -81,15 +94,15 @@ class Target:
 
 _ELF = ("-fPIC", "-Wl,--build-id=none", "-lm", "-ldl")
 
-TARGETS: Mapping[str, Target] = {
+TARGETS: Mapping[str, _Target] = {
     # glibc 2.17: every Linux distribution since 2014
-    "x86_64-linux": Target("x86_64-linux-gnu.2.17", "linux64", ".so", _ELF),
-    "aarch64-linux": Target("aarch64-linux-gnu.2.17", "aarch64-linux", ".so", _ELF),
-    "x86_64-windows": Target("x86_64-windows-gnu", "win64", ".dll"),
+    "x86_64-linux": _Target("x86_64-linux-gnu.2.17", "linux64", ".so", _ELF),
+    "aarch64-linux": _Target("aarch64-linux-gnu.2.17", "aarch64-linux", ".so", _ELF),
+    "x86_64-windows": _Target("x86_64-windows-gnu", "win64", ".dll"),
     # SSE2, not the x87, whose extra digits would give other numbers
-    "x86-windows": Target("x86-windows-gnu", "win32", ".dll", ("-msse2", "-mfpmath=sse")),
-    "x86_64-darwin": Target("x86_64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
-    "aarch64-darwin": Target("aarch64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
+    "x86-windows": _Target("x86-windows-gnu", "win32", ".dll", ("-msse2", "-mfpmath=sse")),
+    "x86_64-darwin": _Target("x86_64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
+    "aarch64-darwin": _Target("aarch64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
 }
 """All platforms; the two Macs share a universal file."""
 
@@ -179,7 +192,7 @@ def compile_flags(command: Sequence[str]) -> list[str]:
     command : sequence of str
         Of a compiler that understands the options of gcc.
     """
-    return [*FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
+    return [*_FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
 
 
 @cache
@@ -262,3 +275,203 @@ def compiled(
                 yield key, future.result()
         finally:  # after a failure or Ctrl-C no other one begins
             pool.shutdown(cancel_futures=True)
+
+
+_UNIVERSAL = 0xCAFEBABE
+_MACHO_64 = 0xFEEDFACF
+_ALIGNMENT = 14  # 16 KiB, the page of Apple's ARM processors; x86 has 4 KiB
+
+
+def universal(libraries: Sequence[bytes]) -> bytes:
+    """Return the universal file of some 64-bit Mach-O libraries.
+
+    Parameters
+    ----------
+    libraries : sequence of bytes
+        One for each processor.
+
+    Raises
+    ------
+    FmuError
+        If one is no 64-bit Mach-O file, or two are for the same processor.
+    """
+    processors = []
+    for library in libraries:
+        magic, cpu, subtype = struct.unpack_from("<3I", library.ljust(12, b"\0"))
+        if magic != _MACHO_64:
+            raise FmuError(
+                f"a universal file is made of 64-bit Mach-O libraries, got one that begins with {library[:4]!r}"
+            )
+        processors.append((cpu, subtype))
+    if len(set(processors)) < len(processors):
+        raise FmuError(f"a universal file has one library for each processor, got {processors}")
+    page = 1 << _ALIGNMENT
+    header = struct.pack(">2I", _UNIVERSAL, len(libraries))
+    body = b""
+    for library, (cpu, subtype) in zip(libraries, processors, strict=True):
+        offset = page + len(body)
+        header += struct.pack(">5I", cpu, subtype, offset, len(library), _ALIGNMENT)
+        body += library.ljust(-(-len(library) // page) * page, b"\0")
+    return header.ljust(page, b"\0") + body
+
+
+_SHIPPED = Path(__file__).resolve().parents[1] / "_data" / "binaries"
+_KEPT_VERSIONS = 4
+"""Versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each."""
+
+Library = tuple[str, str]
+"""A kind and a platform, a key of :data:`hybridsep.fmi.compile.TARGETS`."""
+
+
+def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
+    """Return the libraries of a kind: platform → library.
+
+    Parameters
+    ----------
+    kind : str
+        Of :data:`hybridsep.fmi.c_header.KINDS`.
+    targets : sequence of str
+        Of :data:`hybridsep.fmi.compile.TARGET_NAMES`.
+
+    Raises
+    ------
+    FmuError
+        If a target is unknown, or a library is not there and cannot be compiled.
+    """
+    paths = library_paths([(kind, target) for target in expanded(targets)])
+    return {target: path.read_bytes() for (_, target), path in paths.items()}
+
+
+def library_paths(
+    wanted: Sequence[Library], on_library: Callable[[Library], object] = lambda _wanted: None
+) -> dict[Library, Path]:
+    """Return the files of libraries; missing ones are compiled, and each is kept as soon as it is there.
+
+    Parameters
+    ----------
+    wanted : sequence of pairs
+    on_library : callable, optional
+        Called with each library that had to be compiled, when it is there.
+
+    Raises
+    ------
+    FmuError
+        As :func:`libraries`.
+    """
+    compilers = {target: compiler_for(target) for _, target in missing(wanted)}
+    jobs = {(kind, target): (compilers[target], _sources(kind)) for kind, target in missing(wanted)}
+
+    for library, content in compiled(jobs):
+        place = _place(compilers[library[1]].name, library)
+        with written_whole(place) as file:
+            file.write(content)
+        on_library(library)
+    if jobs:
+        _forget_old_versions()
+    return {library: kept(library) or _place(compiler_for(library[1]).name, library) for library in wanted}
+
+
+def missing(wanted: Iterable[Library]) -> list[Library]:
+    """Return the libraries that have to be compiled; FmuError where no compiler is there for one."""
+    absent = [library for library in wanted if kept(library) is None]
+    return [one for one in absent if not _place(compiler_for(one[1]).name, one).is_file()]
+
+
+def kept(library: Library) -> Path | None:
+    """Return the file of a library of the wheel, or one that was compiled before by :data:`ZIG`; None without one."""
+    shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
+    places = (shipped, _place(ZIG, library))
+    return next((place for place in places if place.is_file()), None)
+
+
+def is_kept_here(kind: str) -> bool:
+    """Return whether a kind's library for this machine is there, and need not be compiled."""
+    try:
+        return kept((kind, host_target())) is not None
+    except FmuError:  # a platform that no library is for
+        return False
+
+
+def check_available(targets: Sequence[str]) -> None:
+    """Check, before any work, that the libraries for some platforms are there or can be compiled.
+
+    Raises
+    ------
+    FmuError
+        If not, or a target is unknown.
+    """
+    for target in expanded(targets):
+        if not _all_kept(target):
+            compiler_for(target)
+
+
+def has_native() -> bool:
+    """Return whether native FMUs that run on this machine can be built."""
+    try:
+        check_available(("host",))
+    except FmuError:
+        return False
+    return True
+
+
+def default_targets() -> tuple[str, ...]:
+    """Return the targets where none are asked for: ``$HYBRIDSEP_TARGETS`` if it is set, else :func:`ready_targets`."""
+    return (os.environ.get("HYBRIDSEP_TARGETS") and chosen_targets()) or ready_targets()
+
+
+def chosen_targets() -> tuple[str, ...]:
+    """Return the platforms of ``$HYBRIDSEP_TARGETS``, names with commas or ``none``; this one if it is not set.
+
+    Raises
+    ------
+    FmuError
+        If a name is unknown, or none is set and this machine is none of the platforms.
+    """
+    chosen = os.environ.get("HYBRIDSEP_TARGETS") or "host"
+    return expanded(() if chosen == "none" else chosen.split(","))
+
+
+def ready_targets() -> tuple[str, ...]:
+    """Return all platforms where nothing has to be compiled for that, else this one."""
+    return ALL_TARGETS if all(map(_all_kept, ALL_TARGETS)) else ("host",)
+
+
+def _all_kept(target: str) -> bool:
+    return all(kept((kind, target)) is not None for kind in KINDS)
+
+
+def _sources(kind: str) -> dict[str, bytes]:
+    return {**c_sources(), "hsep_fmu.h": kind_header(kind).encode(), **fmi_headers()}
+
+
+def _place(compiler: str, library: Library) -> Path:
+    """Return where a library that a compiler made is kept."""
+    kind, target = library
+    return _cache() / _version(compiler) / kind / f"{target}{TARGETS[target].suffix}"
+
+
+@cache
+def _version(compiler: str) -> str:
+    """Return a hash of all that libraries are made of: sources, headers of the kinds, options and compiler."""
+    digest = hashlib.sha256(repr((compiler, _FLAGS, dict(TARGETS))).encode())
+    for name, content in [*c_sources().items(), *((kind, kind_header(kind).encode()) for kind in KINDS)]:
+        digest.update(name.encode() + hashlib.sha256(content).digest())
+    return digest.hexdigest()[:16]
+
+
+def _cache() -> Path:
+    """Return the folder of compiled libraries: ``$HYBRIDSEP_LIBRARIES``, in a checkout its own, else the user's."""
+    if chosen := os.environ.get("HYBRIDSEP_LIBRARIES"):
+        return Path(chosen)
+    root = data_folder("fmu_src").parent
+    if (root / "pyproject.toml").is_file():
+        return root / "build" / "binaries"
+    user = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(user) / "hybridsep" / "binaries"
+
+
+def _forget_old_versions() -> None:
+    """Remove the libraries of all but the latest versions."""
+    versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in versions[_KEPT_VERSIONS:]:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -21,25 +21,27 @@ from ..base.data_files import data_folder
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
-from .c_header import c_header
-from .c_sources import FMI_HEADERS, c_sources, fmi_headers
-from .compiler import placed
-from .content import content_guid
+from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
+from .compile import default_targets, libraries, placed
+from .description import (
+    ICON_FILE,
+    TERMINALS_FILE,
+    build_description,
+    fmi3_description,
+    model_description,
+    terminals_and_icons,
+)
+from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .flavours import FMI_VERSIONS
-from .fmi3_description import fmi3_description
-from .fmu import Fmu
-from .fmu_table import FmuTable
-from .libraries import default_targets, libraries
-from .model_description import build_description, model_description
 from .pages import compile_note, dependencies_note, icon, index_page, reference_note
-from .reference import has_reference
-from .reference_run import reference_run
-from .related_files import MANIFEST_FILE, manifest
-from .resource_data import RESOURCE_DATA_FILE, resource_data
-from .table_file import TABLE_FILE, table_file
-from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
+from .reference import has_reference, reference_run
+from .spec import Fmu, content_guid
+from .variables import FmuTable
 
-__all__ = ["files", "sources"]
+__all__ = [
+    "files",
+    "sources",
+]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
