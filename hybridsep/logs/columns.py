@@ -253,13 +253,15 @@ def channels(source: Source) -> list[Channel]:
     whole, clocks = isinstance(source, ArraysSource), {*source.times.values(), t}
     extents: dict[str, tuple[int | None, float | None]] = {}
 
-    def extent(name: str) -> tuple[int | None, float | None]:
+    def extent(name: str | None) -> tuple[int | None, float | None]:
+        if name is None:
+            return None, None
         if name not in extents:
             extents[name] = _extent(source, name, is_time=name in clocks)
         return extents[name]
 
     # The rows of a text are counted by one column for all
-    probe = t or next((name for name in source.names if not whole and extent(name)[0] is not None), "")
+    probe = t or next((name for name in source.names if not whole and extent(name)[0] is not None), None)
     completed = []
     for one in source.channels():
         clock = source.times.get(one.name) or (one.name if one.name in clocks or whole else probe)
