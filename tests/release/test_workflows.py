@@ -85,6 +85,16 @@ def test_what_a_contributors_run_leaves_out_runs_every_night(pytestconfig: pytes
 
 
 @pytest.mark.skipif(not shutil.which("bash"), reason="the scripts are bash's")
+def test_plug_ins_run_after_the_core_and_all_of_them_at_night() -> None:
+    script = ROOT / ".ci" / "plugins"
+    subprocess.run(["bash", "-n", script], check=True)
+    names = sorted(path.parent.name for path in (ROOT / "plugins").glob("*/pyproject.toml"))
+    assert f"for plug_in in {' '.join(names)}; do" in script.read_text(encoding="utf-8")
+    assert ".ci/plugins" in (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert f".ci/plugins {' '.join(names)}" in (ROOT / ".ci" / "nightly").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(not shutil.which("bash"), reason="the scripts are bash's")
 def test_a_release_has_all_platforms_and_what_workflows_keep() -> None:
     path = ROOT / ".ci" / "release"
     subprocess.run(["bash", "-n", path], check=True)
