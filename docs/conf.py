@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))  # mathml
 
@@ -15,11 +14,10 @@ author = "the authors of hybridsep"
 version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
-exclude_patterns = ["**/.*"]
+exclude_patterns = ["**/.*", "experiments/*"]  # evidence/experiments.md sums them up
 myst_enable_extensions = ["amsmath", "attrs_block", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 suppress_warnings = [
-    "myst.header",  # pages of experiments begin sections below tables
     "ref.python",  # shapes such as (Np,) in docstrings are no references
 ]
 
@@ -35,14 +33,3 @@ html_math_renderer = "mathml"
 smartquotes = False  # -- begins options
 html_copy_source = False
 html_show_copyright = False
-
-
-def setup(app: Any) -> None:
-    """Leave dated pages out of the search: who looks for a word wants what holds today."""
-    app.connect("env-updated", _not_searched)
-
-
-def _not_searched(_app: Any, env: Any) -> None:
-    for name in env.found_docs:
-        if name.startswith("experiments/2"):
-            env.metadata[name]["nosearch"] = ""

@@ -82,11 +82,12 @@ def test_files_on_the_page_exist(page: Path) -> None:
         assert found or ("/" not in name and name in known), name
 
 
-@pytest.mark.parametrize("page", sorted(DATED.glob("2*.md")), ids=lambda page: page.stem)
-def test_an_experiment_says_when_it_was_made(page: Path) -> None:
-    day = date.fromisoformat(page.name[:10])
-    assert re.search(rf"\b{day.day}( and \d+)? {day:%B %Y}", page.read_text(encoding="utf-8"))
-    assert page.stem in (DATED / "index.md").read_text(encoding="utf-8")
+def test_an_experiment_says_when_it_was_made_and_is_summed_up() -> None:
+    summary = (ROOT / "docs" / "evidence" / "experiments.md").read_text(encoding="utf-8")
+    for page in DATED.glob("2*.md"):
+        day = date.fromisoformat(page.name[:10])
+        assert re.search(rf"\b{day.day}( and \d+)? {day:%B %Y}", page.read_text(encoding="utf-8")), page
+        assert f"`{page.stem}`" in summary, page
 
 
 def test_the_front_is_short() -> None:
