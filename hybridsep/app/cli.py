@@ -13,18 +13,16 @@ from ..base.version import version_text
 from .command_backtest import backtest
 from .command_build import build
 from .command_cosim import cosim
-from .command_demo import demo
-from .command_example_log import example_log
 from .command_fit import fit
 from .command_hal import hal
 from .command_header import header
 from .command_identify import identify
-from .command_init import init
 from .command_report import report
 from .command_system import system
 from .command_tune import tune
 from .failures import DEBUG_VARIABLE, Commands, run
 from .panels import EXAMPLES, PanelledCommand
+from .start import demo, example_log, init
 
 __all__ = ["app", "main"]
 

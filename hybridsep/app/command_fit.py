@@ -38,7 +38,7 @@ def fit(
     ] = None,
     Np: Annotated[
         int | None,
-        typer.Option("--Np", "--np", min=1, help="Samples of the controller's look-ahead; 100 ms if left out."),
+        typer.Option("--Np", min=1, help="Samples of the controller's look-ahead; 100 ms if left out."),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the axis; the log's, with --axis, if left out.")] = None,
     *,

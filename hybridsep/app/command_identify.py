@@ -43,7 +43,6 @@ def identify(
     measurement_delay: Annotated[
         int,
         typer.Option(
-            "--measurement-delay",
             "--measurement_delay",
             min=0,
             help="Whole samples by which the measured position is late; the model is then without them.",

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.output import written_text
-from ..base.ranges import parse_range
 from ..base.settings import PredictorSettings
 from .options import (
     PREDICTOR_ENTRIES,
@@ -26,6 +25,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from ..base.parameters import Parameter
     from ..base.signals import Array
     from ..intake.finding import Finding
     from ..logs.units import Shown
@@ -130,7 +130,7 @@ def _tried(
     from ..fitting.tuning import TUNED, candidates, default_values
 
     ranges = {
-        field: parse_range(parameters[parameter.name], parameter)
+        field: _values(parameters[parameter.name], parameter)
         for field, parameter in TUNED.items()
         if parameter.name in parameters
     }
@@ -142,6 +142,18 @@ def _tried(
     if writes:  # a [compensator] that takes over p and q may not allow the largest
         changed.changed("predictor", {"p": max(one.p for one in tried), "q": max(one.q for one in tried)})
     return changed, values, tried
+
+
+def _values(text: str, parameter: Parameter) -> tuple[Any, ...]:
+    """Return the values of an option, which commas separate, ascending."""
+    found = set()
+    for part in text.split(","):
+        try:
+            value: Any = float(part)
+        except ValueError:
+            value = part  # refused by its name
+        found.add(parameter.checked(value, f"--{parameter.name}"))
+    return tuple(sorted(found))
 
 
 def _read(

@@ -16,7 +16,6 @@ import typer
 
 from ..base.data_files import COMMANDS
 from ..base.parameters import Parameter
-from ..base.ranges import GRAMMAR
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
 from ..fmi.compile import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
@@ -73,7 +72,7 @@ TargetOption = Annotated[
     ),
 ]
 TsOption = Annotated[
-    float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
+    float | None, typer.Option("--T_s", help="Sampling interval [s], for a file without a time column.")
 ]
 UnitOption = Annotated[
     str | None,
@@ -83,9 +82,7 @@ UnitOption = Annotated[
     ),
 ]
 TimeColumnOption = Annotated[str | None, typer.Option("--t", help="Name of the time column.")]
-CommandColumnOption = Annotated[
-    str | None, typer.Option("--x_d", "--x-d", help="Name of the commanded position's column.")
-]
+CommandColumnOption = Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")]
 MeasuredColumnOption = Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")]
 AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
 ResampleOption = Annotated[
@@ -168,7 +165,7 @@ def takes_parameters(
     taken = []
     for field, parameter in options.items():
         kind: Any = str if parameter.kind is bool or field in ranges else parameter.kind
-        annotation = Annotated[kind | None, _option(field, parameter, otherwise, several=field in ranges)]
+        annotation = Annotated[kind | None, _option(parameter, otherwise, several=field in ranges)]
         taken.append(inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
 
     def given(values: dict[str, Any], _others: dict[str, Any]) -> dict[str, Any]:
@@ -177,15 +174,15 @@ def takes_parameters(
     return _in_the_place_of("parameters", taken, given)
 
 
-def _option(field: str, parameter: Parameter, otherwise: str, *, several: bool) -> Any:
-    """Return the option, under the FMU's name; with hyphens or by the field's name it is accepted, too."""
-    names = dict.fromkeys(f"--{name}" for name in (parameter.name, parameter.name.replace("_", "-"), field))
+def _option(parameter: Parameter, otherwise: str, *, several: bool) -> Any:
+    """Return the option, under the parameter's name in machine files and FMUs."""
+    name = f"--{parameter.name}"
     if several:
         return typer.Option(
-            *names, help=f"{parameter.help}; several as {GRAMMAR}; a default range if left out", metavar="RANGE"
+            name, help=f"{parameter.help}; several as 5,10,50; some of its own if left out", metavar="VALUES"
         )
     more: dict[str, Any] = {"parser": _truth_value, "metavar": "true|false"} if parameter.kind is bool else {}
-    return typer.Option(*names, help=parameter_help(parameter, otherwise), **more)
+    return typer.Option(name, help=parameter_help(parameter, otherwise), **more)
 
 
 def _truth_value(text: str | bool) -> bool:

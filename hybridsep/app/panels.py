@@ -38,7 +38,7 @@ EXAMPLES = {
     ),
     "tune": (
         "hybridsep tune my_axis.csv -m my_axis/machine.toml",
-        "hybridsep tune my_axis.csv -m my_axis/machine.toml --p 20:100:20",
+        "hybridsep tune my_axis.csv -m my_axis/machine.toml --p 10,50",
     ),
     "init": ("hybridsep init machine.toml", "hybridsep init machine.toml --f_n 42 --zeta 0.35"),
     "demo": ("hybridsep demo --out demo", "hybridsep demo --out demo --force"),

@@ -67,7 +67,7 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", header="time,command,position", scale=1e3)
     names = ("--t", "time", "--x_d", "command", "--x", "position", "--unit", "mm")
-    sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lam", 1e-11, "--t-init", 0.2)
+    sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lambda", 1e-11, "--t_init", 0.2)
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
     assert status == 0
     assert json.loads(out)["n_batches"] == 50
@@ -229,7 +229,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     [
         (["backtest", "{log}", "-m", "robot"], "error: no machine 'robot'"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
-        (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--lambda", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
         (
             ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "furlong"],
@@ -281,7 +281,7 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
     ("option", "value", "message"),
     [
         ("--p", "10.5", "Invalid value for '--p': must be a whole number, got '10.5'"),
-        ("--lam", "1,5", "Invalid value for '--lambda' / '--lam': must be a number, got '1,5'"),
+        ("--lambda", "1,5", "Invalid value for '--lambda' / '--lam': must be a number, got '1,5'"),
     ],
 )
 def test_a_value_that_is_no_number_is_named(hybridsep: Run, option: str, value: str, message: str) -> None:
@@ -309,7 +309,7 @@ def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> No
 def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:
     log = tmp_path / "untimed.csv"
     log.write_text("x_d,x\n" + "0,0\n" * 200)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--Ts", 0.001, "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--T_s", 0.001, "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 200
 
@@ -341,18 +341,18 @@ def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridse
         10,
         "--q",
         2,
-        "--lam",
+        "--lambda",
         1e-9,
         "--spacing",
         4,
-        "--no-reversal",
+        "--no_reversal",
         "false",
     )
     run = ("cosim", "--trajectory", command, "--flavour", "python", "--json")
     status, out, _ = hybridsep(*run, "--compensate", "physics", *given)
     assert status == 0
     assert json.loads(out)["share_physics"] == 1.0
-    for option, value in (("--preview", 90), ("--no_reversal", "true"), ("--jerk-weight", 2)):
+    for option, value in (("--preview", 90), ("--no_reversal", "true"), ("--jerk_weight", 2)):
         status, _, err = hybridsep(*run, option, value)
         assert status == 2
         assert f"{option.replace('jerk-', 'jerk_')} must come with --compensate" in err

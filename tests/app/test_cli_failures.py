@@ -85,14 +85,14 @@ def test_times_that_cannot_be_divided_by(hybridsep: Run, tmp_path: Path, t: list
 def test_a_given_interval_that_cannot_be_divided_by(hybridsep: Run, tmp_path: Path) -> None:
     log = write(tmp_path / "log.csv", {"x_d": np.zeros(9), "x": np.zeros(9)})
     for T_s in ("5e-324", "1e-300", DIGITS):
-        refusal(hybridsep, "backtest", log, "-m", MACHINE, "--Ts", T_s)
+        refusal(hybridsep, "backtest", log, "-m", MACHINE, "--T_s", T_s)
 
 
 def test_numbers_of_5000_digits(hybridsep: Run, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text(f"t,x_d,x\n0,0,0\n0.001,0,{DIGITS}\n0.002,0,0\n")
     assert "column 'x' must be finite, got inf" in refusal(hybridsep, "backtest", log, "-m", MACHINE)
-    assert "lambda must be finite" in refusal(hybridsep, "cosim", "--lam", DIGITS)
+    assert "lambda must be finite" in refusal(hybridsep, "cosim", "--lambda", DIGITS)
     assert "seed must be 0 … 2147483647, got" in refusal(hybridsep, "cosim", "--seed", "9" * 300)
     assert "seed must be a number, got" in refusal(hybridsep, "cosim", "--seed", "9" * 4000)
 
@@ -209,8 +209,7 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
 @pytest.mark.parametrize("streams", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_standard_streams(tmp_path: Path, streams: str) -> None:
     out = tmp_path / "machine.toml"
-    answers = "--name axis --T_s 1e-3 --model lag --tau 0.01 --dead-time 0 --hold zoh --Np 100"
-    shell = f'exec "$0" -c "from hybridsep.__main__ import main; main()" init "$1" {answers} {streams}'
+    shell = f'exec "$0" -m hybridsep init "$1" {streams}'
     done = subprocess.run(["sh", "-c", shell, sys.executable, str(out)], capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert "[physics" in out.read_text(encoding="utf-8")

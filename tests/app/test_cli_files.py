@@ -202,7 +202,7 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
             ["build", "FeedDrive", "--unit", "furlong"],
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
-        (["build", "FeedDrive", "--Ts", "-1"], "T_s must be"),
+        (["build", "FeedDrive", "--T_s", "-1"], "T_s must be"),
         (["cosim", "--predictor", "{log}"], "log.csv is not a readable FMU"),
         (["cosim", "--plant", "none.fmu"], "no FMU at none.fmu; build it first"),
         (["cosim", "--plant", "{fmu}"], "HybridPredictorPy.fmu is no plant: it has no input x_d"),
@@ -211,7 +211,7 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
             ["cosim", "--unit", "furlong"],
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
-        (["cosim", "--Ts", "0"], "T_s must be"),
+        (["cosim", "--T_s", "0"], "T_s must be"),
         (["backtest", "{log}", "-m", MACHINE, "--out", "{folder}"], "--out must be a file, got the folder"),
     ],
 )

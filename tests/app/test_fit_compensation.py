@@ -25,7 +25,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.stage_drive import StageDrive
 
-LIMITS = ("--v_max", 0.3, "--a-max", 30, "--jerk", 2e4)
+LIMITS = ("--v_max", 0.3, "--a_max", 30, "--j_max", 2e4)
 
 
 def stage() -> StageDrive:

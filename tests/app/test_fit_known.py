@@ -88,7 +88,7 @@ def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     results = {}
     for n_late, log in logs.items():
         out = tmp_path / f"fit{n_late}"
-        status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, "--measurement-delay", n_late, "--json")
+        status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, "--measurement_delay", n_late, "--json")
         assert status == 0, err
         results[n_late] = json.loads(said)
         machine = load_machine(out / "machine.toml")
@@ -111,7 +111,7 @@ def test_identify_takes_a_late_encoder(hybridsep: Run, tmp_path: Path) -> None:
     x = screw(x_d, 0.0)
     late = np.concatenate((np.full(LATE, x[0]), x[:-LATE]))
     log, out = write_rows(tmp_path / "axis.csv", x_d, late), tmp_path / "axis.toml"
-    status, said, err = hybridsep("identify", log, "--measurement-delay", LATE, "--out", out, "--json")
+    status, said, err = hybridsep("identify", log, "--measurement_delay", LATE, "--out", out, "--json")
     assert status == 0, err
     machine = load_machine(out)
     assert machine.predictor_settings.measurement_delay == LATE

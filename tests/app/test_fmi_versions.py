@@ -10,14 +10,12 @@ from command_line import Run, write_rows
 from quick_fits import without_other_settings, without_other_windows
 from staircase_data import commanded, measured
 
-from hybridsep import build_fmu, load_machine
 from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.adapters import FmuController
 from hybridsep.cosim.fmu import read_description
 from hybridsep.demo import cases
 from hybridsep.demo.demo import demo, demo_files
 from hybridsep.fitting.fit import fit_files
-from hybridsep.fmi.compile import ready_targets
 
 NP = 20
 
@@ -93,25 +91,3 @@ def test_the_demo_has_one_version_in_python(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="pythonfmu's are of FMI 2 alone"):
         demo(tmp_path / "demo", flavour="python", fmi="both")
     assert not (tmp_path / "demo").exists()
-
-
-def test_init_builds_what_build_would(hybridsep: Run, tmp_path: Path) -> None:
-    path = tmp_path / "axis.toml"
-    status, out, err = hybridsep("init", path, "--tau", "0.006", "--fmi", "both")
-    assert (status, err) == (0, "")
-    for version, name in (("2", "HybridPredictor_axis"), ("3", "HybridPredictorFmi3_axis")):
-        fmu = tmp_path / f"{name}.fmu"
-        assert f"{fmu} written" in out
-        again = build_fmu(load_machine(path), name, tmp_path / "again", targets=ready_targets(), fmi=version)
-        assert fmu.read_bytes() == again.read_bytes()
-    (tmp_path / "HybridPredictor_axis.fmu").write_text("mine")
-    path.unlink()
-    status, _, err = hybridsep("init", path, "--tau", "0.006", "--fmi", "2")
-    assert status == 2
-    assert "HybridPredictor_axis.fmu exists; choose another name" in " ".join(err.split())
-    assert not path.exists()
-
-
-def test_init_without_the_option_builds_nothing(hybridsep: Run, tmp_path: Path) -> None:
-    assert hybridsep("init", tmp_path / "axis.toml", "--tau", "0.006")[0] == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["axis.toml"]

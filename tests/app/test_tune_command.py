@@ -18,7 +18,7 @@ from hybridsep.logs.units import shown_in
 
 MACHINE = ("-m", "spring_mass_damper", "--jobs", "1")
 PAPER = (*MACHINE, "--trust", "false")
-FEW = ("--Np", "50", "--p", "5,40", "--q", "0:1", "--lambda", "1e-12:1e-8:x100", "--t_init", "0.1")
+FEW = ("--Np", "50", "--p", "5,40", "--q", "0,1", "--lambda", "1e-12,1e-10,1e-8", "--t_init", "0.1")
 
 
 @pytest.mark.slow
@@ -108,11 +108,9 @@ def test_changed_positions_are_among_the_sources(hybridsep: Run, tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p", "5:120:5"), "--p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
-        (
-            ("--lambda", "1e-12:1e-6"),
-            "such as 5,10,50 or 5:100:5 (steps) or 1e-14:1e-6:x10 (factors), got '1e-12:1e-6'",
-        ),
+        (("--p", "5,105"), "--p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
+        (("--lambda", "1e-12:1e-6"), "--lambda must be a number, got '1e-12:1e-6'"),
+        (("--p", "5,50.5"), "--p must be a whole number, got 50.5"),
         (("--effect", "1e-5"), "--effect has an effect with trust only: give --trust true, too"),
         (("--fix", "--as-is"), "--fix and --as-is exclude each other"),
         (("--out", "x.csv"), "--out must end in .toml, got 'x.csv'"),

@@ -32,14 +32,14 @@ def fleet(
     ] = None,
     Np: Annotated[
         int | None,
-        typer.Option("--Np", "--np", min=1, help="Samples of the controllers' look-ahead; 100 ms if left out."),
+        typer.Option("--Np", min=1, help="Samples of the controllers' look-ahead; 100 ms if left out."),
     ] = None,
     axis: Annotated[
         list[str] | None, typer.Option(help="Axis that is read of logs with several; all of them if left out.")
     ] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of the positions, where their names do not say it.")] = None,
     T_s: Annotated[
-        float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for logs without a time column.")
+        float | None, typer.Option("--T_s", help="Sampling interval [s], for logs without a time column.")
     ] = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")] = None,

@@ -49,7 +49,7 @@ def live(
     ] = False,
     unit: Annotated[str | None, typer.Option(help="Unit of the positions, where their names do not say it.")] = None,
     T_s: Annotated[
-        float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a log without a time column.")
+        float | None, typer.Option("--T_s", help="Sampling interval [s], for a log without a time column.")
     ] = None,
     axis: Annotated[str | None, typer.Option(help="Axis of a log that holds several.")] = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time.")] = None,
