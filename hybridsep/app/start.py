@@ -122,7 +122,7 @@ def init(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write a machine file with a comment at every entry, to be edited.
+    """Write a machine file with comments, to edit.
 
     Of a lag of 6 ms where no option says what the axis is; hybridsep fit and identify find it from a log.
     """

@@ -157,7 +157,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     options = ("--trajectory", command, "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
     for kind in ("off", "physics", "hybrid"):
-        status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
+        status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json", "--force")
         assert status == 0
         summary = json.loads(out)
         assert summary[f"share_{kind}"] > 0.9
@@ -262,9 +262,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
         (["cosim", "--figure", "run.pdf"], "--figure must end in .png, got 'run.pdf'"),
         (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
-        (["cosim", "--out", "{log}/run.csv"], "a file has the name of the folder"),
+        (["cosim", "--out", "{log}/run.csv"], "is a file, not a folder"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
-        (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "a file has the name of the folder"),
+        (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "is a file, not a folder"),
     ],
 )
 def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:

@@ -61,7 +61,7 @@ def played(fmu: Path, x_d: np.ndarray, x: np.ndarray, n: int = 300) -> np.ndarra
     return np.array(rows)
 
 
-@pytest.mark.parametrize("command", [("fit", "axis.csv"), ("demo",), ("init", "axis.toml", "--tau", "0.01")])
+@pytest.mark.parametrize("command", [("fit", "axis.csv"), ("demo",)])
 def test_another_version_is_refused_before_any_work(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
