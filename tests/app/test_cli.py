@@ -281,7 +281,7 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
     ("option", "value", "message"),
     [
         ("--p", "10.5", "Invalid value for '--p': must be a whole number, got '10.5'"),
-        ("--lambda", "1,5", "Invalid value for '--lambda' / '--lam': must be a number, got '1,5'"),
+        ("--lambda", "1,5", "Invalid value for '--lambda': must be a number, got '1,5'"),
     ],
 )
 def test_a_value_that_is_no_number_is_named(hybridsep: Run, option: str, value: str, message: str) -> None:
