@@ -86,7 +86,7 @@ def test_the_pages_run_from_first_to_last(
                     log = tmp_path / "my_axis.csv"
                     log.write_text("".join(log.read_text().splitlines(keepends=True)[:ROWS]))
     assert len([piece for piece in done if piece.startswith("hybridsep ")]) >= 12
-    for name in ("my_axis/report.html", "replay.html", "tuned.toml", "run.png"):
+    for name in ("my_axis/report.html", "replay.html", "tuned.toml", "compensated.png"):
         assert (tmp_path / name).stat().st_size > 0, name
 
 

@@ -99,11 +99,3 @@ def test_the_front_is_short() -> None:
 
 def files_in(folder: str) -> list[Path]:
     return [path for path in (ROOT / folder).rglob("*.*") if path.is_file()]
-
-
-def test_the_page_about_the_tests_names_every_folder_and_what_they_share() -> None:
-    page = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
-    folders = {path.parent.name for path in (ROOT / "tests").glob("*/test_*.py")}
-    shared = {path.name for path in (ROOT / "tests" / "support").glob("*.py")}
-    assert len(folders) > 15
-    assert {name for name in folders | shared if f"`{name}`" not in page} == set()
