@@ -56,13 +56,14 @@ def backtest(
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
     from ..fitting.advice import partly_used, whole_log_words
-    from ..fitting.replay import replay_log
+    from ..fitting.replay import knew, replay_log
     from ..fmi.weights import warm_predictor
     from ..intake.finding import findings_table
     from ..intake.repair import changed_by
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
+    from ..predict.predictor import HybridPredictor
     from .log_intake import CHECKED_MAX, open_checked, reading_of
     from .outputs import FIGURES, RUNS, check_outputs
     from .progress import progress_bar
@@ -96,6 +97,7 @@ def backtest(
                 replayed.run.save(path)
             if figure is not None:
                 prediction_figure(replayed.run, title, figure, shown)
+    known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     for path in states:
         predictor.save(path)
     if out is not None:
@@ -114,7 +116,7 @@ def backtest(
     summary: dict[str, Any] = replayed.summary()
     print_scores(summary, replayed.verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
     if not as_json:
-        console.print(whole_log_words(warm=weights is not None))
+        console.print(whole_log_words(warm=weights is not None, known=known))
         if rest:
             print_without_first(rest, shown)
         print_written(out, figure, *saved)

@@ -47,7 +47,7 @@ def report(
     from ..evaluate.report import Report
     from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words
     from ..fitting.fit import SAMPLES_MAX, step_times
-    from ..fitting.replay import Recording, replay
+    from ..fitting.replay import Recording, knew, replay
     from ..fitting.report import write_changes, write_errors, write_findings, write_use
     from ..fmi.weights import warm_predictor
     from ..intake.repair import changes
@@ -55,6 +55,7 @@ def report(
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
+    from ..predict.predictor import HybridPredictor
     from .log_intake import open_checked, reading_of
     from .outputs import check_outputs
     from .progress import progress_bar
@@ -80,7 +81,9 @@ def report(
         steps = {}
         if fmu is not None:
             steps = step_times(fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
-    judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the whole log")
+    known = weights is not None and knew(HybridPredictor.load(weights), predictor)
+    shown = shown_of(whole.file_unit, axis_machine.unit)
+    judged = Judged(replayed, whole.T_s, shown, "the whole log", known=known)
     settings = predictor.settings
     written = Report(
         f"{axis_machine.title}: {log.name}",
@@ -89,13 +92,13 @@ def report(
     )
     written.paragraph(recommendation(judged), "verdict")
     write_changes(written, changes({log.name: intake.findings}))
-    words = whole_log_words(warm=weights is not None)
+    words = whole_log_words(warm=weights is not None, known=known)
     write_errors(written, judged, "Errors of the replay", words)
     write_findings(written, {log.name: intake.findings})
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
     written.write(page)
-    for line in (partly_used(whole), recommendation(judged), words):
+    for line in dict.fromkeys((partly_used(whole), recommendation(judged), words)):
         if line:
             console.print(line)
     console.print(f"report: {page}", soft_wrap=True)

@@ -30,6 +30,10 @@ _STANDSTILL = 1e-3
 """Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
 
 
+_KNOWN = (
+    "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log of the axis."
+)
+
 _LEARNS = 0.8
 """Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of the test samples, below
 which a longer log is said to help."""
@@ -54,6 +58,8 @@ class Judged:
         That the residual repeats with the position, and the option that says so, in words; empty where it does not.
     unidentified : bool
         Whether the log's first half had too little motion to identify the axis from.
+    known : bool
+        Whether the predictor had been trained with the log.
     """
 
     replay: Replay
@@ -63,6 +69,7 @@ class Judged:
     share: float = 1.0
     period: str = ""
     unidentified: bool = False
+    known: bool = False
 
     @cached_property
     def unit(self) -> tuple[float, str]:
@@ -70,8 +77,10 @@ class Judged:
         return self.shown.error(self.replay.rms()[0])
 
 
-def whole_log_words(*, warm: bool) -> str:
-    """Return what a replay of a whole log is tested on, in words: more samples than a fit is."""
+def whole_log_words(*, warm: bool, known: bool) -> str:
+    """Return what a replay of a whole log is tested on, in words: more samples than a fit is, or none."""
+    if known:
+        return _KNOWN
     began = "began with what an earlier run had learned" if warm else "began without any knowledge"
     return (
         f"The predictor {began}, and the whole log is the test; hybridsep fit tests on its second half alone, when "
@@ -84,6 +93,8 @@ def recommendation(judged: Judged) -> str:
 
     The hybrid is recommended where it is better than each of physics model, hold and peers alone.
     """
+    if judged.known:
+        return _KNOWN
     n = judged.replay.verdict().n_windows
     if n < WINDOWS_MIN:
         return (

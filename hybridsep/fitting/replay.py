@@ -27,6 +27,7 @@ __all__ = [
     "Replay",
     "Scored",
     "around_the_split",
+    "knew",
     "replay",
     "replay_log",
     "split_log",
@@ -349,6 +350,13 @@ def replay(
         )
         done += len(recording.x)
     return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.n_late)
+
+
+def knew(saved: HybridPredictor, replayed: HybridPredictor) -> bool:
+    """Return whether a saved predictor was trained with the log that it has replayed: both ended with its samples."""
+    one, other = saved.state, replayed.state
+    alike = (one.k, one.start, one.residual.last) == (other.k, other.start, other.residual.last)
+    return alike and np.array_equal(one.physics, other.physics)
 
 
 @dataclass(frozen=True)

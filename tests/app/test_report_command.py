@@ -44,10 +44,17 @@ def test_warm_start_and_step_times(hybridsep: Run, log: Path, fmus: BuiltFmus, t
         *("--fmu", fmus("HybridPredictor")),
     )
     assert status == 0, err
-    assert out.startswith("Use the hybrid: its error is 0.")
+    known = "Nothing is tested: the saved predictor was trained with this log, and knows it"
+    assert out.startswith(known)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "began with what an earlier run had learned" in text
+    assert known in text
     assert "a step of HybridPredictor.fmu took" in text
+    assert known in " ".join(hybridsep("backtest", log, *MACHINE, "--weights", saved)[1].split())
+    other = write_rows(tmp_path / "other.csv", commanded(), measured(1))
+    status, out, err = hybridsep(*("report", other, *MACHINE, "--weights", saved, "--out", tmp_path / "other.html"))
+    assert status == 0, err
+    assert out.startswith("Use the hybrid: its error is 0.")
+    assert "began with what an earlier run had learned" in (tmp_path / "other.html").read_text(encoding="utf-8")
 
 
 def test_findings_are_shown_and_faults_refused(hybridsep: Run, tmp_path: Path) -> None:
