@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .cosim.run import Run
     from .evaluate.backtest import backtest, backtest_stream
     from .fmi.archive import build_fmu, fmu_names
-    from .logs.log import open_log, read_log
+    from .logs.log import Log, open_log, read_log
     from .machines.machine import Machine, load_machine, machine_names
     from .machines.paper import paper_machine
     from .model.physics import ModalModel, Mode
@@ -44,6 +44,7 @@ __all__ = [
     "HybridPredictor",
     "HybridSepError",
     "Limits",
+    "Log",
     "LookAhead",
     "Machine",
     "ModalModel",
@@ -79,6 +80,7 @@ _MODULES = {
     "HybridPredictor": "predict.predictor",
     "HybridSepError": "base.errors",
     "Limits": "base.settings",
+    "Log": "logs.log",
     "LookAhead": "online.look_ahead",
     "Machine": "machines.machine",
     "ModalModel": "model.physics",

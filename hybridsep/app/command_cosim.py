@@ -71,7 +71,7 @@ def cosim(
 
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
-    from ..compensate.qp import limits_that_bind
+    from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
     from ..fmi.archive import build_here
     from ..machines.machine import load_machine, machine_path

@@ -52,11 +52,11 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
-    from ..fitting.advice import next_steps, recommendation
+    from ..fitting.advice import recommendation
     from ..fitting.compensation import drive_limits
     from ..fitting.fit import FitOptions, fit_files
     from ..fitting.fit import fit as fit_logs
-    from ..fitting.report import fit_report, judged_by
+    from ..fitting.report import fit_report, judged_by, next_steps
     from ..intake.finding import findings_table
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log

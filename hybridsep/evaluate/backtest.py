@@ -207,7 +207,9 @@ class Backtest(Scores):
 OnBatch = Callable[[Batch], object]
 
 
-def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_batch: OnBatch | None = None) -> Backtest:
+def backtest(
+    predictor: HybridPredictor, x_d: ArrayLike, x_meas: ArrayLike, *, on_batch: OnBatch | None = None
+) -> Backtest:
     """Replay a log that is in memory.
 
     The predictor goes on from its present state; call its ``restart`` before for another run with the weights kept.
@@ -216,8 +218,8 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     ----------
     predictor : HybridPredictor
         It learns the log on the way.
-    x_d, x : (n,) array_like, m
-        Commanded and measured positions, ``n ≥ 1``; with trust ``x`` is NaN where it is missing.
+    x_d, x_meas : (n,) array_like, m
+        Commanded and measured positions, ``n ≥ 1``; with trust ``x_meas`` is NaN where it is missing.
     on_batch : callable, optional
         Called with each :class:`Batch` when it is finished.
 
@@ -231,7 +233,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
         If the samples are empty, of different lengths or not finite; the predictor is unchanged then.
     """
     command = as_samples(x_d, "x_d")
-    measured = _measured(predictor, x, "x", len(command))
+    measured = _measured(predictor, x_meas, "x_meas", len(command))
     batches: list[Batch] = []
 
     def keep(batch: Batch) -> None:

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
-from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
-from ..fmi.archive import other_platforms
 from ..identify.operation import LITTLE_MOTION
 from ..logs.log import Log
 from ..logs.units import Shown
-from .fit import Fit
 from .replay import Replay
 
-__all__ = ["Judged", "extent", "next_steps", "partly_used", "peers_in_words", "recommendation", "whole_log_words"]
+__all__ = ["Judged", "extent", "partly_used", "peers_in_words", "recommendation", "whole_log_words"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
@@ -203,55 +198,6 @@ def peers_in_words(judged: Judged) -> str:
             "the physics model is judged with the offset that was identified beside it; the FMU's x_pb has none"
         )
     return "; ".join(words) + "."
-
-
-def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> list[str]:
-    """Return the lines.
-
-    Parameters
-    ----------
-    found : Fit
-    files : mapping
-        Of :func:`~hybridsep.fitting.fit.fit_files`.
-    again : str
-        Command line of this fit.
-    fmi : str
-        Version of its FMUs.
-    """
-    machine = found.machine
-    file, state = shlex.quote(str(files["machine file"])), shlex.quote(str(files["trained predictor"]))
-    lines = ["", "Next, to paste:"]
-
-    def step(says: str, *commands: str) -> None:
-        lines.extend([f"  # {says}", *(f"  hybridsep {command}" for command in commands)])
-
-    limits = machine.drive_limits
-    if machine.plant is None:
-        lines.append(f"  # no plant to try with: {found.plant.get('reason', '')}")
-    elif limits is not None:
-        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
-        warm = f" --weights {state}" if "mode" in found.plant["entries"] else ""
-        step(
-            "the compensated axis, on the identified model: to try with, results are optimistic",
-            f"cosim -m {file} --compensate off",
-            f"cosim -m {file} --compensate hybrid{warm}",
-        )
-        step("the same as one file for tools that read SSP", f"system -m {file} --compensate hybrid{warm}")
-    else:
-        step("prediction, on the identified model: to try with, results are optimistic", f"cosim -m {file}")
-        step("the same as one file for tools that read SSP", f"system -m {file}")
-    if limits is not None and limits.estimated:
-        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
-        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
-        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
-        lines.append(f"  {again} {' '.join(known)}")
-    native = next((path for what, path in files.items() if what.startswith("native FMU")), None)
-    note = other_platforms(native, files["machine file"], files["trained predictor"], fmi) if native else ""
-    if note:
-        says, _, command = note.rpartition(": ")
-        lines += [f"  # {says}", f"  {command}"]
-    lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
-    return lines
 
 
 _ALL = 0.995

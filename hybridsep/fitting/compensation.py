@@ -11,8 +11,7 @@ import numpy as np
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import peak_derivatives, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
-from ..compensate.expected import Expected, expected_errors
-from ..compensate.qp import limits_that_bind
+from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..evaluate.report import Report
 from ..logs.units import Shown
 from ..machines.machine import Machine
@@ -49,6 +48,9 @@ LIMITS_WORDS = (
     "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
 )
 """What the limits of :func:`estimated_limits` are."""
+
+_SAID = 0.001
+"""Share of the samples from which on a limit that binds is said: fewer cost nothing that could be seen."""
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -102,7 +104,7 @@ def expected_tracking(
     """Return the RMS of commanded minus measured position over the test samples, m, and which limits bind.
 
     ``none`` is measured, ``physics`` and ``hybrid`` are estimates with each model; None where a plan diverges.
-    ``limits`` has the shares of :func:`~hybridsep.compensate.qp.limits_that_bind` by model.
+    ``limits`` has the shares of :func:`~hybridsep.compensate.expected.limits_that_bind` by model.
     """
     settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
     pairs = [(one.x_d, one.x) for one in recordings]
@@ -147,9 +149,9 @@ def tracking_lines(tracking: Mapping[str, Any], shown: Shown) -> list[str]:
 
 def binding_words(shares: Mapping[str, float]) -> str:
     """Return which limits bind a compensated command, and in which share of its samples, in words."""
-    if not shares:
+    each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items() if share >= _SAID)
+    if not each:
         return "No limit binds the compensated command."
-    each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items())
     return f"Limits bind the compensated command: {each} of the samples; within larger ones less error would be left."
 
 

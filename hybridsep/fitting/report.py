@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import welch
 
 from ..base.metrics import coverage, rms_ratio
+from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
+from ..fmi.archive import other_platforms
 from ..identify.model import deviation_words, shown_estimates
 from ..identify.operation import TOO_LITTLE
 from ..intake.finding import Finding
@@ -27,6 +31,7 @@ __all__ = [
     "NAMES",
     "fit_report",
     "judged_by",
+    "next_steps",
     "write_changes",
     "write_errors",
     "write_findings",
@@ -363,8 +368,6 @@ def _times(fmu: str, steps: Mapping[str, float], T_s: float) -> str:
 
 
 _REPLAY = """\
-import math
-
 import numpy as np
 from fmpy import simulate_fmu
 
@@ -382,3 +385,52 @@ result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], output_interval={T
 def _duration(seconds: float) -> str:
     """Return a duration in ms, or in µs if it is shorter."""
     return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"
+
+
+def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> list[str]:
+    """Return what to do after a fit, as lines to paste.
+
+    Parameters
+    ----------
+    found : Fit
+    files : mapping
+        Of :func:`~hybridsep.fitting.fit.fit_files`.
+    again : str
+        Command line of this fit.
+    fmi : str
+        Version of its FMUs.
+    """
+    machine = found.machine
+    file, state = shlex.quote(str(files["machine file"])), shlex.quote(str(files["trained predictor"]))
+    lines = ["", "Next, to paste:"]
+
+    def step(says: str, *commands: str) -> None:
+        lines.extend([f"  # {says}", *(f"  hybridsep {command}" for command in commands)])
+
+    limits = machine.drive_limits
+    if machine.plant is None:
+        lines.append(f"  # no plant to try with: {found.plant.get('reason', '')}")
+    elif limits is not None:
+        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
+        warm = f" --weights {state}" if "mode" in found.plant["entries"] else ""
+        step(
+            "the compensated axis, on the identified model: to try with, results are optimistic",
+            f"cosim -m {file} --compensate off",
+            f"cosim -m {file} --compensate hybrid{warm}",
+        )
+        step("the same as one file for tools that read SSP", f"system -m {file} --compensate hybrid{warm}")
+    else:
+        step("prediction, on the identified model: to try with, results are optimistic", f"cosim -m {file}")
+        step("the same as one file for tools that read SSP", f"system -m {file}")
+    if limits is not None and limits.estimated:
+        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
+        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
+        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
+        lines.append(f"  {again} {' '.join(known)}")
+    native = next((path for what, path in files.items() if what.startswith("native FMU")), None)
+    note = other_platforms(native, files["machine file"], files["trained predictor"], fmi) if native else ""
+    if note:
+        says, _, command = note.rpartition(": ")
+        lines += [f"  # {says}", f"  {command}"]
+    lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
+    return lines

@@ -125,6 +125,12 @@ class HybridPredictor:
         self.state = PredictorState(0, 0, None, self.discrete.rest(), late, residual, uncertainty)
         self.restart(start, t_init=settings.warm_up)
 
+    def __repr__(self) -> str:
+        """Return the main settings, and how much was learned, in one line."""
+        names = ("Np", "p", "q", "T_s", "trust")
+        shown = {name: getattr(self.settings, name) for name in names} | {"n_learned": int(self.regression.n_rows)}
+        return f"HybridPredictor({', '.join(f'{name} = {value!r}' for name, value in shown.items())})"
+
     def restart(self, start: float | None = None, *, t_init: float = 0.0) -> None:
         """Begin another run, at rest at ``start``; what was learned is kept (warm start).
 

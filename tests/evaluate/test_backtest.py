@@ -236,10 +236,10 @@ def test_memory_does_not_grow_with_the_stream() -> None:
     ("x_d", "x", "message"),
     [
         ([], [], "a log must have at least one sample, got none"),
-        ([0.0, 1.0], [0.0], "x must have 2 samples, got 1"),
+        ([0.0, 1.0], [0.0], "x_meas must have 2 samples, got 1"),
         ([[0.0]], [[0.0]], r"x_d must be one-dimensional, got shape \(1, 1\)"),
         ([0.0, math.nan], [0.0, 0.0], "x_d must be finite, got nan at sample 1"),
-        ([0.0, 0.0], [0.0, math.inf], "x must be finite, got inf at sample 1"),
+        ([0.0, 0.0], [0.0, math.inf], "x_meas must be finite, got inf at sample 1"),
         (["a"], [0.0], "x_d must be numbers"),
     ],
 )
@@ -268,7 +268,9 @@ def test_missing_measurements_are_bridged_with_trust_and_refused_without() -> No
     holes = x.copy()
     holes[300:320:2] = np.nan
     holes[500:520] = np.nan  # a whole window
-    with pytest.raises(SignalError, match="x must be finite, got nan at sample 300: missing measurements need trust"):
+    with pytest.raises(
+        SignalError, match="x_meas must be finite, got nan at sample 300: missing measurements need trust"
+    ):
         backtest(predictor(), x_d, holes)
     with pytest.raises(
         SignalError, match="x of the chunk from sample 500 on must be finite, got nan at sample 0: miss"

@@ -203,3 +203,11 @@ def test_a_file_that_is_no_predictor(tmp_path: Path) -> None:
     path.write_text("t,x_d,x\n" * 10)
     with pytest.raises(StateError, match=r"^a saved state of kind 'predictor' was expected, got 80 bytes of"):
         HybridPredictor.load(path)
+
+
+def test_a_predictor_says_its_settings_and_how_much_it_has_learned() -> None:
+    found = HybridPredictor(MODEL, PredictorSettings(Np=20, p=5, q=2))
+    assert repr(found) == "HybridPredictor(Np = 20, p = 5, q = 2, T_s = 0.001, trust = True, n_learned = 0)"
+    found.predict(np.zeros(20))
+    found.update(np.full(20, 1e-6))
+    assert repr(found).endswith("n_learned = 20)")
