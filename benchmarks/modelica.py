@@ -21,7 +21,8 @@ import rumoca
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.fmi.archive import build_fmu, fmu_name
+from hybridsep.fmi.archive import build_fmu
+from hybridsep.fmi.spec import fmu_name
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.trajectory import spiral, staircase
 

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .cosim.loop import cosimulate
     from .cosim.run import Run
     from .evaluate.backtest import backtest, backtest_stream
-    from .fmi.archive import build_fmu, fmu_names
+    from .fmi.archive import build_fmu
+    from .fmi.spec import fmu_names
     from .logs.log import Log, open_log, read_log
     from .machines.machine import Machine, load_machine, machine_names
     from .machines.paper import paper_machine
@@ -94,7 +95,7 @@ _MODULES = {
     "backtest_stream": "evaluate.backtest",
     "build_fmu": "fmi.archive",
     "cosimulate": "cosim.loop",
-    "fmu_names": "fmi.archive",
+    "fmu_names": "fmi.spec",
     "load_machine": "machines.machine",
     "machine_names": "machines.machine",
     "open_log": "logs.log",

@@ -15,7 +15,8 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.archive import build_fmu
+from hybridsep.fmi.spec import fmu_names
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive

@@ -137,8 +137,8 @@ def _jobs_of(
     fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
 ) -> list[Job]:
     """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
-    from ..fmi.archive import fmu_name, fmu_names
     from ..fmi.compile import check_available
+    from ..fmi.spec import fmu_name, fmu_names
     from ..machines.machine import load_machine, machine_names
 
     versions = versions_of(fmi, flavour)

@@ -187,8 +187,8 @@ def _check_pair(
     """
     from ..cosim.adapters import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
-    from ..fmi.archive import fmu_names
     from ..fmi.compile import check_available
+    from ..fmi.spec import fmu_names
 
     models = fmu_names(axis, flavour).values()
     if plant is None and "FeedDrive" not in models:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..base.output import written_text
-from ..fmi.archive import default_flavour, fmu_names
+from ..fmi.archive import default_flavour
 from ..fmi.flavours import FMI_VERSIONS, versions_of
+from ..fmi.spec import fmu_names
 from ..machines.machine import load_machine
 from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
 from .compensation import COMPENSATED

@@ -22,9 +22,10 @@ from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..cosim.adapters import FmuController
-from ..fmi.archive import build_here, fmu_name
+from ..fmi.archive import build_here
 from ..fmi.compile import check_available, has_native
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
+from ..fmi.spec import fmu_name
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.output_error import in_time

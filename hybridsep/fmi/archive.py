@@ -15,14 +15,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..fmi import native, python
 from ..machines.machine import Machine
 from .compile import ALL_TARGETS, default_targets, expanded, has_native
-from .flavours import FLAVOURS, FMI_VERSIONS, check_version, versions_of
-from .spec import Fmu
+from .flavours import FLAVOURS, FMI_VERSIONS, versions_of
+from .spec import FmuSpec, fmu_name, fmu_names
 
 __all__ = [
     "archived",
@@ -30,12 +29,9 @@ __all__ = [
     "build_here",
     "build_pair",
     "default_flavour",
-    "fmu_name",
-    "fmu_names",
     "other_platforms",
 ]
 
-_SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
@@ -44,35 +40,6 @@ _LEVEL = 6
 
 _COMPRESSED = ".fmu"
 """Suffix of what is stored as it is."""
-
-
-def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
-    """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
-
-    A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
-    ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one.
-
-    Raises
-    ------
-    FmuError
-        If the flavour is unknown, or has no FMUs of this version of FMI.
-    """
-    models = ["HybridPredictor"]
-    if machine.drive_limits is not None:
-        models.append("SepCompensator")
-    if machine.plant is not None:
-        models.append("FeedDrive")
-    if machine.name == DEFAULT_MACHINE and flavour == "native":
-        models.append("ReferenceTrajectory")
-    return {fmu_name(model, machine.name, flavour, fmi): model for model in models}
-
-
-def fmu_name(model: str, machine: str, flavour: str, fmi: str = FMI_VERSIONS[0]) -> str:
-    """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
-    if flavour not in FLAVOURS:
-        raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
-    check_version(flavour, fmi)
-    return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
 def build_fmu(
@@ -152,11 +119,19 @@ def build_fmu(
             from .weights import load_trained  # which loads slowly
 
             trained = load_trained(weights, machine, model)
-        fmu = Fmu.of(machine, model, name, fmi=fmi, samples=samples, trained=trained, origin=origin, windows=windows)
+        spec = FmuSpec.of(
+            *(machine, model),
+            flavour=flavour,
+            fmi=fmi,
+            samples=samples,
+            trained=trained,
+            origin=origin,
+            windows=windows,
+        )
         if flavour == "native":
-            files = native.files(fmu, targets=targets, embed_weights=embed_weights)
+            files = native.files(spec, targets=targets, embed_weights=embed_weights)
         else:
-            files = python.files(fmu)
+            files = python.files(spec)
         file.write(archived(files))
     return path
 

@@ -16,7 +16,7 @@ from xml.etree import ElementTree as ET
 from ..base.version import __version__
 from .c_header import layout_of
 from .flavours import FMI_VERSIONS
-from .spec import Fmu, author, copyright_notice, fmu_title, generation_time, paper_note, stop_time
+from .spec import AUTHOR, COPYRIGHT, FmuSpec, generation_time
 from .variables import INTERPOLATED, FmuTable, Variable
 
 __all__ = [
@@ -37,26 +37,24 @@ __all__ = [
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def model_description(fmu: Fmu, guid: str, generation_tool: str, *, native: bool) -> bytes:
+def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
     """Return the XML document, the same bytes for the same arguments.
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
         The machine's sampling interval and trajectory make the default experiment.
     guid : str
         Follows from the content; see :mod:`hybridsep.fmi.spec`.
     generation_tool : str
-    native : bool
-        Whether the FMU is made of C sources, which take their memory from the importer's functions, extrapolate inputs
-        and need no more than their own binary; otherwise it needs a Python.
     """
-    table = fmu.table.shown
-    root = _begun("modelDescription.xml", fmu, table, {"guid": guid}, generation_tool)
+    # C sources take their memory from the importer, extrapolate inputs and need no more than their own binary
+    table, native = spec.table.shown, spec.flavour == "native"
+    root = _begun("modelDescription.xml", spec, table, {"guid": guid}, generation_tool)
     simulation, _, types, _, _, variables, structure = root
     simulation.attrib |= {
         "needsExecutionTool": xml_text(not native),
-        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[fmu.table.model])),
+        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[spec.table.model])),
         "canNotUseMemoryManagementFunctions": xml_text(not native),
     }
     if native:
@@ -73,7 +71,7 @@ def model_description(fmu: Fmu, guid: str, generation_tool: str, *, native: bool
 
 
 def _begun(
-    file: str, fmu: Fmu, table: Sequence[Variable], token: Mapping[str, str], generation_tool: str
+    file: str, spec: FmuSpec, table: Sequence[Variable], token: Mapping[str, str], generation_tool: str
 ) -> ET.Element:
     """Return a template with what all versions of FMI say alike: names, units and the default experiment.
 
@@ -81,28 +79,28 @@ def _begun(
     ----------
     file : str
         The template.
-    fmu, generation_tool
+    spec, generation_tool
         As :func:`model_description` has them.
     table : sequence of Variable
     token : mapping
         What the version calls the GUID → the GUID.
     """
-    machine, model, name, root = fmu.machine, fmu.table.model, fmu.table.name, template(file)
+    name, root = spec.table.name, template(file)
     simulation, units, _, _, experiment, _, _ = root
     root.attrib |= {
         "modelName": name,
         **token,
-        "description": fmu_title(machine, model) + paper_note(machine, model),
+        "description": spec.title,
         "version": __version__,
-        "author": author(),
-        "copyright": copyright_notice(),
+        "author": AUTHOR,
+        "copyright": COPYRIGHT,
         "generationTool": generation_tool,
         "generationDateAndTime": generation_time(),
     }
     simulation.set("modelIdentifier", name)
     used = {variable.unit for variable in table}
     units[:] = [unit for unit in unit_elements() if unit.get("name") in used]
-    experiment.attrib |= {"stopTime": xml_text(stop_time(fmu)), "stepSize": xml_text(machine.T_s)}
+    experiment.attrib |= {"stopTime": xml_text(spec.stop_time), "stepSize": xml_text(spec.machine.T_s)}
     return root
 
 
@@ -262,24 +260,24 @@ _OWN_STEPS = ("FeedDrive",)
 """Models whose internal steps divide the communication step; all others sample at T_s."""
 
 
-def fmi3_description(fmu: Fmu, token: str, generation_tool: str) -> bytes:
+def fmi3_description(spec: FmuSpec, token: str, generation_tool: str) -> bytes:
     """Return the XML document of a native FMU, the same bytes for the same arguments.
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
         The machine's sampling interval and trajectory make the default experiment.
     token : str
         The instantiation token, which follows from the content; see :mod:`hybridsep.fmi.spec`.
     generation_tool : str
     """
-    table = fmi3_variables(fmu.table)
+    table = fmi3_variables(spec.table)
     own_table = [each.variable for each in table]
     named = {"instantiationToken": token}
-    root = _begun("modelDescription3.xml", fmu, own_table, named, generation_tool)
+    root = _begun("modelDescription3.xml", spec, own_table, named, generation_tool)
     simulation, _, types, _, _, variables, structure = root
-    if fmu.table.model not in _OWN_STEPS:
-        simulation.set("fixedInternalStepSize", xml_text(fmu.machine.T_s))
+    if spec.table.model not in _OWN_STEPS:
+        simulation.set("fixedInternalStepSize", xml_text(spec.machine.T_s))
     for variable, attributes in _types_of(own_table):
         # fmpy up to 0.3.23 reads no EnumerationType that has a description; the variable and the items have theirs
         del attributes["description"]

@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 
 from ..base.version import __version__
 from .description import document, xml_text
-from .spec import author, generation_time
+from .spec import AUTHOR, FmuSpec, generation_time
 
 __all__ = [
     "AGREEMENT",
@@ -115,31 +115,28 @@ _SRMD = "http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData"
 _STC = "http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon"
 
 
-def resource_data(name: str, guid: str, origin: Mapping[str, Any]) -> bytes:
-    """Return the document.
+def resource_data(spec: FmuSpec, guid: str) -> bytes:
+    """Return the document of an FMU with an origin, whose tables and lists become keywords with dots and numbers.
 
     Parameters
     ----------
-    name : str
-        Model identifier.
+    spec : FmuSpec
     guid : str
         The modelDescription's.
-    origin : mapping
-        What the FMU was made from, plain values; tables and lists in it become keywords with dots and numbers.
     """
     ET.register_namespace("srmd", _SRMD)
     ET.register_namespace("stc", _STC)
     attributes = {
         "version": "1.0.0",
-        "name": f"{name}: origin",
+        "name": f"{spec.table.name}: origin",
         "description": "log, settings and figures of the fit that the FMU comes from; lengths in m, times in s",
-        "author": author(),
+        "author": AUTHOR,
         "generationTool": f"hybridsep {__version__}",
         "generationDateAndTime": generation_time(),
     }
     root = ET.Element(f"{{{_SRMD}}}SimulationResourceMetaData", attributes)
     entries = ET.SubElement(root, f"{{{_STC}}}Classification", type=_CLASSIFICATION)
-    for keyword, text in (("model.guid", guid), *_flat("", origin)):
+    for keyword, text in (("model.guid", guid), *_flat("", spec.origin)):
         ET.SubElement(entries, f"{{{_STC}}}ClassificationEntry", keyword=keyword).text = text
     return document(root)
 

@@ -35,7 +35,7 @@ from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .flavours import FMI_VERSIONS
 from .pages import compile_note, dependencies_note, icon, index_page, reference_note
 from .reference import has_reference, reference_run
-from .spec import Fmu, content_guid
+from .spec import FmuSpec, content_guid
 from .variables import FmuTable
 
 __all__ = [
@@ -64,12 +64,12 @@ Those for Windows have parts of mingw-w64 besides:
 {}"""
 
 
-def files(fmu: Fmu, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
+def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
     targets, embed_weights
         As in :func:`hybridsep.fmi.archive.build_fmu`.
 
@@ -78,7 +78,7 @@ def files(fmu: Fmu, *, targets: Sequence[str] | None = None, embed_weights: bool
     FmuError
         If it cannot be compiled.
     """
-    table, fmi = fmu.table, fmu.fmi
+    table, fmi = spec.table, spec.fmi
     model, name = table.model, table.name
     content = {f"sources/{file}": text for file, text in sources(table, "", fmi).items()}
     del content["sources/hsep_fmu.h"]  # names the GUID
@@ -88,31 +88,31 @@ def files(fmu: Fmu, *, targets: Sequence[str] | None = None, embed_weights: bool
     reference = "this FMU" if has_reference(table) else None
     if reference:
         content |= reference_note(table)
-    content["documentation/index.html"] = index_page(fmu, needs, reference=reference, sources=compile_note(name, fmi))
+    content["documentation/index.html"] = index_page(spec, needs, reference=reference, sources=compile_note(name, fmi))
     if fmi == "3":
         content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
     else:
         content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
-        content |= {f"resources/{file}": data for file, data in _trajectories(fmu.machine.T_s, fmu.samples).items()}
+        content |= {f"resources/{file}": data for file, data in _trajectories(spec.machine.T_s, spec.samples).items()}
     weights = None
-    if fmu.trained is not None:
+    if spec.trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
-        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(fmu.trained)
+        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
     tool = f"hybridsep {__version__}"
     if fmi == "3":
-        content["modelDescription.xml"] = fmi3_description(fmu, guid, tool)
+        content["modelDescription.xml"] = fmi3_description(spec, guid, tool)
     else:
-        content["modelDescription.xml"] = model_description(fmu, guid, tool, native=True)
+        content["modelDescription.xml"] = model_description(spec, guid, tool)
     if reference:
-        content |= reference_run(fmu, guid, content, native=True)
-    if fmu.origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
+        content |= reference_run(spec, guid, content)
+    if spec.origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
     compiled = libraries(table.kind, targets or default_targets())
     content[MANIFEST_FILE] = manifest(content)
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}

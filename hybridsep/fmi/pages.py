@@ -10,7 +10,7 @@ from string import Template
 
 from .description import fmi3_variables
 from .extras import AGREEMENT, RELATED_FOLDER
-from .spec import Fmu, fmu_title, paper_note
+from .spec import FmuSpec
 from .variables import FmuTable, Variable
 
 __all__ = [
@@ -66,7 +66,7 @@ def filled(template: str, **values: object) -> str:
 
 
 def index_page(
-    fmu: Fmu,
+    spec: FmuSpec,
     needs: str,
     *,
     reference: str | None = None,
@@ -77,7 +77,7 @@ def index_page(
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
         The machine's sources are listed, and types named as its version of FMI has them.
     needs : str
         Requirements of the FMU, one sentence.
@@ -86,8 +86,8 @@ def index_page(
     limits, sources : str
         Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
     """
-    machine, model, name = fmu.machine, fmu.table.model, fmu.table.name
-    table = fmu.table.shown if fmu.fmi == "2" else [each.shown for each in fmi3_variables(fmu.table)]
+    model, name = spec.table.model, spec.table.name
+    table = spec.table.shown if spec.fmi == "2" else [each.shown for each in fmi3_variables(spec.table)]
     rows = "\n".join(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
@@ -96,12 +96,12 @@ def index_page(
     table_of_inputs = f'<a href="../{RELATED_FOLDER}/{name}_in.csv">{name}_in.csv</a>'
     run = {"folder": RELATED_FOLDER, "origin": reference, "inputs": f", fed with {table_of_inputs}" * has_inputs}
     digits = AGREEMENT.get(model, 11)
-    named = _SOURCES.get(model, machine.sources) or ("none is named in the machine file",)
+    named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
     page = filled(
         "index",
         name=name,
-        title=html.escape(fmu_title(machine, model) + paper_note(machine, model)),
+        title=html.escape(spec.title),
         needs=html.escape(needs),
         computes=filled(model, steps=filled("steps"), residual=filled("residual")),
         partner=partner,

@@ -24,7 +24,7 @@ from .description import model_description
 from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .pages import dependencies_note, filled, icon, index_page, reference_note
 from .reference import has_reference, reference_run
-from .spec import Fmu, content_guid
+from .spec import FmuSpec, content_guid
 
 __all__ = [
     "checked_version",
@@ -56,12 +56,12 @@ _LAUNCHER = "launcher.py"
 """The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
 
 
-def files(fmu: Fmu) -> dict[str, bytes]:
+def files(spec: FmuSpec) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
         Of FMI 2.0.
 
     Raises
@@ -69,37 +69,37 @@ def files(fmu: Fmu) -> dict[str, bytes]:
     FmuError
         If the pythonfmu that is installed is of another series than 0.7.
     """
-    model, name = fmu.table.model, fmu.table.name
+    model, name = spec.table.model, spec.table.name
     version = checked_version()
     content = _resources(model)
-    if fmu.trained is not None:
+    if spec.trained is not None:
         from .weights import WEIGHTS_FILE, weights_file
 
-        content[f"resources/{WEIGHTS_FILE}"] = weights_file(fmu.trained)
+        content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)
     content["model.png"] = icon(model)
     content |= dependencies_note(_DEPENDENCIES.format(version))
-    reference = "its native twin" if has_reference(fmu.table) else None
+    reference = "its native twin" if has_reference(spec.table) else None
     if reference:
-        content |= reference_note(fmu.table)
-    page = index_page(fmu, needs, limits=limits, reference=reference)
+        content |= reference_note(spec.table)
+    page = index_page(spec, needs, limits=limits, reference=reference)
     content["documentation/index.html"] = page
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
     content["documentation/licenses/license.txt"] = (data_folder("fmu_src").parent / "LICENSE").read_bytes()
     content["documentation/licenses/pythonfmu.txt"] = _license()
-    guid = content_guid(content, fmu.table)
+    guid = content_guid(content, spec.table)
     content["resources/machine.json"] = json.dumps(
-        {**fmu.table.as_json(), "content": guid}, indent=1, sort_keys=True
+        {**spec.table.as_json(), "content": guid}, indent=1, sort_keys=True
     ).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
-    content["modelDescription.xml"] = model_description(fmu, guid, tool, native=False)
+    content["modelDescription.xml"] = model_description(spec, guid, tool)
     if reference:
-        content |= reference_run(fmu, guid, content, native=False)
-    if fmu.origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(name, guid, fmu.origin)
+        content |= reference_run(spec, guid, content)
+    if spec.origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
     content[MANIFEST_FILE] = manifest(content)
     return content
 

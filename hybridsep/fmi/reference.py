@@ -32,7 +32,7 @@ from ..plants.trajectory import staircase
 from .c_header import TABLE_FILE, table_file
 from .compile import TARGETS, host_target, is_kept_here, libraries
 from .extras import EXPERIMENT_FILE, RELATED_FOLDER, experiment
-from .spec import Fmu, table_of
+from .spec import FmuSpec, table_of
 from .variables import FmuTable
 
 if TYPE_CHECKING:
@@ -84,19 +84,17 @@ def has_reference(table: FmuTable) -> bool:
     return int(table.parameters.get("preview", table.parameters.get("Np", 0))) <= _WINDOW_MAX
 
 
-def reference_files(
-    machine: Machine, table: FmuTable, model: _ReferenceModel, drive: _ReferenceModel | None = None
-) -> dict[str, bytes]:
+def reference_files(spec: FmuSpec, model: _ReferenceModel, drive: _ReferenceModel | None = None) -> dict[str, bytes]:
     """Return experiment, input, result and options of one FMU: archive name → content.
 
     Parameters
     ----------
-    machine : Machine
-    table : FmuTable
+    spec : FmuSpec
     model : _ReferenceModel
     drive : _ReferenceModel, optional
         The machine's plant, behind a look-ahead; a linear drive 2 % off if left out.
     """
+    machine, table = spec.machine, spec.table
     T_s = machine.T_s
     outputs = {name: variable.kind for name, variable in table.named("output").items()}
     names, given = list(outputs), list(table.named("input"))
@@ -366,22 +364,22 @@ class _TrajectoryModel:
         self._k += 1
 
 
-def library_models(fmu: Fmu) -> tuple[_ReferenceModel, _ReferenceModel | None]:
+def library_models(spec: FmuSpec) -> tuple[_ReferenceModel, _ReferenceModel | None]:
     """Return the models of a reference run: :func:`library_model`, and the machine's plant if it has one."""
-    plant = None if fmu.machine.plant is None else _plant(fmu.machine)
-    return library_model(fmu), plant
+    plant = None if spec.machine.plant is None else _plant(spec.machine)
+    return library_model(spec), plant
 
 
-def library_model(fmu: Fmu) -> _ReferenceModel:
+def library_model(spec: FmuSpec) -> _ReferenceModel:
     """Return the model of an FMU, at its start values."""
     from ..online.look_ahead import LookAhead  # which loads slowly
     from .weights import restore_weights, weights_file
 
-    machine, table = fmu.machine, fmu.table
+    machine, table = spec.machine, spec.table
     if table.model == "FeedDrive":
         return _plant(machine)
     if table.model == "ReferenceTrajectory":
-        played = staircase(machine.T_s) if fmu.samples is None else as_samples(fmu.samples, "samples")
+        played = staircase(machine.T_s) if spec.samples is None else as_samples(spec.samples, "samples")
         return _TrajectoryModel(played.tolist())
     t_init = table.parameters["t_init"]
     if table.model == "HybridPredictor":
@@ -391,8 +389,8 @@ def library_model(fmu: Fmu) -> _ReferenceModel:
         compensator = machine.new_compensator(predictor=replace(machine.compensator_predictor, t_init=t_init))
         predictor = compensator.predictor
         look_ahead = LookAhead(compensator, 0.0)
-    if fmu.trained is not None:
-        restore_weights(predictor, weights_file(fmu.trained))
+    if spec.trained is not None:
+        restore_weights(predictor, weights_file(spec.trained))
     return _LookAheadModel(look_ahead, list(table.named("output")))
 
 
@@ -405,7 +403,7 @@ def _plant(machine: Machine) -> _PlantModel:
 _FOLDER = "resources/"
 
 
-def reference_run(fmu: Fmu, guid: str, content: Mapping[str, bytes], *, native: bool) -> dict[str, bytes]:
+def reference_run(spec: FmuSpec, guid: str, content: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return the files of :func:`~hybridsep.fmi.reference.reference_files`.
 
     Platforms differ in the last digits, so they stay out of the GUID, as the binaries do. A Python FMU's are its native
@@ -413,25 +411,23 @@ def reference_run(fmu: Fmu, guid: str, content: Mapping[str, bytes], *, native: 
 
     Parameters
     ----------
-    fmu : Fmu
+    spec : FmuSpec
     guid : str
         The modelDescription's.
     content : mapping
-        Archive name → content; a native model reads ``resources/``.
-    native : bool
-        Whether the FMU is native, so that its library is compiled where it is not there.
+        Archive name → content; a native model reads ``resources/``, and its library is compiled where it is not there.
     """
     resources = {
         file.removeprefix(_FOLDER): data
         for file, data in content.items()
         if file.startswith(_FOLDER) and file.endswith(".bin")
     }
-    machine, table = fmu.machine, fmu.table
+    machine, table = spec.machine, spec.table
     plant = None if machine.plant is None else table_of(machine, "FeedDrive", "drive")
-    if native or all(is_kept_here(each.kind) for each in (table, plant) if each is not None):
+    if spec.flavour == "native" or all(is_kept_here(each.kind) for each in (table, plant) if each is not None):
         with ExitStack() as running:
             model = running.enter_context(_host_fmu(table, guid, resources, machine.T_s))
             if model is not None:
                 drive = None if plant is None else running.enter_context(_host_fmu(plant, "{drive}", {}, machine.T_s))
-                return reference_files(machine, table, model, drive)
-    return reference_files(machine, table, *library_models(fmu))
+                return reference_files(spec, model, drive)
+    return reference_files(spec, *library_models(spec))

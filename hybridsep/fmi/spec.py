@@ -13,45 +13,45 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.settings import PARAMETERS
-from ..base.signals import as_samples
+from ..base.signals import Array, as_samples
 from ..base.version import VERSION_DATE
 from ..machines.machine import Machine
 from ..machines.paper import PAPER_SETTINGS
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from .flavours import FMI_VERSIONS
+from .flavours import FLAVOURS, FMI_VERSIONS, check_version
 from .variables import SAMPLES_TRAJECTORY, FmuTable
 
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-__all__ = [
-    "Fmu",
-    "author",
-    "content_guid",
-    "copyright_notice",
-    "fmu_title",
-    "generation_time",
-    "paper_note",
-    "stop_time",
-    "table_of",
-]
+__all__ = ["AUTHOR", "COPYRIGHT", "FmuSpec", "content_guid", "fmu_name", "fmu_names", "generation_time", "table_of"]
+
+
+_SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
 
 @dataclass(frozen=True, eq=False)
-class Fmu:
-    """What an FMU is made from.
+class FmuSpec:
+    """A machine on its way into an archive: names, table, title and default experiment, resolved once.
 
     Attributes
     ----------
     machine : Machine
     table : FmuTable
+        Model, model identifier, start values and variables.
+    flavour : {"native", "python"}
     fmi : {"2", "3"}
         Version of FMI.
-    samples : (n,) array_like, m, or None
+    title : str
+        Description of the FMU.
+    stop_time : float, s
+        End of the default experiment.
+    samples : (n,) array, m, or None
         Trajectory 3 of a ReferenceTrajectory.
     trained : HybridPredictor or None
         With which a HybridPredictor or SepCompensator starts warm.
@@ -61,8 +61,11 @@ class Fmu:
 
     machine: Machine
     table: FmuTable
-    fmi: str = FMI_VERSIONS[0]
-    samples: ArrayLike | None = None
+    flavour: str
+    fmi: str
+    title: str
+    stop_time: float
+    samples: Array | None = None
     trained: HybridPredictor | None = None
     origin: Mapping[str, Any] | None = None
 
@@ -71,19 +74,60 @@ class Fmu:
         cls,
         machine: Machine,
         model: str,
-        name: str,
         *,
+        flavour: str = FLAVOURS[0],
         fmi: str = FMI_VERSIONS[0],
         samples: ArrayLike | None = None,
         trained: HybridPredictor | None = None,
         origin: Mapping[str, Any] | None = None,
         windows: bool = True,
         rest: float = 0.0,
-    ) -> Fmu:
-        """Return an FMU of a machine; arguments as the attributes, and as :func:`table_of`."""
-        built_in = {"samples": samples is not None, "warm": trained is not None}
-        table = table_of(machine, model, name, **built_in, windows=windows, rest=rest)
-        return cls(machine, table, fmi, samples, trained, origin)
+    ) -> FmuSpec:
+        """Return the FMU of a model; arguments as the attributes, and as :func:`table_of`.
+
+        Raises
+        ------
+        FmuError
+            If the flavour is unknown, or has no FMUs of this version of FMI.
+        SignalError
+            If ``samples`` is not finite or empty.
+        """
+        played = None if samples is None else as_samples(samples, "samples")
+        if played is not None:
+            as_samples(played[:1], "samples", 1)
+        name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
+        table = table_of(machine, model, name, **built_in, warm=trained is not None, windows=windows, rest=rest)
+        title, end = _title(machine, model), _stop_time(machine, table, played)
+        return cls(machine, table, flavour, fmi, title, end, played, trained, origin)
+
+
+def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
+    """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
+
+    A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
+    ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one.
+
+    Raises
+    ------
+    FmuError
+        If the flavour is unknown, or has no FMUs of this version of FMI.
+    """
+    models = ["HybridPredictor"]
+    if machine.drive_limits is not None:
+        models.append("SepCompensator")
+    if machine.plant is not None:
+        models.append("FeedDrive")
+    if machine.name == DEFAULT_MACHINE and flavour == "native":
+        models.append("ReferenceTrajectory")
+    return {fmu_name(model, machine.name, flavour, fmi): model for model in models}
+
+
+def fmu_name(model: str, machine: str, flavour: str, fmi: str = FMI_VERSIONS[0]) -> str:
+    """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
+    if flavour not in FLAVOURS:
+        raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
+    check_version(flavour, fmi)
+    return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
 def table_of(
@@ -149,8 +193,9 @@ def _modes(model: ModalModel) -> tuple[dict[str, float], ...]:
     return tuple(asdict(mode) for mode in model.modes)
 
 
-_AUTHOR = "the hybridsep authors"
-_YEAR = "2026"
+AUTHOR = "the hybridsep authors"
+COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"
+"""The line of LICENSE."""
 
 _TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
@@ -160,27 +205,18 @@ _TITLES = {
 }
 
 
-def fmu_title(machine: Machine, model: str) -> str:
-    """Return an FMU's title; ReferenceTrajectory's is the same for every machine."""
-    return _TITLES[model] if model == "ReferenceTrajectory" else f"{machine.title}: {_TITLES[model]}"
+def _title(machine: Machine, model: str) -> str:
+    """Return the title, with the paper's settings of a predictor that it has figures for.
 
-
-def paper_note(machine: Machine, model: str) -> str:
-    """Return which settings of a predictor are the paper's, of a machine that it has figures for; else nothing."""
+    ReferenceTrajectory's is the same for every machine.
+    """
+    if model == "ReferenceTrajectory":
+        return _TITLES[model]
+    title = f"{machine.title}: {_TITLES[model]}"
     if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
-        return ""
+        return title
     settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
-    return f"; the paper's settings are {settings}"
-
-
-def author() -> str:
-    """Return the author of the FMUs, as LICENSE names him."""
-    return _AUTHOR
-
-
-def copyright_notice() -> str:
-    """Return the line of LICENSE."""
-    return f"Copyright (c) {_YEAR}, {_AUTHOR}"
+    return f"{title}; the paper's settings are {settings}"
 
 
 def generation_time() -> str:
@@ -218,18 +254,17 @@ def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
 _WITHOUT_TRAJECTORY = 10.0  # s
 
 
-def stop_time(fmu: Fmu) -> float:
-    """Return the end of the FMU's samples, or of the machine's trajectory, with the look-ahead's delay, s.
+def _stop_time(machine: Machine, table: FmuTable, samples: Array | None) -> float:
+    """Return the end of the samples, or of the machine's trajectory, with the look-ahead's delay, s.
 
     With ``[limits]`` the trajectory is the staircase within them; without it is 10 s.
     """
-    machine = fmu.machine
-    if fmu.samples is not None:
-        n = len(as_samples(fmu.samples, "samples"))
+    if samples is not None:
+        n = len(samples)
     elif machine.limits is not None:
         n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
     else:
         return _WITHOUT_TRAJECTORY
     # A compensator delays by its preview, everything else runs beside a predictor.
-    delay = int(fmu.table.parameters.get("preview", machine.predictor_settings.Np))
+    delay = int(table.parameters.get("preview", machine.predictor_settings.Np))
     return round((n - 1 + delay) * machine.T_s, 9)

@@ -20,10 +20,10 @@ from ..base.signals import as_samples
 from ..base.version import __version__
 from ..fmi import native
 from ..machines.machine import Machine
-from .archive import archived, fmu_name
+from .archive import archived
 from .description import fmi3_variables, unit_elements
 from .flavours import FMI_VERSIONS
-from .spec import Fmu
+from .spec import FmuSpec
 from .variables import Variable
 
 __all__ = [
@@ -296,7 +296,6 @@ def build_system(
     components, sets = [], {}
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
-        name = fmu_name(kind, machine.name, "native", fmi)
         trained = None
         if weights is not None and part == look_ahead:
             from .weights import load_trained  # which loads slowly
@@ -305,9 +304,10 @@ def build_system(
         played = samples if part == "reference" else None
         # windows are no connectors, and thousands of errors of one importer's
         rest = float(samples[0])
-        fmu = Fmu.of(machine, kind, name, fmi=fmi, samples=played, trained=trained, windows=False, rest=rest)
-        content[f"resources/{name}.fmu"] = archived(native.files(fmu, targets=targets))
-        components.append(Component(part, f"{name}.fmu", _variables(fmu)))
+        spec = FmuSpec.of(machine, kind, fmi=fmi, samples=played, trained=trained, windows=False, rest=rest)
+        name = spec.table.name
+        content[f"resources/{name}.fmu"] = archived(native.files(spec, targets=targets))
+        components.append(Component(part, f"{name}.fmu", _variables(spec)))
         sets[part] = f"{machine.name}_{part}.ssv"
         content[f"resources/{sets[part]}"] = _parameter_set(components[-1], ssp)
     connections: list[Connection] = [
@@ -325,8 +325,8 @@ def build_system(
     return Path(path)
 
 
-def _variables(fmu: Fmu) -> tuple[Variable, ...]:
+def _variables(spec: FmuSpec) -> tuple[Variable, ...]:
     """Return an FMU's variables, of FMI 3.0 the scalar ones."""
-    if fmu.fmi == FMI_VERSIONS[0]:
-        return fmu.table.shown
-    return tuple(each.variable for each in fmi3_variables(fmu.table) if each.size is None)
+    if spec.fmi == FMI_VERSIONS[0]:
+        return spec.table.shown
+    return tuple(each.variable for each in fmi3_variables(spec.table) if each.size is None)

@@ -16,10 +16,9 @@ from fmi3_rules import RULES, Archive, violations
 from fmpy.validation import validate_fmu
 
 from hybridsep.base.data_files import data_folder
-from hybridsep.fmi.archive import fmu_names
 from hybridsep.fmi.compile import ALL_TARGETS, TARGETS, placed
 from hybridsep.fmi.description import ICON_FILE, TERMINALS, build_description, fmi3_description, terminals_and_icons
-from hybridsep.fmi.spec import Fmu
+from hybridsep.fmi.spec import FmuSpec, fmu_names
 from hybridsep.machines.machine import load_machine
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
@@ -149,7 +148,7 @@ def test_a_rotary_axis_keeps_the_rules(tmp_path: Path) -> None:
     path.write_text(text + "[drive_limits]\nvelocity = 1.0\nacceleration = 9.0\njerk = 900.0\n", encoding="utf-8")
     machine = load_machine(path)
     for name, model in fmu_names(machine, fmi="3").items():
-        xml = ET.fromstring(fmi3_description(Fmu.of(machine, model, name), "{1}", "tool"))
+        xml = ET.fromstring(fmi3_description(FmuSpec.of(machine, model, fmi="3"), "{1}", "tool"))
         assert xml.find("ModelVariables/Float64[@unit='rad']") is not None
         build, icons = ET.fromstring(build_description(name, "3")), ET.fromstring(terminals_and_icons(model))
         assert violations(Archive(xml, icons, build, [ICON_FILE, "sources/all.c"])) == []

@@ -14,10 +14,9 @@ from built_once import NATIVE, PYTHON, BuiltFmus, each_kind
 from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
-from hybridsep.fmi.archive import fmu_names
 from hybridsep.fmi.description import model_description
 from hybridsep.fmi.flavours import FLAVOURS
-from hybridsep.fmi.spec import Fmu
+from hybridsep.fmi.spec import FmuSpec, fmu_names
 from hybridsep.machines.machine import Machine, load_machine
 
 
@@ -78,8 +77,8 @@ def test_a_rotary_axis_keeps_the_rules(rotary: Machine) -> None:
     for flavour in FLAVOURS:
         names = fmu_names(rotary, flavour)
         assert list(names.values()) == ["HybridPredictor", "SepCompensator"]
-        for name, model in names.items():
-            xml = model_description(Fmu.of(rotary, model, name), "{1}", "tool", native=flavour == "native")
+        for model in names.values():
+            xml = model_description(FmuSpec.of(rotary, model, flavour=flavour), "{1}", "tool")
             assert violations(ET.fromstring(xml)) == []
 
 

@@ -17,8 +17,9 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.fmi.spec import fmu_names
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.machines.paper import PAPER_SETTINGS
 from hybridsep.plants.encoder import Encoder

@@ -23,9 +23,10 @@ from fmpy.validation import validate_fmu
 
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.fmi.archive import archived, build_fmu, fmu_names
+from hybridsep.fmi.archive import archived, build_fmu
 from hybridsep.fmi.compile import ALL_TARGETS, compile_flags, host_target, universal
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.fmi.spec import fmu_names
 from hybridsep.fmi.variables import FmuTable, Variable
 from hybridsep.machines.machine import load_machine
 

@@ -14,10 +14,10 @@ import pytest
 from built_once import BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
 
-from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.extras import RELATED_FOLDER
 from hybridsep.fmi.reference import library_model, library_models, reference_files
-from hybridsep.fmi.spec import Fmu
+from hybridsep.fmi.spec import FmuSpec, fmu_names
 from hybridsep.machines.machine import load_machine, machine_names
 
 NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
@@ -73,7 +73,7 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
     """The files hold what the FMU gave when it was built."""
     axis, base = load_machine(machine), folders(name) / RELATED_FOLDER / name
     model = fmu_names(axis)[name]
-    reference = library_model(Fmu.of(axis, model, name))
+    reference = library_model(FmuSpec.of(axis, model))
     expected = np.genfromtxt(f"{base}_ref.csv", delimiter=",", skip_header=1)
     inputs = (
         np.genfromtxt(f"{base}_in.csv", delimiter=",", skip_header=1) if Path(f"{base}_in.csv").exists() else expected
@@ -88,12 +88,12 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
 @pytest.mark.slow
 def test_the_reference_is_short_and_the_same_every_time() -> None:
     machine = load_machine("spring_mass_damper")
-    fmu = Fmu.of(machine, "HybridPredictor", "H")
-    files = reference_files(machine, fmu.table, *library_models(fmu))
-    assert files == reference_files(machine, fmu.table, *library_models(fmu))
-    names = ("H_in.csv", "H_ref.csv", "H_ref.opt", "reference.exp")
-    assert sorted(files) == [f"{RELATED_FOLDER}/{file}" for file in names]
-    assert b"StopTime, 0.6\n" in files[f"{RELATED_FOLDER}/H_ref.opt"]
+    spec = FmuSpec.of(machine, "HybridPredictor")
+    files = reference_files(spec, *library_models(spec))
+    assert files == reference_files(spec, *library_models(spec))
+    names = [f"HybridPredictor_{end}" for end in ("in.csv", "ref.csv", "ref.opt")]
+    assert sorted(files) == [f"{RELATED_FOLDER}/{file}" for file in (*names, "reference.exp")]
+    assert b"StopTime, 0.6\n" in files[f"{RELATED_FOLDER}/HybridPredictor_ref.opt"]
     assert sum(map(len, files.values())) < 120_000
 
 
@@ -104,9 +104,9 @@ def test_the_reference_of_a_late_measurement_is_late() -> None:
     rms = []
     for late in (0, 5):
         changed = machine.changed("compensator", {"measurement_delay": late})
-        fmu = Fmu.of(changed, "SepCompensator", "C")
-        files = reference_files(changed, fmu.table, *library_models(fmu))
-        table = np.genfromtxt(BytesIO(files[f"{RELATED_FOLDER}/C_ref.csv"]), delimiter=",", names=True)
+        spec = FmuSpec.of(changed, "SepCompensator")
+        files = reference_files(spec, *library_models(spec))
+        table = np.genfromtxt(BytesIO(files[f"{RELATED_FOLDER}/SepCompensator_ref.csv"]), delimiter=",", names=True)
         rms.append(float(table["rms_e"][-1]))
     assert rms[1] == pytest.approx(rms[0], rel=0.2)
 
