@@ -85,7 +85,7 @@ def build(
     """
     from ..fmi.archive import build_fmu
     from ..fmi.compile import library_paths, missing
-    from ..fmi.twincat import CONFIGURATION_FILE, write_configuration
+    from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
     from .outputs import check_outputs
     from .progress import progress_bar

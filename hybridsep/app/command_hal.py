@@ -34,7 +34,7 @@ def hal(
     """
     from ..base.errors import ParameterError
     from ..base.output import written_whole
-    from ..fmi.hal import COMPONENTS, axis_files, check_names, component_files
+    from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
     from ..fmi.weights import WEIGHTS_FILE, load_trained
     from ..machines.machine import load_machine
     from .outputs import check_outputs

@@ -28,7 +28,7 @@ def header(
     axis's modes, settings and, with ``--weights``, what an earlier run has learned.
     """
     from ..base.output import written_text
-    from ..fmi.axis_header import axis_header
+    from ..fmi.controllers import axis_header
     from ..fmi.weights import load_trained
     from ..machines.machine import load_machine, machine_path
     from .outputs import check_outputs

@@ -23,7 +23,7 @@ from command_line import Run
 from places import ROOT
 
 from hybridsep import backtest, load_machine
-from hybridsep.fmi.twincat import CONFIGURATION_FILE, DEFINITIONS
+from hybridsep.fmi.controllers import CONFIGURATION_FILE, DEFINITIONS
 
 STAND_INS = ROOT / "tests" / "c" / "msvc"
 MODELS = ("HybridPredictor", "SepCompensator", "FeedDrive", "HybridPredictorFmi3")

@@ -14,7 +14,7 @@ from c_compiler import build_folder, compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
-from hybridsep.fmi.hal import COMPONENTS, axis_files, component_files
+from hybridsep.fmi.controllers import COMPONENTS, axis_files, component_files
 from hybridsep.machines.machine import Machine
 
 OUT, DELAYED, FB_JOINT, PREDICTED, ERROR, STD, STATE = range(7)

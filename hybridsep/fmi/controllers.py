@@ -1,0 +1,242 @@
+"""Files for controllers that take no FMU as it is: LinuxCNC's component, an axis's C header, TwinCAT's configuration.
+
+The HAL component (``integrations/linuxcnc/hsep.c``) is one file over the C core, for ``halcompile``; what one axis
+differs in is read from a folder when the component is loaded, as an FMU reads its resources: the table
+``variables.bin`` and, of an axis that starts warm, ``weights.bin``.
+
+The C header gives an axis to the library in C (``fmu_src/c``): its modes, settings and weights, as ``hsep.h`` takes
+them, for C99 and C++11; each number is the machine file's to the last bit, as weights are refused with others.
+
+Beckhoff's TE1420, Target for FMI, puts an FMU's sources into a project of Visual Studio; what a tool's sources need
+there stands in an XML file of the form of its ``CustomFMU.xml``, which it finds in its folder of program data.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+from ..base.data_files import data_folder
+from ..base.errors import ParameterError
+from ..base.output import written_whole
+from ..base.version import __version__
+from ..machines.agree import check_drive_limits
+from ..machines.machine import Machine
+from .c_header import TABLE_FILE, c_sources, kind_header, table_file
+from .spec import content_guid, table_of
+from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+
+if TYPE_CHECKING:
+    from ..predict.predictor import HybridPredictor
+
+__all__ = [
+    "COMPONENTS",
+    "CONFIGURATION_FILE",
+    "DEFINITIONS",
+    "axis_files",
+    "axis_header",
+    "check_names",
+    "component_files",
+    "write_configuration",
+]
+
+COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}
+"""Name of the component of each model."""
+
+
+_NAME_MAX = 47 - len("..look-ahead")
+"""Letters that HAL leaves for the names of component and axis together: 47, less the longest pin's."""
+
+
+def check_names(model: str, names: Sequence[str]) -> None:
+    """Raise ParameterError if the names of a component's axes are too long for HAL, or one is there twice."""
+    if len(set(names)) < len(names):
+        raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
+    most = _NAME_MAX - len(COMPONENTS[model])
+    for name in names:
+        if len(name) > most:
+            raise ParameterError(
+                f"an axis's name must have at most {most} letters, as HAL's names have 47, got {len(name)}: {name}; "
+                "change the machine file's name"
+            )
+
+
+def component_files(model: str) -> dict[str, bytes]:
+    """Return the sources of the component: name → content, ``<component>.c`` to be given to ``halcompile``.
+
+    Parameters
+    ----------
+    model : {"SepCompensator", "HybridPredictor"}
+    """
+    name = COMPONENTS[model]
+    text = (data_folder("integrations") / "linuxcnc" / "hsep.c").read_text(encoding="utf-8")
+    sources = {**c_sources(versions=()), "hsep_fmu.h": kind_header(model).encode()}
+    return {
+        f"{name}.c": text.replace('"sources/all.c"', f'"{name}_sources/all.c"').encode(),
+        **{f"{name}_sources/{file}": content for file, content in sources.items()},
+    }
+
+
+def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = None) -> dict[str, bytes]:
+    """Return the files of an axis' folder: name → content.
+
+    Parameters
+    ----------
+    machine : Machine
+    model : {"SepCompensator", "HybridPredictor"}
+    trained : HybridPredictor, optional
+        What an earlier run has learned.
+
+    Raises
+    ------
+    FmuError
+        If a compensator is asked for a machine without limits of its drive.
+    """
+    if model == "SepCompensator":
+        check_drive_limits(machine, "--predictor writes the component that predicts alone")
+    table = table_of(machine, model, machine.name, warm=trained is not None)
+    files: dict[str, bytes] = {}
+    if trained is not None:
+        from .weights import WEIGHTS_FILE, weights_file
+
+        files[WEIGHTS_FILE] = weights_file(trained)
+    return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
+
+
+_PARTS = {"predictor": PREDICTOR_SETTINGS, "trust": TRUST_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
+
+
+def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = None) -> str:
+    """Return the header's text.
+
+    Parameters
+    ----------
+    machine : Machine
+    model : {"SepCompensator", "HybridPredictor"}
+    trained : HybridPredictor, optional
+        What an earlier run has learned.
+
+    Raises
+    ------
+    FmuError
+        If a compensator is asked for a machine without limits of its drive.
+    """
+    compensates = model == "SepCompensator"
+    if compensates:
+        check_drive_limits(machine, "--predictor writes the header of a predictor")
+    numbers = machine.fmi_compensator_parameters() if compensates else machine.fmi_parameters()
+    settings = [
+        f"    parameters->{part}.{name} = {numbers[name] + 0!r};"  # truth values are numbers there
+        for part, names in _PARTS.items()
+        for name in names
+        if name in numbers
+    ]
+    modes = [f"    {{{mode.f_n!r}, {mode.zeta!r}, {mode.alpha!r}, {mode.beta!r}}}," for mode in machine.model.modes]
+    kind, name, guard = "compensator" if compensates else "predictor", machine.name, f"HSEP_AXIS_{machine.name}_H"
+    lines = [
+        f"/* Axis of hybridsep {__version__}: {name}, its {kind}, for hsep.h.",
+        " *",
+        " *     hsep_parameters parameters;",
+        f" *     {name}_parameters(&parameters);",
+        f" *     hsep_{kind}_init(block, &parameters, start, {name}_weights, {name}_weights_size);",
+        " */",
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        '#include "hsep.h"',
+        "",
+        "/* f_n, Hz; zeta; alpha, 1/s^2; beta, 1/s */",
+        f"static const hsep_mode {name}_modes[] = {{",
+        *modes,
+        "};",
+        "",
+        *_weights(name, trained),
+        "",
+        "/* Fill in its settings and modes. */",
+        f"static inline void {name}_parameters(hsep_parameters *parameters)",
+        "{",
+        "    hsep_defaults(parameters);",
+        *settings,
+        f"    parameters->n_modes = {len(modes)};",
+        f"    parameters->modes = {name}_modes;",
+        "}",
+        "",
+        "#endif",
+    ]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _weights(name: str, trained: HybridPredictor | None) -> list[str]:
+    """Return the lines that declare the weights: none, or the content of a weights file."""
+    if trained is None:
+        return [
+            "/* Nothing was learned before: it starts cold. */",
+            f"static const void *const {name}_weights = NULL;",
+            f"static const size_t {name}_weights_size = 0;",
+        ]
+    from .weights import weights_file
+
+    content = weights_file(trained)
+    numbers = textwrap.wrap(", ".join(map(str, content)), 112)
+    return [
+        "/* What an earlier run has learned. */",
+        f"static const unsigned char {name}_weights[] = {{",
+        *(f"    {line}" for line in numbers),
+        "};",
+        f"static const size_t {name}_weights_size = sizeof {name}_weights;",
+    ]
+
+
+CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"
+"""Beside the archives; another name than the template's, which lies where the file goes."""
+
+DEFINITIONS = ("HSEP_NO_FILES", "HSEP_NO_STDIO")
+"""Macros of the compilation: the runtime opens no files, and has printf in part only."""
+
+_ALL = "all.c"
+
+
+def write_configuration(out: Path, archives: Iterable[Path]) -> Path:
+    """Write the configuration for some archives beside them; return its path.
+
+    Parameters
+    ----------
+    out : Path
+        Folder; exists.
+    archives : iterable of Path
+        Native FMUs. ``all.c`` includes all their other sources, which are excluded from the build one by one.
+    """
+    path = out / CONFIGURATION_FILE
+    with written_whole(path) as file:
+        file.write(_configuration(_included_sources(archives)))
+    return path
+
+
+def _included_sources(archives: Iterable[Path]) -> list[str]:
+    names: set[str] = set()
+    for archive in archives:
+        with ZipFile(archive) as opened:
+            names |= {name.removeprefix("sources/") for name in opened.namelist() if name.startswith("sources/")}
+    return sorted(name for name in names if name.endswith(".c") and name != _ALL)
+
+
+def _configuration(excluded: Iterable[str]) -> bytes:
+    root = ElementTree.Element("CustomConfigurations")
+    root.set("xmlns:xsi", "http://www.w3.org/2001/XMLSchema-instance")
+    root.set("xsi:noNamespaceSchemaLocation", "CustomFmu.xsd")
+    tool = ElementTree.SubElement(root, "FmuConfiguration")
+    for name, text in (
+        ("ToolName", f"hybridsep {__version__}"),  # the generationTool of modelDescription.xml
+        ("AdditionalInclude", "$(ProjectDir);$(ProjectDir)sources;"),
+        ("PreprocessorDefinitions", ";".join(DEFINITIONS)),
+        ("ExcludedFromBuild", ";".join(excluded)),
+        ("CodeReplacements", ""),
+    ):
+        ElementTree.SubElement(tool, name).text = text
+    ElementTree.indent(root)
+    content: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return content
