@@ -23,7 +23,6 @@ from hybridsep.evaluate.verdict import ALIKE
 from hybridsep.fitting.advice import recommendation
 from hybridsep.fitting.fit import FitOptions, fit
 from hybridsep.fitting.report import judged_by
-from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log, read_log
 from hybridsep.machines.naming import machine_name
 
@@ -95,19 +94,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def logs(emps: Path | None, recordings: Path | None) -> Iterator[Log]:
     """Yield the logs, as their files are."""
     if emps is not None:
-        yield read_log(emps, columns={"x_d": "qg", "x": "qm"}, uniform=False)
+        yield read_log(emps, columns={"x_d": "qg", "x": "qm"})
     for path in sorted(recordings.glob("*.csv")) if recordings is not None else []:
         if path.name not in COPIES:
-            yield read_log(path, uniform=False)
+            yield read_log(path)
 
 
 def row(log: Log, Np: int) -> Row:
     """Return a row of the table."""
-    used, _ = take_in([log], fix=False)
     with tempfile.TemporaryDirectory() as folder:
-        found = fit(used, Path(folder), FitOptions(Np, machine_name(log.path)), fmus=False)
+        found = fit([log], Path(folder), FitOptions(Np, machine_name(log.path)), fmus=False)
     rms = {one.name: 1e6 * one.rms for one in found.judged.scored()}
-    return Row(log.path.stem, Np, rms, recommendation(judged_by(found, used[0].shown)))
+    return Row(log.path.stem, Np, rms, recommendation(judged_by(found, log.shown)))
 
 
 def summary(rows: Sequence[Row]) -> str:

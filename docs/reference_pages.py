@@ -218,20 +218,14 @@ def messages() -> str:
         _WRITTEN,
         "On the command line an error is one line, `error: …`; in Python it is one of the [exceptions](#exceptions). "
         "Where it "
-        "speaks of a log, it usually lists [findings of the log's checks](#findings), which are also printed as "
-        "`warning: …`, "
-        "`note: …`, `handled: …` and `fixed: …`.",
+        "speaks of a log, it may be a [finding of the log's checks](#findings); others are printed as `note: …`.",
     ]
     rows = ((f"`{text}`", f"[{name}](#{name.lower()})") for name, one in ERRORS.items() for text in one.printed)
     parts += [
         _table(("a message with", "is a"), rows),
         "## Findings",
-        "An **error** is refused by `backtest`, `report` and `tune` until `--fix` or `--as-is`, and by `fit` and "
-        "`identify` "
-        "unless they can repair it; a **warning** makes figures worse than they need be; a **note** is worth knowing. "
-        "`handled` and `fixed` say that a fix was applied, `fixed` that positions mean something else afterwards, so "
-        "that your "
-        "controller must do the same.",
+        "For the first ten a log is refused: its columns do not mean what they were read for. The others are "
+        "**notes**, each with its statistic and a picture in the report; nothing is changed for them.",
     ]
     for name, one in FINDINGS.items():
         parts += [f"### {name}", *_explained(one)]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .evaluate.backtest import backtest, backtest_stream
     from .fmi.archive import build_fmu
     from .fmi.spec import fmu_names
-    from .logs.log import Log, open_log, read_log
+    from .logs.log import Log, read_log
     from .machines.machine import Machine, load_machine, machine_names
     from .machines.paper import paper_machine
     from .model.physics import ModalModel, Mode
@@ -63,7 +63,6 @@ __all__ = [
     "fmu_names",
     "load_machine",
     "machine_names",
-    "open_log",
     "paper_machine",
     "read_log",
     "rest_to_rest",
@@ -98,7 +97,6 @@ _MODULES = {
     "fmu_names": "fmi.spec",
     "load_machine": "machines.machine",
     "machine_names": "machines.machine",
-    "open_log": "logs.log",
     "paper_machine": "machines.paper",
     "read_log": "logs.log",
     "rest_to_rest": "plants.trajectory",

@@ -11,8 +11,6 @@ import typer
 from ..base.output import written_text
 from .options import (
     PREDICTOR_ENTRIES,
-    AsIsOption,
-    FixOption,
     ForceOption,
     JsonOption,
     LogArgument,
@@ -31,8 +29,6 @@ __all__ = ["backtest"]
 def backtest(
     log: LogArgument,
     machine: MachineOption,
-    fix: FixOption = False,
-    as_is: AsIsOption = False,
     weights: SavedOption = None,
     *,
     reading: ReadingOptions,
@@ -58,13 +54,11 @@ def backtest(
     from ..fitting.advice import partly_used, whole_log_words
     from ..fitting.replay import knew, replay_log
     from ..fmi.weights import warm_predictor
-    from ..intake.finding import findings_table
-    from ..intake.repair import changed_by
-    from ..logs.log import Log
+    from ..logs.checks import findings_table
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..predict.predictor import HybridPredictor
-    from .log_intake import CHECKED_MAX, open_checked, reading_of
+    from .logs import read_checked, reading_of
     from .outputs import FIGURES, RUNS, check_outputs
     from .progress import progress_bar
     from .tables import console, print_scores, print_without_first, print_written
@@ -75,7 +69,7 @@ def backtest(
     axis_machine = load_machine(machine)
     saved = list(save or [])
     predictor = warm_predictor(axis_machine.changed("predictor", parameters), weights)
-    how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
+    how = reading_of(axis_machine, reading)
     outputs = [
         ("--out", out, ()),
         ("--figure", figure, FIGURES),
@@ -83,32 +77,27 @@ def backtest(
     ]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
     check_outputs(outputs, inputs, force=force)
-    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
-    shown = shown_of(opened.file_unit, axis_machine.unit)
-    title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
+    read, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.trust)
+    shown = shown_of(read.file_unit, axis_machine.unit)
+    title = f"{axis_machine.title}, {log.name}"
     states = [path for path in saved if path.suffix.lower() == ".state"]
     predictions = [path for path in saved if path not in states]
     with progress_bar(as_json) as advance:
-        short = isinstance(opened, Log) or opened.n_samples <= CHECKED_MAX
-        whole = short or figure is not None or bool(predictions)
-        replayed = replay_log(predictor, opened, whole=whole, progress=advance)
-        if replayed.run is not None:
-            for path in predictions:
-                replayed.run.save(path)
-            if figure is not None:
-                prediction_figure(replayed.run, title, figure, shown)
+        replayed = replay_log(predictor, read, progress=advance)
+        for path in predictions:
+            replayed.run.save(path)
+        if figure is not None:
+            prediction_figure(replayed.run, title, figure, shown)
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     for path in states:
         predictor.save(path)
     if out is not None:
         with written_text(out) as file:
             csv.writer(file).writerows([("t", "rms_pb", "rms_hold", "rms_h"), *replayed.batches])
-    if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
+    if not as_json and (line := partly_used(read)):
         console.print(line)
-    if replayed.judged is None and not as_json:
-        console.print(f"ARX models are left out: they take at most {CHECKED_MAX} samples.")
-    more: dict[str, Any] = {"findings": findings_table(intake.findings)}
-    in_motion = any(finding.name == "start in motion" and not finding.applied for finding in intake.findings)
+    more: dict[str, Any] = {"findings": findings_table(findings)}
+    in_motion = any(finding.name == "start in motion" for finding in findings)
     rest = replayed.without_first_window() if in_motion else {}
     if rest:
         unit = f"u{axis_machine.unit}"

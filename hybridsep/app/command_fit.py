@@ -23,7 +23,7 @@ from .options import (
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
-    from ..intake.finding import Finding
+    from ..logs.checks import Finding
     from ..logs.log import Log
 
 __all__ = ["fit"]
@@ -44,9 +44,6 @@ def fit(
     *,
     reading: ReadingOptions,
     parameters: dict[str, Any],
-    fix: Annotated[
-        bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
-    ] = False,
     fmi: FmiOption = FMI_VERSIONS[0],
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -57,11 +54,10 @@ def fit(
     from ..fitting.fit import FitOptions, fit_files
     from ..fitting.fit import fit as fit_logs
     from ..fitting.report import fit_report, judged_by, next_steps
-    from ..intake.finding import findings_table
-    from ..intake.repair import changes, take_in
+    from ..logs.checks import checked, findings_table
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
-    from .log_intake import different_logs, show
+    from .logs import different_logs, show
     from .outputs import check_outputs, keep_written, written_before
     from .progress import progress_bar
     from .tables import console, print_json
@@ -74,25 +70,13 @@ def fit(
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     outputs = [("--out", path, ()) for path in files.values()]
     check_outputs(outputs, inputs, force=force, ours=written_before(files["results"], logs))
-    found = [
-        read_log(
-            path,
-            columns=reading.columns,
-            unit=reading.unit,
-            T_s=reading.T_s,
-            axis=reading.axis,
-            uniform=False,
-            resample=reading.resample,
-        )
-        for path in logs
-    ]
-    found = different_logs(found)
-    for log in found:
+    used = different_logs([read_log(path, **reading.arguments) for path in logs])
+    for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
-    used, findings = take_in(found, fix=fix)
+    findings = {log.path.name: checked(log) for log in used}
     with progress_bar(as_json) as advance:
         options = FitOptions(Np, machine, known=known, drive_limits=limits)
-        result = fit_logs(used, folder, options, advance, changes=changes(findings), fmi=fmi)
+        result = fit_logs(used, folder, options, advance, fmi=fmi)
         fit_report(result, used, findings).write(files["report"])
     keep_written(files["results"], logs, files.values())
     advice = recommendation(judged_by(result, used[0].shown))
@@ -104,7 +88,7 @@ def fit(
     _print_fit(result, used, findings)
     console.print(f"\n{advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
-    again = _again(logs, out, Np, name, reading, known, fix=fix)
+    again = _again(logs, out, Np, name, reading, known)
     console.print("\n".join(next_steps(result, files, again, fmi)), soft_wrap=True, highlight=False)
 
 
@@ -115,8 +99,6 @@ def _again(
     name: str | None,
     reading: ReadingOptions,
     known: Mapping[str, Any],
-    *,
-    fix: bool,
 ) -> str:
     """Return the command line of this fit, without its other outputs."""
     given = {"out": out, "Np": Np, "name": name, **vars(reading), **known}
@@ -124,13 +106,13 @@ def _again(
     for option, value in given.items():
         if value is True:
             words.append(f"--{option}")
-        elif value is not None and value is not False:
+        elif value:
             words += [f"--{option}", str(value)]
-    return shlex.join([*words, "--fix"] if fix else words)
+    return shlex.join(words)
 
 
 def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
-    """Print what was read and what the intake found, what was identified and how it was judged."""
+    """Print what was read and what the checks found, what was identified and how it was judged."""
     import numpy as np
     from rich import box
     from rich.table import Table
@@ -138,7 +120,6 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     from ..base.metrics import shown_figure
     from ..fitting.advice import extent
     from ..fitting.compensation import tracking_lines
-    from ..intake.repair import changed_by
     from .tables import console
 
     unit, shown = logs[0].unit, logs[0].shown  # of all of them
@@ -146,10 +127,7 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     for log in logs:
         travel = float(np.ptp(log.x_d))
         stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
-        console.print(
-            f"{log.path.name}: {extent([log])}, travel {factor * travel:.4g} {position}{stated}"
-            f"{changed_by(findings.get(log.path.name, ()))}"
-        )
+        console.print(f"{log.path.name}: {extent([log])}, travel {factor * travel:.4g} {position}{stated}")
     for name, of_log in findings.items():
         for finding in of_log:
             console.print(f"{name}: {finding}")

@@ -34,9 +34,6 @@ def identify(
     out: Annotated[Path | None, typer.Option(help="Machine file to write.")] = None,
     figure: Annotated[Path | None, typer.Option(help="PNG to draw.")] = None,
     name: Annotated[str | None, typer.Option(help="Name of the machine in its file; the file's if left out.")] = None,
-    fix: Annotated[
-        bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
-    ] = False,
     unit_gain: Annotated[
         bool | None, typer.Option("--unit-gain/--free-gain", help="Static gain of 1, or estimated; chosen if left out.")
     ] = None,
@@ -66,10 +63,10 @@ def identify(
     from ..identify.figures import operation_figure
     from ..identify.operation import identify_operation
     from ..identify.output_error import in_time
-    from ..intake.repair import changes, take_in
+    from ..logs.checks import checked
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
-    from .log_intake import show
+    from .logs import show
     from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
@@ -79,9 +76,8 @@ def identify(
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     with progress_bar(as_json) as advance:
-        read = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=False, may_miss=True)
-        (log,), findings = take_in([read], fix=fix)
-        show(log.remarks, findings[recording.name])
+        log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis)
+        show(log.remarks, checked(log))
         late = (in_time(piece.x_d, piece.x_meas, measurement_delay) for piece in log.segments())
         pieces = [piece for piece in late if len(piece[0])]
         found = identify_operation(
@@ -91,8 +87,6 @@ def identify(
         operation_figure(found, pieces, recording.name, figure, log.shown)
     if out is not None:
         entries: dict[str, Any] = {"predictor": {"measurement_delay": measurement_delay}} if measurement_delay else {}
-        if changed := changes(findings):
-            entries["sources"] = [f"identified from {recording.name}", *changed]
         _write_machine(found, machine, recording.name, entries, out)
     if as_json:
         print_json(dict(found.summary()))

@@ -9,8 +9,6 @@ import typer
 
 from .options import (
     PREDICTOR_ENTRIES,
-    AsIsOption,
-    FixOption,
     ForceOption,
     LogArgument,
     MachineOption,
@@ -30,8 +28,6 @@ def report(
     machine: MachineOption,
     out: Annotated[Path | None, typer.Option(help="The HTML file; named after the log if left out.")] = None,
     fmu: Annotated[Path | None, typer.Option(help="A HybridPredictor whose steps are timed with the log.")] = None,
-    fix: FixOption = False,
-    as_is: AsIsOption = False,
     weights: SavedOption = None,
     *,
     reading: ReadingOptions,
@@ -48,15 +44,13 @@ def report(
     from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words
     from ..fitting.fit import SAMPLES_MAX, step_times
     from ..fitting.replay import Recording, knew, replay
-    from ..fitting.report import write_changes, write_errors, write_findings, write_use
+    from ..fitting.report import write_errors, write_findings, write_use
     from ..fmi.weights import warm_predictor
-    from ..intake.repair import changes
-    from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
     from ..predict.predictor import HybridPredictor
-    from .log_intake import open_checked, reading_of
+    from .logs import read_checked, reading_of
     from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console
@@ -70,12 +64,11 @@ def report(
     axis_machine = load_machine(machine)
     changed = axis_machine.changed("predictor", parameters)
     predictor = warm_predictor(changed, weights)
-    how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
-    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
-    whole = opened if isinstance(opened, Log) else opened.read()
+    how = reading_of(axis_machine, reading)
+    whole, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.trust)
     with progress_bar(False) as advance:
-        recording = Recording(whole.x_d, whole.x_meas, 0)
-        replayed = replay(predictor, [recording], progress=lambda done: advance("replay", 0.8 * done))
+        recordings = [Recording(one.x_d, one.x_meas, 0) for one in whole.segments()]
+        replayed = replay(predictor, recordings, progress=lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("peers", 0.8 + 0.1 * done))
         advance("time the FMU's steps", 0.95)
         steps = {}
@@ -91,10 +84,9 @@ def report(
         f"{1e3 * settings.Np * whole.T_s:.4g} ms · p = {settings.p}, q = {settings.q}",
     )
     written.paragraph(recommendation(judged), "verdict")
-    write_changes(written, changes({log.name: intake.findings}))
     words = whole_log_words(warm=weights is not None, known=known)
     write_errors(written, judged, "Errors of the replay", words)
-    write_findings(written, {log.name: intake.findings})
+    write_findings(written, [whole], {log.name: findings})
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
     written.write(page)

@@ -14,8 +14,6 @@ from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from .options import (
     PREDICTOR_ENTRIES,
-    AsIsOption,
-    FixOption,
     ForceOption,
     JsonOption,
     MachineOption,
@@ -27,7 +25,7 @@ from .options import (
 if TYPE_CHECKING:
     from ..base.parameters import Parameter
     from ..base.signals import Array
-    from ..intake.finding import Finding
+    from ..logs.checks import Finding
     from ..logs.units import Shown
     from ..machines.machine import Machine
 
@@ -39,8 +37,6 @@ __all__ = ["tune"]
 def tune(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     machine: MachineOption,
-    fix: FixOption = False,
-    as_is: AsIsOption = False,
     *,
     reading: ReadingOptions,
     parameters: dict[str, Any],
@@ -61,7 +57,7 @@ def tune(
     from ..fitting.tuning import n_unjudged, over_windows
     from ..fitting.tuning import tune as tune_on
     from ..machines.machine import load_machine, machine_path
-    from .log_intake import show
+    from .logs import show
     from .outputs import FIGURES, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
@@ -75,7 +71,7 @@ def tune(
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     changed, values, tried = _tried(given, parameters, writes=out is not None)
-    read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust, fix=fix, as_is=as_is)
+    read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust)
     with progress_bar(as_json) as advance:
         jobs = jobs or os.cpu_count() or 1
         tuning = tune_on(
@@ -117,7 +113,7 @@ class _Read:
     shown: Shown
 
     def findings_table(self) -> dict[str, Any]:
-        from ..intake.finding import findings_table
+        from ..logs.checks import findings_table
 
         return {name: findings_table(found) for name, found in self.findings.items()}
 
@@ -156,22 +152,17 @@ def _values(text: str, parameter: Parameter) -> tuple[Any, ...]:
     return tuple(sorted(found))
 
 
-def _read(
-    logs: Sequence[Path], given: Machine, reading: ReadingOptions, *, may_miss: bool, fix: bool, as_is: bool
-) -> _Read:
+def _read(logs: Sequence[Path], given: Machine, reading: ReadingOptions, *, may_miss: bool) -> _Read:
     """Read and check the logs."""
     from ..fitting.advice import partly_used
-    from ..logs.log import Log
     from ..logs.units import shown_of
-    from .log_intake import open_checked, reading_of
+    from .logs import read_checked, reading_of
 
-    how = reading_of(given, reading, may_miss=may_miss)
+    how = reading_of(given, reading)
     pieces, findings, partly = {}, {}, []
     for name, path in _named(logs).items():
-        opened, intake = open_checked(path, how, given, fix=fix, as_is=as_is, segments=True)
-        log = opened if isinstance(opened, Log) else opened.read()
+        log, findings[name] = read_checked(path, how, given, may_miss=may_miss)
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
-        findings[name] = intake.findings
         partly += [line] if (line := partly_used(log)) else []
         shown = shown_of(log.file_unit, given.unit)
     return _Read(pieces, findings, partly, shown)
@@ -181,13 +172,10 @@ def _write_machine(
     changed: Machine, chosen: PredictorSettings, values: Mapping[str, Sequence[Any]], read: _Read, out: Path
 ) -> None:
     """Write the machine file with the settings that were chosen."""
-    from ..intake.repair import changes
     from ..machines.text import machine_text
     from .tune_table import entries
 
     best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
-    sources = dict.fromkeys((*best.sources, *changes(read.findings)))
-    best = best.changed("", {"sources": tuple(sources)} if sources else {})
     comment = f"Settings of [predictor] from hybridsep tune on {', '.join(Path(name).name for name in read.pieces)}."
     with written_text(out) as file:
         file.write(machine_text(best, [comment]))

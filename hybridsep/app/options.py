@@ -25,10 +25,9 @@ __all__ = [
     "KNOWN_ENTRIES",
     "PREDICTOR_ENTRIES",
     "TRAJECTORIES",
-    "AsIsOption",
     "AxisOption",
     "CommandColumnOption",
-    "FixOption",
+    "DelayOption",
     "FlavourOption",
     "FmiOption",
     "ForceOption",
@@ -88,8 +87,13 @@ AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds 
 ResampleOption = Annotated[
     bool,
     typer.Option(
-        "--resample", help="Take columns that are sampled at rates of their own at the times of the slower one."
+        "--resample",
+        help="Take columns of rates of their own at the times of the slower one, and uneven times at even ones.",
     ),
+]
+DelayOption = Annotated[
+    int,
+    typer.Option(help="Samples by which the log has the measured position too late (negative: too early)."),
 ]
 ListChannelsOption = Annotated[
     bool,
@@ -108,8 +112,6 @@ LogArgument = Annotated[
         help="Recorded log with the columns t, x_d, x_meas or x, in a format of docs/reference/logs.md: CSV, .mat, …"
     ),
 ]
-FixOption = Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")]
-AsIsOption = Annotated[bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")]
 SavedOption = Annotated[
     Path | None,
     typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
@@ -203,6 +205,7 @@ class ReadingOptions:
     axis : str, optional
     t, x_d, x : str, optional
         Columns of time, commanded and measured position.
+    delay : int
     resample : bool
     """
 
@@ -212,12 +215,19 @@ class ReadingOptions:
     t: TimeColumnOption = None
     x_d: CommandColumnOption = None
     x: MeasuredColumnOption = None
+    delay: DelayOption = 0
     resample: ResampleOption = False
 
     @property
     def columns(self) -> dict[str, str]:
         """Columns that are given, by what they hold."""
         return {role: column for role in ("t", "x_d", "x") if (column := getattr(self, role))}
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of :func:`~hybridsep.logs.log.read_log`."""
+        given = {name: getattr(self, name) for name in ("unit", "T_s", "axis", "delay", "resample")}
+        return {"columns": self.columns, **given}
 
 
 def takes_reading(command: Callable[..., None]) -> Callable[..., None]:

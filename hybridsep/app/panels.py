@@ -11,7 +11,7 @@ from .options import COMPENSATOR_ENTRIES, KNOWN_ENTRIES, PREDICTOR_ENTRIES
 
 __all__ = ["EXAMPLES", "PanelledCommand"]
 
-_READING = ("unit", "T_s", "axis", "t", "x_d", "x", "resample", "list_channels", "fix", "as_is")
+_READING = ("unit", "T_s", "axis", "t", "x_d", "x", "delay", "resample", "list_channels")
 _OUTPUT = ("out", "figure", "save", "fmus", "reports", "full", "force", "as_json")
 
 _PANELS = {

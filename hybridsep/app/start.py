@@ -67,7 +67,7 @@ def demo(
     from ..demo.demo import demo as run_demo
     from ..demo.demo import demo_files, processor_time
     from ..fmi.archive import default_flavour
-    from .log_intake import show
+    from .logs import show
     from .outputs import check_outputs
     from .progress import progress_bar
     from .tables import console, print_compensation, print_json, print_predictions

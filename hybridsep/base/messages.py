@@ -44,13 +44,11 @@ ERRORS: Mapping[str, Explanation] = {
     "LogError": Explanation(
         "A recorded log cannot be read, or the errors computed from it would be invalid.",
         "The message names file, line and column. Names of columns are given by `--t`, `--x_d`, `--x`, the unit by "
-        "`--unit`, the interval of a log without times by `--T_s`. Where it lists findings of the checks, look them up "
-        "below; `--fix` applies their fixes, `--as-is` (of `backtest`, `report` and `tune`) goes on without.",
+        "`--unit`, the interval of a log without times by `--T_s`. Where it has a finding of the checks, look it up "
+        "below; lines to paste follow it.",
         (
-            "must increase",
             "counts samples: it is an index",
-            "must be uniform: an interval of",
-            "errors computed from this log would be invalid",
+            "is rounded too coarsely",
             "the measured position is missing (NaN) in all",
         ),
     ),
@@ -84,106 +82,89 @@ ERRORS: Mapping[str, Explanation] = {
 """By class of exception; in the order of the hierarchy in :mod:`hybridsep.base.errors`."""
 
 FINDINGS: Mapping[str, Explanation] = {
-    "time order": Explanation(
-        "Times repeat or run backwards: rows written twice, a clock that was set back, or times rounded more coarsely "
-        "than the sampling interval.",
-        "`--fix` sorts and keeps one row of each time. If times are rounded, remove the column and give `--T_s`.",
+    "no motion": Explanation(
+        "The commanded or the measured position never changes.",
+        "Record the axis while it works, or name other columns (`--x_d`, `--x`).",
     ),
-    "whole turns": Explanation(
-        "A rotary axis was recorded modulo one turn: it jumps by whole turns.",
-        "`--fix` unwraps both positions; your controller must count turns the same way.",
-    ),
-    "gaps": Explanation(
-        "Stretches of time without samples: the recorder lost data, or was stopped.",
-        "Gaps of at most 10 samples are bridged with `trust = true`, longer ones separate segments. Record without "
-        "interruption.",
-    ),
-    "jitter": Explanation(
-        "Sampling intervals differ; the model assumes equal ones.",
-        "`--fix` resamples. Record in the controller's own cycle rather than by a PC's clock.",
-    ),
-    "lost rows": Explanation(
-        "Rows are missing although the times are even: both positions make a step that is a multiple of the "
-        "neighbouring ones.",
-        "`--fix` inserts the rows as missing. Check the recorder for a buffer overflow.",
-    ),
-    "missing samples": Explanation(
-        "The measured position is empty or `nan` in some rows.",
-        "None is needed with `trust = true`, which treats them as missing. Without trust, `--fix` interpolates.",
-    ),
-    "jumps": Explanation(
-        "Both positions jump within one sample, as where two logs were joined, or the command alone jumps.",
-        "`--fix` splits the log at the jump. A step in the command alone needs no remedy.",
-    ),
-    "outliers": Explanation(
-        "Single samples are far from their neighbours: glitches of the encoder or of the transmission.",
-        "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` reach rejects them online.",
-    ),
-    "clipped": Explanation(
-        "The measured position stops dead at a limit and leaves it at speed, while the command moves on, at both ends "
-        "or many times, though the axis had followed closer before: the recorder's range ends there. As a note: it "
-        "stands there once or by less, as an axis does that friction or load keeps from its command.",
-        "`--fix` treats the samples as missing. Record with a larger range or another scaling. A note needs none.",
-    ),
-    "stuck samples": Explanation(
-        "The measured position stands still and then jumps: the sensor or its transmission froze.",
-        "Repaired by `fit` and `--fix`, which cut the stretch out.",
-    ),
-    "repeated samples": Explanation(
-        "Each value occurs several times in a row: the position was sampled more slowly than the log was written.",
-        "`--fix` keeps every n-th sample. Record at the rate of the position's own source.",
-    ),
-    "too little motion": Explanation(
-        "The command hardly moves, or moves less than the noise: nothing can be identified or learned.",
-        "No fix helps: record the axis at work. `hybridsep fit` goes on with a gain of 1.",
-    ),
+    "too short": Explanation("Fewer than 100 samples are measured.", "Record half a minute of work."),
     "same column": Explanation(
         "The measured position equals the commanded one in every sample: one column was read for both, or the axis was "
         "simulated.",
-        "Name the columns with `--x_d` and `--x`.",
+        "Name the column of the measured position with `--x`.",
+    ),
+    "unit": Explanation(
+        "No unit is stated, and the positions are not plausible in metres: too large a travel or acceleration.",
+        "Give `--unit`.",
     ),
     "columns swapped": Explanation(
-        "The column of the commanded position lags behind the measured position's column and is noisier.",
-        "Exchange `--x_d` and `--x`, or let `--fix` do it.",
+        "The commanded position follows the measured one as a drive follows its command, and not the other way round.",
+        "Exchange `--x_d` and `--x`, as the line says. Where the measured column is the noisier one, it may have been "
+        "recorded too early instead: `--delay`, negative.",
+    ),
+    "sign": Explanation(
+        "The measured position moves opposite to its command.",
+        "Correct it where it is recorded; your controller must do the same.",
     ),
     "following error": Explanation(
         "The measured position's column holds the following error, which controllers call *lag* or *contouring "
         "deviation*.",
-        "`--fix` computes the position from it; recording the actual position is better.",
+        "Name the column of the actual position with `--x`, or write the command less the error into the file.",
     ),
-    "velocity for position": Explanation(
-        "One of the columns holds a velocity.",
-        "Name the column of the position. `--fix` integrates, which drifts.",
-    ),
-    "sign": Explanation(
-        "The measured position moves opposite to its command: its static gain is negative.",
-        "`--fix` reverses the sign; your controller must do the same.",
-    ),
+    "velocity": Explanation("One of the columns holds a velocity.", "Name the column of the position."),
     "scale": Explanation(
-        "The measured position moves by a multiple of the command: a wrong unit, resolution or gear ratio.",
-        "`--fix` multiplies where the factor is unambiguous; give `--unit`, or correct the scaling. A gain between "
-        "0.15 and 1 is only a note: a soft servo has one.",
+        "The measured position moves by a multiple of the command: the columns are in different units, or the axis "
+        "hardly moves.",
+        "State the unit of each column in its name, such as `x [mm]`, or name another column with `--x`.",
+    ),
+    "hardly follows": Explanation(
+        "No drive explains the measured position by the command.",
+        "Name the column of this axis with `--x`.",
+    ),
+    "missing samples": Explanation(
+        "The measured position is empty or `nan` in some rows.",
+        "None is needed with `trust = true`: they are left out. Without trust such a log is refused.",
+    ),
+    "rate": Explanation(
+        "Sampling intervals differ; the rows are taken as if they were even.",
+        "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",
+    ),
+    "lost rows": Explanation(
+        "Both positions make steps of twice the steps around them, although the times are even: rows are missing.",
+        "Check the recorder for a buffer overflow.",
+    ),
+    "jumps": Explanation(
+        "Both positions jump within one sample, as where two logs were joined.",
+        "Give the logs as files of their own.",
+    ),
+    "outliers": Explanation(
+        "Single samples leave the signal: glitches of the encoder or of the transmission.",
+        "None is needed with `trust = true`, which rejects what is out of reach.",
+    ),
+    "repeated samples": Explanation(
+        "The position was sampled more slowly than the log was written, and unevenly.",
+        "Record at the rate of the position's own source.",
+    ),
+    "stuck samples": Explanation(
+        "The measured position stands still while its command goes on: the axis sticks, or the sensor was held.",
+        "Look at the picture. An axis that sticks needs none.",
+    ),
+    "clipped": Explanation(
+        "The same, at one end of the measured range: the recorder's range may end there, or friction or load stops the "
+        "axis.",
+        "Look at the picture. Record with a larger range where it was the recorder.",
+    ),
+    "late": Explanation(
+        "The measured position is more than 0.1 s behind its command, drive, dead time and recorder together.",
+        "None, if the axis is as slow. Where the recorder is known to be late by whole samples, give `--delay`; where "
+        "the controller gets the measurement as late, `--measurement_delay`.",
     ),
     "offset": Explanation(
-        "The zeros of the two positions are far apart.",
-        "`--fix` subtracts the difference; your controller must do the same.",
-    ),
-    "unit": Explanation(
-        "The positions are not plausible in the unit that was read: the travel or the velocity is too large.",
-        "Give `--unit`; `--fix` reads both positions as millimetres.",
+        "The zeros of the two positions differ by more than the error varies.",
+        "None is needed: the offset is learned.",
     ),
     "start in motion": Explanation(
         "The axis moves when the log begins; the physics model starts from rest.",
-        "With `trust = true` the state is estimated from the first window. `--fix` begins at the first rest.",
-    ),
-    "delay": Explanation(
-        "The measured position is late by more than the model explains, or early.",
-        "If you know that the encoder is late by whole samples, give `--measurement_delay`; `dead_time` must not count "
-        "those samples again.",
-    ),
-    "sampling rate": Explanation(
-        "The log is sampled too slowly for the model's fastest mode, or at another interval than the machine's.",
-        "Record at the controller's rate. `--fix` resamples where only the interval differs.",
+        "None is needed: the state is estimated from the first window, which is not judged.",
     ),
 }
-"""By name of a finding, in the order in which they are looked for, and fixed."""
+"""By name of a finding: those for which a log is refused, then those that are noted."""

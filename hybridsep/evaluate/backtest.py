@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -196,6 +196,14 @@ class Backtest(Scores):
         }
         return line_plot(np.arange(float(self.n_batches)), lines, "window", "RMS prediction error [µm]")
 
+    def pieces(self, starts: Sequence[int]) -> list[Backtest]:
+        """Return the predictions of each segment, the scores those of all."""
+        names = ("x_pb", "x_hold", "x_h", "x_h_std", "active")
+        return [
+            replace(self, **{name: getattr(self, name)[start:end] for name in names})
+            for start, end in zip(starts, (*starts[1:], len(self.x_pb)), strict=True)
+        ]
+
     def _figures(self) -> dict[str, float | int]:
         score = self.overall
         errors = {"rms_pb_um": score.rms_pb, "rms_hold_um": score.rms_hold, "rms_h_um": score.rms_h}
@@ -208,7 +216,12 @@ OnBatch = Callable[[Batch], object]
 
 
 def backtest(
-    predictor: HybridPredictor, x_d: ArrayLike, x_meas: ArrayLike, *, on_batch: OnBatch | None = None
+    predictor: HybridPredictor,
+    x_d: ArrayLike,
+    x_meas: ArrayLike,
+    *,
+    starts: Sequence[int] = (0,),
+    on_batch: OnBatch | None = None,
 ) -> Backtest:
     """Replay a log that is in memory.
 
@@ -220,6 +233,8 @@ def backtest(
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
         Commanded and measured positions, ``n ≥ 1``; with trust ``x_meas`` is NaN where it is missing.
+    starts : sequence of int
+        First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     on_batch : callable, optional
         Called with each :class:`Batch` when it is finished.
 
@@ -244,7 +259,9 @@ def backtest(
     def joined(name: str) -> Array:
         return np.concatenate([np.atleast_1d(getattr(batch, name)) for batch in batches])
 
-    scores = _replayed(predictor, [np.stack((command, measured))], keep)
+    both = np.stack((command, measured))
+    segments = [[both[:, start:end]] for start, end in zip(starts, (*starts[1:], len(command)), strict=True)]
+    scores = _replayed(predictor, segments, keep)
     return Backtest(
         scores.overall,
         scores.after_warm_up,
@@ -281,17 +298,20 @@ def backtest_stream(
         If a chunk's samples cannot be used, there are none at all, or a prediction diverges. The windows before are
         learned.
     """
-    return _replayed(predictor, _checked(predictor, chunks), on_batch)
+    return _replayed(predictor, [_checked(predictor, chunks)], on_batch)
 
 
 @one_blas_thread
-def _replayed(predictor: HybridPredictor, chunks: Iterable[Array], on_batch: OnBatch | None) -> Scores:
-    """Replay chunks, (2, m) each, whose samples are checked."""
+def _replayed(predictor: HybridPredictor, segments: Iterable[Iterable[Array]], on_batch: OnBatch | None) -> Scores:
+    """Replay segments in chunks, (2, m) each, whose samples are checked."""
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
     j = k = n_rejected = n_missing = 0
     late: Array | None = None
-    residual = 0.0
-    for commands, x in _windows(chunks, predictor.Np):
+    residual, begin = 0.0, 0
+    for new, commands, x in _windows_of(segments, predictor.Np):
+        if new and j:
+            predictor.restart()
+            late, residual, begin = None, 0.0, k
         window = _predicted(predictor, commands, residual)
         if late is None:
             late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.state.late)
@@ -300,7 +320,7 @@ def _replayed(predictor: HybridPredictor, chunks: Iterable[Array], on_batch: OnB
         late = signals[:, n:]
         x_d, x_h_std, predicted = signals[_X_D, :n], signals[_STD, :n], signals[_PREDICTED, :n]
         warm = n - int(signals[_ACTIVE, :n].sum())
-        compared = np.where(np.arange(k, k + n) < late.shape[1], np.nan, x)
+        compared = np.where(np.arange(k - begin, k - begin + n) < late.shape[1], np.nan, x)
         error = compared - predicted
         residual = last_residual(compared, predicted[0], residual)
         n_known, squares, peaks = _measure(error, k)
@@ -352,6 +372,13 @@ def _measure(error: Array, k: int) -> tuple[int, list[float], list[float]]:
     if not all(peak <= PREDICTION_MAX for peak in peaks):
         raise SignalError(f"x_h diverges in the window from sample {k} on; raise lambda or lower p")
     return error.shape[1], [float(row.dot(row)) for row in error], peaks
+
+
+def _windows_of(segments: Iterable[Iterable[Array]], Np: int) -> Iterator[tuple[bool, Array, Array]]:
+    """Yield the windows of segments, each with whether it is the first of one."""
+    for chunks in segments:
+        for i, (x_d, x) in enumerate(_windows(chunks, Np)):
+            yield i == 0, x_d, x
 
 
 def _windows(chunks: Iterable[Array], Np: int) -> Iterator[tuple[Array, Array]]:

@@ -157,7 +157,6 @@ def fit(
     options: FitOptions,
     progress: Progress = lambda _message, _done: None,
     *,
-    changes: Sequence[str] = (),
     fmus: bool = True,
     fmi: str = FMI_VERSIONS[0],
 ) -> Fit:
@@ -176,8 +175,6 @@ def fit(
     options : FitOptions
     progress : callable, optional
         Called with a message and the fraction done.
-    changes : sequence of str
-        What was done to the logs' positions before, for the machine file's ``sources``.
     fmus : bool
         Whether FMUs are built, and their steps timed.
     fmi : str
@@ -236,7 +233,7 @@ def fit(
         limits = estimated
     elif "change_max" not in limits and estimated:
         limits["change_max"] = estimated["change_max"]
-    machine = _machine(options, logs, model, settings, changes, plant["entries"], limits)
+    machine = _machine(options, logs, model, settings, plant["entries"], limits)
     with written_text(files["machine file"]) as file:
         file.write(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)))
     _write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
@@ -251,7 +248,7 @@ def fit(
     result = Fit(machine, found, choice, windows, {}, options.share, judged, written, tracking, plant)
     summary = result.summary()["judged"]
     if fmus:
-        origin = _origin(result, logs, summary, changes)
+        origin = _origin(result, logs, summary)
         built = _build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
         progress("time the FMU's steps", 0.95)
         try:
@@ -329,7 +326,6 @@ def _machine(
     logs: Sequence[Log],
     model: ModalModel,
     settings: PredictorSettings,
-    changes: Sequence[str],
     plant: Mapping[str, Any],
     limits: Mapping[str, Any],
 ) -> Machine:
@@ -343,7 +339,7 @@ def _machine(
         return machine_of(
             *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
             unit=logs[0].unit,
-            sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs] + list(changes),
+            sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs],
             predictor={"Np": settings.Np, "p": settings.p, "q": settings.q, **known},
             **{**sections, **more},
         )
@@ -443,7 +439,7 @@ def _called(what: str, flavour: str, version: str) -> str:
     return f"{flavour} {what}FMU" if version == FMI_VERSIONS[0] else f"{flavour} {what}FMU, FMI {version}.0"
 
 
-def _origin(found: Fit, logs: Sequence[Log], judged: Mapping[str, Any], changes: Sequence[str]) -> dict[str, Any]:
+def _origin(found: Fit, logs: Sequence[Log], judged: Mapping[str, Any]) -> dict[str, Any]:
     """Return what FMUs say of their origin: logs with their hashes, settings, figures of the fit."""
     machine, identification = found.machine, found.identification
     return {
@@ -452,7 +448,7 @@ def _origin(found: Fit, logs: Sequence[Log], judged: Mapping[str, Any], changes:
             {"file": log.path.name, "sha256": sha256_of(log.path), "samples": len(log.t), "T_s": log.T_s}
             for log in logs
         ],
-        "change": list(changes),
+        "change": [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks],
         "machine": {"name": machine.name, "unit": machine.unit},
         "identification": {"structure": identification["structure"], "offset": identification["offset"]},
         "settings": machine.predictor_settings.to_fmi(),

@@ -20,8 +20,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..base.signals import Array
 from ..identify.output_error import in_time
-from ..intake.relation import noise_std
-from ..intake.samples import resolution
+from ..logs.checks import noise_std, resolution
 from ..logs.units import Shown
 from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel, Mode

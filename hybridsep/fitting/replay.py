@@ -13,11 +13,11 @@ from ..base.errors import SignalError
 from ..base.metrics import largest, rms
 from ..base.signals import Array, Indices
 from ..cosim.run import Run
-from ..evaluate.backtest import Backtest, Batch, Scores, backtest, backtest_stream, replayed_run
+from ..evaluate.backtest import Backtest, Batch, backtest, replayed_run
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
-from ..intake.samples import resolution
-from ..logs.log import Log, LogReader
+from ..logs.checks import resolution
+from ..logs.log import Log
 from ..predict.predictor import HybridPredictor
 
 __all__ = [
@@ -365,38 +365,33 @@ class LogReplay:
 
     Attributes
     ----------
-    scores : Scores
+    scores : Backtest
     first : Batch
         The first window.
     batches : list of (t, rms_pb, rms_hold, rms_h), s and m
         Of each window.
-    judged : Replay or None
-        With ARX models fitted again before each window to all samples so far; None where the log was not held in
-        memory.
-    run : Run or None
-        Predictions sample by sample, likewise.
+    judged : Replay
+        With ARX models fitted again before each window to all samples so far.
+    run : Run
+        Predictions sample by sample.
     """
 
-    scores: Scores
+    scores: Backtest
     first: Batch
     batches: list[tuple[float, ...]]
-    judged: Replay | None = None
-    run: Run | None = None
+    judged: Replay
+    run: Run
 
     @cached_property
     def verdict(self) -> Verdict:
         """Verdict with all that was compared."""
         own = self.scores.verdict
-        if self.judged is None:
-            return own
         found = self.judged.verdict()
         return replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples)
 
     @cached_property
     def _of_peers(self) -> dict[str, Scored]:
         """Errors of the ARX models by their names in :meth:`summary`, such as ``arx20``."""
-        if self.judged is None:
-            return {}
         scored = self.judged.scored()[2:-1]
         return {peer.name.lower(): one for peer, one in zip(self.judged.peers, scored, strict=True)}
 
@@ -407,7 +402,7 @@ class LogReplay:
         and ``"diverged"`` of one that did.
         """
         found: dict[str, float | int | str] = dict(self.scores.summary())
-        active = self.scores.active if isinstance(self.scores, Backtest) else np.empty(0, np.bool_)
+        active = self.scores.active
         for suffix, counted in (("", np.ones(len(active), np.bool_)), ("_after_warm_up", active)):
             for quantity, figure in (("rms", rms), ("max", largest)):
                 for name, one in self._of_peers.items():
@@ -429,11 +424,7 @@ class LogReplay:
 
 
 def replay_log(
-    predictor: HybridPredictor,
-    opened: LogReader | Log,
-    *,
-    whole: bool,
-    progress: Callable[[str, float], object] = lambda _message, _done: None,
+    predictor: HybridPredictor, log: Log, *, progress: Callable[[str, float], object] = lambda _message, _done: None
 ) -> LogReplay:
     """Replay a log.
 
@@ -441,9 +432,7 @@ def replay_log(
     ----------
     predictor : HybridPredictor
         It learns the log on the way.
-    opened : LogReader or Log
-    whole : bool
-        Whether the log is held in memory, for ARX models and predictions sample by sample; a Log always is.
+    log : Log
     progress : callable, optional
         Called with a message and the fraction done.
 
@@ -452,23 +441,19 @@ def replay_log(
     SignalError
         If a prediction diverges.
     """
-    n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []
     first: list[Batch] = []
 
     def on_batch(batch: Batch) -> None:
-        rows.append((round(batch.k * opened.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
+        rows.append((round(batch.k * log.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
         if batch.j == 0:
             first.append(batch)
-        progress("replay", 0.8 * batch.k / n_samples)
+        progress("replay", 0.8 * batch.k / len(log.t))
 
-    if isinstance(opened, LogReader) and not whole:
-        scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
-        return LogReplay(scores, first[0], rows)
-    log = opened if isinstance(opened, Log) else opened.read()
-    found = backtest(predictor, log.x_d, log.x_meas, on_batch=on_batch)
+    found = backtest(predictor, log.x_d, log.x_meas, starts=log.starts, on_batch=on_batch)
     delay = predictor.settings.n_late
-    judged = Replay((Recording(log.x_d, log.x_meas, 0),), (found,), predictor.Np, delay)
+    recordings = tuple(Recording(one.x_d, one.x_meas, 0) for one in log.segments())
+    judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, delay)
     judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
     return LogReplay(found, first[0], rows, judged, run)

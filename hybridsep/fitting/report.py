@@ -17,8 +17,7 @@ from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..fmi.archive import other_platforms
 from ..identify.model import deviation_words, shown_estimates
 from ..identify.operation import TOO_LITTLE
-from ..intake.finding import Finding
-from ..intake.repair import changes
+from ..logs.checks import Finding
 from ..logs.log import Log
 from ..logs.units import Shown
 from .advice import Judged, extent, peers_in_words, recommendation
@@ -32,7 +31,6 @@ __all__ = [
     "fit_report",
     "judged_by",
     "next_steps",
-    "write_changes",
     "write_errors",
     "write_findings",
     "write_use",
@@ -63,7 +61,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     logs : sequence of Log
         As they were used.
     findings : mapping
-        Log's name → findings of its intake.
+        Log's name → findings of its checks.
     """
     T_s, Np = fit.machine.T_s, fit.judged.Np
     judged = judged_by(fit, logs[0].shown)
@@ -73,7 +71,6 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
         f"{Np} samples, {1e3 * Np * T_s:.4g} ms",
     )
     report.paragraph(recommendation(judged), "verdict")
-    write_changes(report, changes(findings))
     write_errors(
         report,
         judged,
@@ -82,7 +79,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
         "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in fit.judged.recordings) else ""),
     )
     _write_other_windows(report, fit, judged)
-    write_findings(report, findings)
+    write_findings(report, logs, findings)
     _write_identification(report, fit, judged)
     _write_settings(report, fit, judged)
     write_tracking(report, fit.tracking, judged.shown)
@@ -169,13 +166,6 @@ COLOURS = (PHYSICS, HOLD, HYBRID)
 """Their colours."""
 
 _COMMAND = "#1d2733"
-
-
-def write_changes(report: Report, changes: Sequence[str]) -> None:
-    """Write what was done to the log's positions that a controller must do as well."""
-    if changes:
-        report.paragraph("These figures, and the FMUs, are of positions that were changed before:")
-        report.bullets(changes)
 
 
 def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
@@ -290,23 +280,17 @@ def _write_spectra(report: Report, judged: Judged) -> None:
     report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
 
 
-def write_findings(report: Report, findings: Mapping[str, Iterable[Finding]]) -> None:
-    """Write what the intake of the logs, by name, found, with its pictures."""
-    report.heading("What the checks of the log found")
-    listed = {name: list(found) for name, found in findings.items()}
-    if not any(listed.values()):
-        report.paragraph("Nothing: time axis, samples, signs, scales, delay and motion are plausible.")
-    for name, found in listed.items():
-        rows = [
-            [
-                finding.name,
-                str(finding).partition(":")[0],
-                finding.words + (f". {finding.fix.words}" if finding.fix else ""),
-            ]
-            for finding in found
-        ]
+def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> None:
+    """Write how the logs were read, and what their checks, by the log's name, noted, with its pictures."""
+    report.heading("What the checks of the log noted")
+    remarks = [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks]
+    report.bullets(remarks)
+    if not any(findings.values()):
+        report.paragraph("Nothing: time axis, samples, signs, scales and motion are plausible.")
+    for name, found in findings.items():
+        rows = [[one.name, one.plain.partition(": ")[2]] for one in found]
         if rows:
-            report.table([name, "", "finding, and what puts it right"], rows, words=2)
+            report.table([name, "note"], rows, words=1)
         for finding in found:
             picture = finding.picture
             lines = [

@@ -23,7 +23,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array, as_measured, as_samples
 from ..evaluate.figures import finish_panels, save_figure
 from ..evaluate.report import HOLD, HYBRID, PHYSICS
-from ..intake.motion import starts_in_motion
+from ..logs.checks import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .choice import WORTH, settings_to_try, window_sizes, with_window

@@ -12,8 +12,7 @@ from ..base.errors import IdentificationError
 from ..base.settings import check
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from ..intake.gain import runs_against
-from ..intake.motion import starts_in_motion
+from ..logs.checks import runs_against, starts_in_motion
 from ..logs.units import Shown, shown_in
 from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
@@ -172,7 +171,7 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
     longest = max(segments, key=lambda segment: float(np.ptp(segment.u)))
     # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
-    if correlation < OPPOSED and runs_against(longest.u, longest.y) is not None:
+    if correlation < OPPOSED and runs_against(longest.u, longest.y):
         return (
             f"the measured position moves against the commanded one (correlation {correlation:.2f}); reverse the sign "
             "of one of them"

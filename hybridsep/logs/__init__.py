@@ -2,7 +2,6 @@
 
 Text, NumPy ``.npz``, MATLAB ``.mat``, Parquet and controllers' files hold the columns ``t`` (s), ``x_d`` and ``x_meas``
 or ``x`` (positions), under these names or others; :mod:`hybridsep.logs.formats` lists the formats. Arrays come from
-:func:`~hybridsep.logs.log.read_log` whole, or from :func:`~hybridsep.logs.log.open_log` chunk by chunk, with the same
-checks. A :class:`~hybridsep.base.errors.LogError` names the file, the line or sample, what was expected and what was
-found.
+:func:`~hybridsep.logs.log.read_log` as they were recorded; :func:`~hybridsep.logs.checks.check` asks what they mean. A
+:class:`~hybridsep.base.errors.LogError` names the file, the line or sample, what was expected and what was found.
 """

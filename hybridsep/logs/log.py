@@ -1,10 +1,10 @@
-"""Readers of logs: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
+"""Recorded logs: :class:`Log`, and :func:`read_log`, which reads one from a file of any format."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +14,20 @@ from ..base.settings import check
 from ..base.signals import Array
 from .columns import COUNT, Column, choose_columns, on_one_clock
 from .formats import open_source
-from .gaps import row_interval
-from .source import NEEDS_TRUST, Block
-from .time_axis import TimeAxis
+from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
+from .source import Block, Source
+from .times import given_times, recorded_times
 from .units import POSITION_UNITS, UNIT_OPTIONS, Shown, position_unit, shown_of, stated_unit
 
-__all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
+__all__ = ["Log", "check_reading", "read_log"]
 
-SPAN_MAX: Mapping[str, float] = {"m": 100.0, "rad": 1e3}
-"""Largest plausible travel of an axis, m or rad; a larger one indicates a log in a smaller unit."""
+TRAVEL_MAX = 100.0
+"""Largest plausible travel of a linear axis, m; a larger one indicates a log in a smaller unit."""
 
-TS_TOLERANCE = 0.01
-"""Largest relative difference between a given ``T_s`` and the time column's: more than any clock's drift."""
+TIME_MAX = 1e19
+"""Largest time in a file: a clock in ns since 1970 has 2e18; differences of larger times may overflow."""
 
-_SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm", "rad": "deg"}
+_SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm"}
 """Unit that a log may be in if its travel is implausible in the key's."""
 
 _OWN_NAMES = ("x_d", "x", "x_meas")
@@ -58,15 +58,17 @@ class Log:
     unit_stated : bool
         Whether the file or the caller stated the positions' unit.
     starts : tuple of int
-        First samples of the segments, which gaps separate; the first is 0.
+        First samples of the segments, which gaps and clocks that were set back separate; the first is 0.
     remarks : tuple of str
-        What the reader chose that the user may want to change.
+        What was chosen and what was done to keep the file's meaning, each in a line.
     file_unit : str
         Unit of the positions in the file, in which they are shown; SI if left out.
     n_recorded : int
         Samples that were read from the file; as many as there are, if left out.
     T_recorded : float
-        Mean interval between them, s, gaps aside; ``T_s`` if left out.
+        Interval between them, s; ``T_s`` if left out.
+    columns : tuple of str
+        Names of the columns of the commanded and of the measured position.
     """
 
     t: Array
@@ -81,6 +83,7 @@ class Log:
     file_unit: str = ""
     n_recorded: int = 0
     T_recorded: float = 0.0
+    columns: tuple[str, str] = ("x_d", "x")
 
     @property
     def shown(self) -> Shown:
@@ -94,228 +97,26 @@ class Log:
         return [replace(self, t=self.t[s], x_d=self.x_d[s], x_meas=self.x_meas[s], starts=(0,)) for s in pieces]
 
 
-class LogReader:
-    """Chunk-wise reader of a log; returned by :func:`open_log`.
-
-    Opening scans the time column (``x_d`` if there is none), so that ``T_s`` is the mean over the whole file and an
-    invalid time axis is reported before any prediction. No file stays open between calls.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, gaps aside, rounded to the fewest digits
-        within three of its standard errors.
-    n_samples : int
-        Samples in the log.
-    is_even : bool
-        Whether its times increase and none is missing; jitter counts only where ``uniform`` is true, and is refused.
-    unit : {"m", "rad"}
-        Unit of the positions that are returned.
-    file_unit : str
-        Their unit in the file.
-    """
-
-    def __init__(
-        self,
-        path: str | Path,
-        *,
-        columns: Mapping[str, str] | None = None,
-        unit: str | None = None,
-        T_s: float | None = None,
-        axis: str | None = None,
-        uniform: bool = True,
-        may_miss: bool | None = None,
-        resample: bool = False,
-    ) -> None:
-        self.path = Path(path)
-        given = check_reading(unit, T_s)
-        self._source = open_source(self.path)
-        chosen = choose_columns(self._source, columns, unit, axis=axis, time_needed=given is None)
-        self._may_miss = not uniform if may_miss is None else may_miss
-        self._source.commanded, self._source.measured = chosen["x_d"].name, chosen["x"].name
-        self._source.may_miss = self._may_miss
-        self._source, self._columns = on_one_clock(self._source, chosen, resample=resample)
-        self.unit, self.file_unit = self._columns["x_d"].unit.si, self._columns["x_d"].unit.name
-        self._guesses = list(self._guessed(columns or {}))
-        self._uniform = uniform
-        self._check_twins()
-        self.is_even = True
-        self.n_samples, self.T_s = self._scan(given)
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What was chosen, left out or filled that the user may want to change."""
-        return (*self._source.remarks, *self._guesses, *self._source.notes())
-
-    def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
-        """Iterate over the log as pairs ``(x_d, x_meas)``, in :attr:`unit`, of at most ``n`` samples each.
-
-        Raises
-        ------
-        LogError
-            When the next samples are invalid.
-        """
-        if n < 1:
-            raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
-        return ((x_d, x_meas) for x_d, x_meas in self._signals(n, ("x_d", "x")))
-
-    def read(self, most: int | None = None) -> Log:
-        """Return the whole log, or at least its first ``most`` samples."""
-        roles = ("x_d", "x", "t") if "t" in self._columns else ("x_d", "x")
-        blocks = self._signals(_BLOCK, roles)
-        if most is not None and most < self.n_samples:
-            blocks = islice(blocks, -(-most // _BLOCK))
-        columns = [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
-        if len(columns) == 2:
-            columns.append(np.arange(len(columns[0]), dtype=np.float64) * self.T_s)
-        x_d, x_meas, t = columns
-        stated = self._columns["x_d"].stated and self._columns["x"].stated
-        return Log(
-            *(t, x_d, x_meas, self.T_s, self.path, self.unit, stated),
-            remarks=self.remarks,
-            file_unit=self.file_unit,
-            n_recorded=len(t),
-            T_recorded=row_interval(t, self.T_s),
-        )
-
-    def _signals(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
-        """Iterate over the columns ``roles``, the first being the commanded position, checked and in SI units."""
-        columns = [self._columns[role] for role in roles]
-        lowest, highest, count = np.inf, -np.inf, 0
-        for block in self._source.blocks([column.name for column in columns], n):
-            for column, values in zip(columns, block.columns, strict=True):
-                self._check_finite(block, column.name, values, measured=column is self._columns["x"])
-            with np.errstate(invalid="ignore"):  # a NaN may be a signalling one
-                signals = [values * column.unit.factor for column, values in zip(columns, block.columns, strict=True)]
-            x_d = signals[0]
-            lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
-            self._check_span(columns[0], highest - lowest)
-            count += len(x_d)
-            yield tuple(signals)
-        if count != self.n_samples:
-            raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
-
-    def _guessed(self, given: Mapping[str, str]) -> Iterator[str]:
-        """Yield a remark if a column of positions was recognised by a name other than the library's own."""
-        known = {*_OWN_NAMES, *(name for pair in self._source.axes.values() for name in pair)}
-        roles = [role for role in ("x_d", "x") if role not in given]
-        if any(stated_unit(self._columns[role].name)[0] not in known for role in roles):
-            x_d, x = brief(self._columns["x_d"].name), brief(self._columns["x"].name)
-            yield (
-                f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x_d, --x) name "
-                "others"
-            )
-
-    def _check_span(self, column: Column, span: float) -> None:
-        """Raise LogError if the commanded position spans more than any axis does."""
-        si, largest = column.unit.si, SPAN_MAX[column.unit.si]
-        if span > largest:
-            smaller = _SMALLER.get(column.unit.name)
-            hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
-            hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller and si == "m" else ""
-            error = LogError(
-                f"{self.path}: column {brief(column.name)} read in {column.unit.name} spans {span:.4g} {si}, more than "
-                f"{largest:g} {si}{hint}"
-            )
-            error.options = () if column.stated else UNIT_OPTIONS
-            raise error
-
-    def _check_twins(self) -> None:
-        """Raise LogError if a column that is read occurs several times, with values that differ.
-
-        Scopes write the time again beside each channel.
-        """
-        for role, column in self._columns.items():
-            twins = self._source.twins.get(column.name, ())
-            for block in self._source.blocks([column.name, *twins], _BLOCK) if twins else ():
-                values = np.stack(block.columns)
-                differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
-                if differ.any():
-                    i = int(np.argmax(differ))
-                    other = next(value for value in values[1:, i] if value != values[0, i])
-                    ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
-                    raise LogError(
-                        f"{self.path}, {block.where(i)}: column {brief(column.name)} occurs {1 + len(twins)} times, "
-                        f"with different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
-                    )
-
-    def _scan(self, given: float | None) -> tuple[int, float]:
-        """Scan one column; return the number of samples and the sampling interval.
-
-        A column of time that counts samples is an index: its place is taken by the given interval.
-        """
-        role = "t" if "t" in self._columns else "x_d"
-        column = self._columns[role]
-        axis, count = TimeAxis(self.path, column.name, uniform=self._uniform), 0
-        for block in self._source.blocks([column.name], _BLOCK):
-            self._check_finite(block, column.name, block.columns[0])
-            if role == "t":
-                axis.extend(Block([block.columns[0] * column.unit.factor], block.where))
-            count += len(block.columns[0])
-        if count < 2:
-            raise LogError(f"{self.path}: a log needs at least 2 samples, got {count or 'none'}")
-        if role != "t":
-            return count, float(given or 0.0)  # given, as there is no time
-        if axis.counts_samples and not column.stated:
-            if given is None:
-                raise LogError(
-                    f"{self.path}: column {brief(column.name)} counts samples: it is an index, or a time in ms; "
-                    f"give T_s (--T_s), or name its unit in the file, '{column.name:.60} [ms]'"
-                )
-            del self._columns["t"]
-            return count, given
-        found = axis.interval()
-        self.is_even = self._uniform or axis.is_even
-        if given is not None and abs(found - given) > TS_TOLERANCE * given:
-            raise LogError(
-                f"{self.path}: T_s = {given:g} s was given, but column {brief(column.name)} has an interval of "
-                f"{found:g} s; leave T_s out, or correct it or the column"
-            )
-        return count, found if given is None else given
-
-    def _check_finite(self, block: Block, name: str, column: Array, *, measured: bool = False) -> None:
-        """Raise LogError if a value is infinite, or NaN and not a measurement that may miss."""
-        finite = np.isfinite(column)
-        if not finite.all():
-            if measured and self._may_miss and not np.isinf(column).any():
-                return
-            i = int(np.argmax(np.isinf(column) if measured and self._may_miss else ~finite))
-            hint = NEEDS_TRUST if measured and np.isnan(column[i]) else ""
-            raise LogError(f"{self.path}, {block.where(i)}: column {brief(name)} must be finite, got {column[i]}{hint}")
-
-
-def check_reading(unit: str | None, T_s: float | None) -> float | None:
-    """Return the given sampling interval, validated; LogError for an unknown unit."""
-    if unit is not None and position_unit(unit) is None:
-        raise LogError(
-            f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
-        )
-    return None if T_s is None else float(check("T_s", T_s, label="T_s"))
-
-
-def open_log(
+def read_log(
     path: str | Path,
     *,
     columns: Mapping[str, str] | None = None,
     unit: str | None = None,
     T_s: float | None = None,
     axis: str | None = None,
-    uniform: bool = True,
-    may_miss: bool | None = None,
+    delay: int = 0,
     resample: bool = False,
-) -> LogReader:
-    """Open a log for reading chunk by chunk.
+) -> Log:
+    """Read a log as it was recorded: in the order of the file, every sample.
 
-    Columns are read whole, so that their size is limited by the memory. What a file is, its content tells.
+    Measured positions that are missing are NaN. Gaps, and times that go back, begin another segment. What keeps the
+    file's meaning is done, and said in :attr:`Log.remarks`: the wraps of a counter and the whole turns of a rotary axis
+    are unwrapped, and of a sensor that is renewed every n samples the samples are taken in which it is new.
 
     Parameters
     ----------
     path : str or Path
-        Text (CSV, TSV; comma, semicolon, tab or blanks between columns; plain or in gzip), ``.npz``, ``.mat`` up to
-        version 7, Parquet (with the extra ``parquet``), Siemens Capture JSON, SINUMERIK trace XML, TwinCAT Scope's CSV,
-        LinuxCNC halscope.
+        In a format of :mod:`hybridsep.logs.formats`; what a file is, its content tells.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
@@ -326,46 +127,141 @@ def open_log(
         one, ``0.1um``, such as an encoder's count. If left out, the unit in the columns' names (``x [mm]``), otherwise
         m.
     T_s : float, optional
-        Sampling interval, s; needed only if the file has no time column or an index in its place; otherwise it is
-        checked against the times.
+        Sampling interval, s; needed if the file has no time column, or one that counts samples, is rounded too
+        coarsely or in an unknown unit; otherwise it is checked against the times.
     axis : str, optional
         Axis of a file that holds several, such as ``"X1"``.
-    uniform : bool
-        Whether an uneven time axis is refused; otherwise gaps, jitter and times out of order are left to
-        :func:`hybridsep.intake.check.check`.
-    may_miss : bool, optional
-        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them,
-        and they are left out of an identification. If left out, where ``uniform`` is false, as the checks find them.
+    delay : int
+        Samples by which the measured position is recorded too late, negative: too early; it is shifted back.
     resample : bool
-        Whether columns that are sampled at rates of their own are taken at the times of the slower one; otherwise that
-        is refused.
-
-    Returns
-    -------
-    LogReader
+        Whether columns of rates of their own are taken at the times of the slower one, and uneven times at even ones,
+        linearly between samples.
 
     Raises
     ------
     LogError
-        If the file, its columns or its time axis cannot be used.
+        If the file, its columns or its times cannot be used.
     """
-    return LogReader(
-        path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss, resample=resample
+    path = Path(path)
+    given = check_reading(unit, T_s)
+    source = open_source(path)
+    chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
+    source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
+    source, chosen = on_one_clock(source, chosen, resample=resample)
+    _check_twins(source, chosen)
+    read = _read(source, chosen)
+    x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
+    _check_travel(path, chosen["x_d"], x_d)
+    time = chosen.get("t")
+    if time is None:
+        times = given_times(len(x_d), given or 0.0)  # given, as there is no time
+    else:
+        times = recorded_times(path, time.name, read["t"], time.unit.factor, stated=time.stated, given=given)
+    samples, remarks = Samples(times.t, x_d, x_meas, times.T_s, times.starts), list(times.remarks)
+    si = chosen["x_d"].unit.si
+    for change, wanted in (
+        (whole_turns, si == "rad"),
+        (at_sensor_phase, True),
+        (partial(shifted, delay=delay), delay != 0),
+        (resampled, resample),
+    ):
+        if wanted:
+            samples, said = change(samples)
+            remarks += [said] if said else []
+    return Log(
+        *(*samples[:4], path, si),
+        unit_stated=chosen["x_d"].stated and chosen["x"].stated,
+        starts=samples.starts,
+        remarks=(*source.remarks, *_guessed(source, chosen, columns or {}), *source.notes(), *remarks),
+        file_unit=chosen["x_d"].unit.name,
+        n_recorded=len(x_d),
+        T_recorded=times.T_s,
+        columns=(chosen["x_d"].name, chosen["x"].name),
     )
 
 
-def read_log(
-    path: str | Path,
-    *,
-    columns: Mapping[str, str] | None = None,
-    unit: str | None = None,
-    T_s: float | None = None,
-    axis: str | None = None,
-    uniform: bool = True,
-    may_miss: bool | None = None,
-    resample: bool = False,
-) -> Log:
-    """Return a whole log; parameters and errors as for :func:`open_log`."""
-    return LogReader(
-        path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss, resample=resample
-    ).read()
+def _read(source: Source, columns: Mapping[str, Column]) -> dict[str, Array]:
+    """Return the columns by role as they are in the file, checked to be finite; LogError for fewer than 2 samples."""
+    parts: dict[str, list[Array]] = {role: [] for role in columns}
+    for block in source.blocks([column.name for column in columns.values()], _BLOCK):
+        for (role, column), values in zip(columns.items(), block.columns, strict=True):
+            _check_finite(source.path, block, column.name, values, role)
+            parts[role].append(values)
+    read = {role: np.concatenate(values or [np.empty(0)]) for role, values in parts.items()}
+    n = len(read["x_d"])
+    if n < 2:
+        raise LogError(f"{source.path}: a log needs at least 2 samples, got {n or 'none'}")
+    if np.isnan(read["x"]).all():
+        raise LogError(
+            f"{source.path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or "
+            "record it"
+        )
+    return read
+
+
+def _check_finite(path: Path, block: Block, name: str, column: Array, role: str) -> None:
+    """Raise LogError if a value is infinite, NaN and not a measurement, or a time that no clock has."""
+    wrong = np.isinf(column) if role == "x" else ~np.isfinite(column)
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise LogError(f"{path}, {block.where(i)}: column {brief(name)} must be finite, got {column[i]}")
+    if role == "t" and np.abs(column).max() > TIME_MAX:
+        i = int(np.argmax(np.abs(column) > TIME_MAX))
+        raise LogError(f"{path}, {block.where(i)}: time {brief(name)} must be within ±{TIME_MAX:g}, got {column[i]:g}")
+
+
+def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
+    """Yield a remark if a column of positions was recognised by a name other than the library's own."""
+    known = {*_OWN_NAMES, *(name for pair in source.axes.values() for name in pair)}
+    roles = [role for role in ("x_d", "x") if role not in given]
+    if any(stated_unit(columns[role].name)[0] not in known for role in roles):
+        x_d, x = brief(columns["x_d"].name), brief(columns["x"].name)
+        yield (
+            f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x_d, --x) name "
+            "others"
+        )
+
+
+def _check_travel(path: Path, column: Column, x_d: Array) -> None:
+    """Raise LogError if the commanded position spans more than any linear axis does."""
+    travel = float(np.ptp(x_d))
+    if column.unit.si != "m" or travel <= TRAVEL_MAX:
+        return
+    smaller = _SMALLER.get(column.unit.name)
+    hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
+    hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller else ""
+    error = LogError(
+        f"{path}: column {brief(column.name)} read in {column.unit.name} spans {travel:.4g} m, more than "
+        f"{TRAVEL_MAX:g} m{hint}"
+    )
+    error.options = () if column.stated else UNIT_OPTIONS
+    raise error
+
+
+def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
+    """Raise LogError if a column that is read occurs several times, with values that differ.
+
+    Scopes write the time again beside each channel.
+    """
+    for role, column in columns.items():
+        twins: Sequence[str] = source.twins.get(column.name, ())
+        for block in source.blocks([column.name, *twins], _BLOCK) if twins else ():
+            values = np.stack(block.columns)
+            differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
+            if differ.any():
+                i = int(np.argmax(differ))
+                other = next(value for value in values[1:, i] if value != values[0, i])
+                ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
+                raise LogError(
+                    f"{source.path}, {block.where(i)}: column {brief(column.name)} occurs {1 + len(twins)} times, "
+                    f"with different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
+                )
+
+
+def check_reading(unit: str | None, T_s: float | None) -> float | None:
+    """Return the given sampling interval, validated; LogError for an unknown unit."""
+    if unit is not None and position_unit(unit) is None:
+        raise LogError(
+            f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
+        )
+    return None if T_s is None else float(check("T_s", T_s, label="T_s"))

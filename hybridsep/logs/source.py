@@ -16,7 +16,6 @@ from ..base.errors import LogError, brief
 from ..base.signals import Array
 
 __all__ = [
-    "NEEDS_TRUST",
     "N_COLUMNS",
     "ArraysSource",
     "Block",
@@ -26,10 +25,6 @@ __all__ = [
     "check_declared",
     "line_number",
 ]
-
-
-NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
-"""End of the message about a measured position that is missing."""
 
 
 _SMALL, _COMPRESSION_MAX = 1 << 28, 100
@@ -114,9 +109,7 @@ class Source(ABC):
     remarks : list of str
         What was chosen for the reader that the user may want to change.
     commanded, measured : str
-        Columns of the positions that are read.
-    may_miss : bool
-        Whether nothing between two delimiters stands for NaN there.
+        Columns of the positions that are read; nothing between two delimiters of the latter stands for NaN.
     """
 
     format: ClassVar[str]
@@ -134,7 +127,7 @@ class Source(ABC):
         self.axes: Mapping[str, tuple[str, str]] = {}
         self.axis = ""
         self.remarks: list[str] = []
-        self.commanded, self.measured, self.may_miss = "", "", False
+        self.commanded, self.measured = "", ""
 
     @staticmethod
     @abstractmethod

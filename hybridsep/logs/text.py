@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
-from .source import NEEDS_TRUST, Block, Source, line_number
+from .source import Block, Source, line_number
 from .timestamps import CELL, Clock, cell, stamp_kind
 from .units import plain_name, position_unit, time_unit
 
@@ -240,7 +240,7 @@ class TextSource(Source):
                 row.append(cell(field))
             elif is_number(decimal_points(field)):
                 row.append(float(decimal_points(field)))
-            elif missing and self.may_miss:
+            elif missing:
                 row.append(math.nan)
             elif not field and name == self.commanded and not math.isnan(self._last):
                 self._held += 1
@@ -249,7 +249,7 @@ class TextSource(Source):
                 came = brief(field) if field else "nothing"
                 raise LogError(
                     f"{self.path}, line {number}: column {brief(name)} must be a number, got {came}"
-                    f"{NEEDS_TRUST if missing else _hint(field, divided=len(fields) > len(self._table.names))}"
+                    f"{_hint(field, divided=len(fields) > len(self._table.names))}"
                 )
             if name == self.commanded and i not in stamps:
                 self._last = float(row[-1])

@@ -379,7 +379,7 @@ class DriveLimitsSection(LimitsSection):
 
 @dataclass(frozen=True, kw_only=True)
 class LogSection(Section):
-    """How a recorded log is read; as by :func:`hybridsep.logs.log.open_log` where an entry is left out."""
+    """How a recorded log is read; as by :func:`hybridsep.logs.log.read_log` where an entry is left out."""
 
     t: str | None = line_entry(None)
     x_d: str | None = line_entry(None)

@@ -161,7 +161,7 @@ def read_trajectory(
     Parameters
     ----------
     path : str or Path
-        A file with a time column ``t`` and the command, in any format of :func:`hybridsep.logs.log.open_log`.
+        A file with a time column ``t`` and the command, in any format of :func:`hybridsep.logs.log.read_log`.
     column : str
         The command's name in the file.
     unit : str, optional

@@ -38,7 +38,7 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
 
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:
     path = recording(tmp_path / "log.csv")
-    replay = ("backtest", path, "-m", "spring_mass_damper", "--as-is", "--Np", "20", "--p", "5", "--json")
+    replay = ("backtest", path, "-m", "spring_mass_damper", "--Np", "20", "--p", "5", "--json")
     status, _, err = hybridsep(*replay)
     assert status == 2
     assert "'x_d' has 4000 samples every 0.001 s, 'x' has 2000 samples every 0.002 s" in err

@@ -10,7 +10,7 @@ import pytest
 from command_line import Run
 
 from hybridsep import read_log
-from hybridsep.intake.check import check
+from hybridsep.logs.checks import check
 from hybridsep.logs.formats import EXAMPLE
 
 
@@ -26,8 +26,8 @@ def test_it_is_written_and_read(hybridsep: Run, tmp_path: Path, monkeypatch: pyt
     assert "--out must end in .csv or .gz, got 'log.mat'" in hybridsep("example-log", "--out", "log.mat")[2]
 
 
-def test_the_intake_has_nothing_to_say_of_it() -> None:
-    assert check(read_log(EXAMPLE)).findings == ()
+def test_the_checks_have_nothing_to_say_of_it() -> None:
+    assert check(read_log(EXAMPLE)) == ()
 
 
 @pytest.mark.slow

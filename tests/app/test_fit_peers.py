@@ -18,7 +18,6 @@ from staircase_data import commanded, measured
 from hybridsep import read_log
 from hybridsep.base.signals import Array
 from hybridsep.fitting.advice import extent
-from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log
 from hybridsep.logs.units import shown_in, shown_of
 
@@ -41,7 +40,7 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
 @pytest.mark.usefixtures("quick_fit")
 def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path, name: str) -> None:
     log = RECORDINGS / f"{name}.csv"
-    [used], _ = take_in([read_log(log, uniform=False)], fix=False)
+    used = read_log(log)
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
     assert status == 0, err
     judged = json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]
@@ -81,11 +80,13 @@ def test_the_physics_model_is_judged_with_its_offset(hybridsep: Run, tmp_path: P
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_path: Path) -> None:
-    """1 kHz, its times rounded to 2 ms, in degrees."""
-    rows = np.column_stack((np.arange(1600) // 2 * 2e-3, 3000 * commanded()[:1600], 3000 * measured(0)[:1600]))
+    """1 kHz, its sensor renewed every 2 ms, in degrees."""
+    x = 3000 * measured(0)[:1600]
+    x[1::2] = x[::2]
+    rows = np.column_stack((np.arange(1600) * 1e-3, 3000 * commanded()[:1600], x))
     log = tmp_path / "axis.csv"
     np.savetxt(log, rows, delimiter=",", header="t,x_d [deg],x [deg]", comments="", fmt="%.12g")
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--fix")
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     words = " ".join(out.split())
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"
@@ -105,21 +106,17 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
 
 def columns(tmp_path: Path, change: str) -> Log:
     x = measured(0)[:1600].copy()
-    if change == "frozen":
-        x[800:] = x[800]
-    elif change == "missing":
+    if change == "missing":
         x[:400] = np.nan
     elif change == "held":
         x[1::2] = x[::2]
-    log = write_rows(tmp_path / "axis.csv", commanded()[:1600], x)
-    return take_in([read_log(log, uniform=False)], fix=True)[0][0]
+    return read_log(write_rows(tmp_path / "axis.csv", commanded()[:1600], x))
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ("", "1600 samples, 1.6 s at 1000 Hz"),
-        ("frozen", "800 of 1600 samples (50 %), 0.8 s at 1000 Hz"),
         ("missing", "1200 of 1600 samples (75 %), 1.6 s at 1000 Hz"),
         ("held", "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"),
     ],
@@ -169,7 +166,7 @@ def test_commands_on_a_log_in_degrees_speak_of_degrees(hybridsep: Run, tmp_path:
     assert "rad" not in out
     for command in ("backtest", "tune"):
         few = ("--p", "5,10", "--q", "1", "--lambda", "1e-12", "--jobs", 1) if command == "tune" else ()
-        status, out, err = hybridsep(command, log, "-m", machine, "--Np", 60, *few, "--as-is")
+        status, out, err = hybridsep(command, log, "-m", machine, "--Np", 60, *few)
         assert status == 0, err
         assert "mdeg" in out
         assert "rad" not in out

@@ -84,7 +84,7 @@ def test_a_log_at_rest_is_refused(tmp_path: Path, hybridsep: Run) -> None:
     log = write_rows(tmp_path / "axis.csv", np.full(600, 0.1), np.full(600, 0.1))
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
     assert (status, out) == (2, "")
-    assert "axis.csv: the commanded and the measured position never change: an axis at rest shows neither" in err
+    assert "axis.csv: no motion: the commanded and the measured position never change: an axis" in err
     assert not (tmp_path / "fit" / "machine.toml").exists()
 
 

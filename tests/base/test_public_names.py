@@ -89,7 +89,7 @@ def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
 @pytest.mark.slow
 def test_a_replay_loads_no_plots_and_no_fmus(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
-    log.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3},0,0\n" for k in range(200)))
+    log.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3},{k * 1e-5},{k * 1.1e-5}\n" for k in range(200)))
     arguments = ["backtest", str(log), "-m", "spring_mass_damper"]
     modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()")
     assert "hybridsep.evaluate.backtest" in modules

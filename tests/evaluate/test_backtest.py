@@ -19,7 +19,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream, replayed_run
-from hybridsep.logs.log import Log, open_log, read_log
+from hybridsep.logs.log import Log, read_log
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -72,9 +72,10 @@ def test_recorded_axis(emps: Log) -> None:
 
 
 @pytest.mark.slow
-def test_recorded_axis_from_the_file_in_chunks(emps: Log) -> None:
+def test_recorded_axis_in_chunks(emps: Log) -> None:
     whole = backtest(emps_predictor(), emps.x_d, emps.x_meas)
-    streamed = backtest_stream(emps_predictor(), open_log(EMPS, columns=EMPS_COLUMNS).chunks(777))
+    chunks = ((emps.x_d[i : i + 777], emps.x_meas[i : i + 777]) for i in range(0, len(emps.t), 777))
+    streamed = backtest_stream(emps_predictor(), chunks)
     assert streamed.summary() == whole.summary()
 
 

@@ -224,5 +224,5 @@ def test_a_sampled_log_is_read_as_it_is(hybridsep: Run, tmp_path: Path) -> None:
     table = np.column_stack([np.arange(n), *[command] * (len(sampled_columns.COLUMNS) - 1)])
     np.savetxt(tmp_path / "samples.txt", table, header=" ".join(sampled_columns.COLUMNS), comments="", fmt="%.6f")
     reading = ("--x_d", "x_out", "--x", "x_fb", "--unit", "mm", "--T_s", "0.001")
-    status, _, err = hybridsep("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading, "--as-is")
+    status, _, err = hybridsep("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading)
     assert status == 0, err

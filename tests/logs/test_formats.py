@@ -9,7 +9,7 @@ import pytest
 from log_files import EVERY_FORMAT, columns, write
 
 from hybridsep.base.errors import LogError
-from hybridsep.logs.log import open_log, read_log
+from hybridsep.logs.log import read_log
 
 
 @EVERY_FORMAT
@@ -50,10 +50,10 @@ def test_content_and_not_the_name_decides(tmp_path: Path, suffix: str) -> None:
 def test_formats_without_a_reader(tmp_path: Path, content: bytes, message: str) -> None:
     (tmp_path / "file").write_bytes(content)
     with pytest.raises(LogError, match=message):
-        open_log(tmp_path / "file")
+        read_log(tmp_path / "file")
 
 
 def test_binary_rubbish_under_a_known_name(tmp_path: Path) -> None:
     (tmp_path / "log.mat").write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB"):
-        open_log(tmp_path / "log.mat")
+        read_log(tmp_path / "log.mat")

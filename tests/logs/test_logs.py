@@ -12,7 +12,7 @@ from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
 from places import EMPS
 from properties import examples
 
-from hybridsep.logs.log import LogReader, open_log, read_log
+from hybridsep.logs.log import read_log
 
 
 @EVERY_FORMAT
@@ -25,19 +25,6 @@ def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
     np.testing.assert_allclose(log.x_meas, data["x"], rtol=rounding)
     assert log.T_s == 1e-3
     assert log.path == tmp_path / f"log{suffix}"
-
-
-@FORMATS
-@pytest.mark.parametrize("n", [1, 7, 50, 1000])
-def test_chunks_are_the_log_in_pieces(tmp_path: Path, suffix: str, n: int) -> None:
-    data = columns()
-    reader = open_log(write(tmp_path / f"log{suffix}", data))
-    assert isinstance(reader, LogReader)
-    assert (reader.T_s, reader.n_samples) == (1e-3, 50)
-    pieces = list(reader.chunks(n))
-    assert all(len(x_d) == len(x) <= n for x_d, x in pieces)
-    np.testing.assert_array_equal(np.concatenate([x_d for x_d, _ in pieces]), data["x_d"])
-    np.testing.assert_array_equal(np.concatenate([x for _, x in pieces]), data["x"])
 
 
 @FORMATS
@@ -143,7 +130,7 @@ def test_the_interval_of_a_clock_that_jitters(
     t = np.delete(t, numbers.integers(1, n - 1, rows_lost))
     t[n // 2 :] += 7.77  # recording stopped, and went on
     path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
-    T_s = read_log(path, uniform=False).T_s
+    T_s = read_log(path).T_s
     # Standard error of the mean: by two ends for each piece between gaps, √2 · 0.1 ms
     assert T_s == pytest.approx(1e-3, rel=5 * 0.1414 * np.sqrt(rows_lost + 2) / (n - rows_lost))
     if rows_lost == 0 and n > 15_000:
@@ -154,16 +141,16 @@ def test_an_interval_that_is_not_round_stays(tmp_path: Path) -> None:
     t = np.arange(12_000) * 1.0002e-3
     jitter = np.random.default_rng(0).normal(0.0, 1e-4, len(t))
     path = write(tmp_path / "log.npz", {"t": t + jitter, "x_d": t, "x": t})
-    assert read_log(path, uniform=False).T_s == pytest.approx(1.0002e-3, rel=1e-6)
+    assert read_log(path).T_s == pytest.approx(1.0002e-3, rel=1e-6)
     t[7000:] += 0.3e-3  # one late sample tells nothing of the others
     for uneven in (t, np.delete(t, 5000)):
         path = write(tmp_path / "log.npz", {"t": uneven, "x_d": uneven, "x": uneven})
-        assert read_log(path, uniform=False).T_s == pytest.approx(1.0002e-3, rel=3e-5)
+        assert read_log(path).T_s == pytest.approx(1.0002e-3, rel=3e-5)
 
 
 def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
-    assert read_log(path, uniform=False).T_s == 5.5
+    assert read_log(path).T_s == 5.5
 
 
 def test_recorded_axis() -> None:

@@ -11,7 +11,7 @@ from log_files import columns, write, write_csv
 from places import CASES
 
 from hybridsep.base.errors import LogError
-from hybridsep.logs.log import open_log, read_log
+from hybridsep.logs.log import read_log
 
 
 @pytest.mark.parametrize(
@@ -71,9 +71,9 @@ def test_units(tmp_path: Path, unit: str, factor: float, si: str) -> None:
 def test_an_index_is_told_from_time(tmp_path: Path) -> None:
     rows = "".join(f"{i},{i},{i}\n" for i in range(20))
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
-    message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s\), or .*'t \[ms\]'"
+    message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s 0.001\), or .*'t \[ms\]'"
     with pytest.raises(LogError, match=message):
-        open_log(path)
+        read_log(path)
     log = read_log(path, T_s=2e-3)
     np.testing.assert_allclose(log.t, 2e-3 * np.arange(20))
     assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3
@@ -82,7 +82,7 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
     with pytest.raises(
         LogError, match=r"column 't' is missing, the file has 'index', 'x_d', 'x'; name it: --t NAME \(or --T_s"
     ):
-        open_log(path)
+        read_log(path)
 
 
 @pytest.mark.parametrize(
@@ -148,14 +148,9 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("nothing", ["", "nan", "NaN"])
 def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
     path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n1,3,{nothing}\n2,5,6\n")
-    refused = r"line 3: column 'x' must be .*got n.*missing measurements .*with may_miss=True \(--trust true\)$"
-    with pytest.raises(LogError, match=refused):
-        read_log(path)
-    with pytest.raises(LogError, match=refused):
-        read_log(path, uniform=False, may_miss=False)
-    for log in (read_log(path, may_miss=True), read_log(path, uniform=False)):
-        np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
-        np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
+    log = read_log(path)
+    np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
+    np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
 
 
 @pytest.mark.parametrize(
@@ -170,7 +165,7 @@ def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
 def test_nothing_else_may_be_missing(tmp_path: Path, row: str, problem: str) -> None:
     path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n{row}\n2,5,\n")
     with pytest.raises(LogError, match=f"line 3: {problem}"):
-        read_log(path, may_miss=True)
+        read_log(path)
 
 
 def test_counts_are_read_with_their_length(tmp_path: Path) -> None:
@@ -212,7 +207,7 @@ ROWS = [f"{k / 1000:.3f},{k % 7},{k % 7}.5" for k in range(50)]
     ],
 )
 def test_recorded_texts(name: str, n: int, missing: list[int]) -> None:
-    log = read_log(CASES / f"{name}.csv", uniform=False)
+    log = read_log(CASES / f"{name}.csv")
     assert (len(log.t), log.T_s, log.file_unit, np.flatnonzero(np.isnan(log.x_meas)).tolist()) == (
         n,
         1e-3,
@@ -224,7 +219,7 @@ def test_recorded_texts(name: str, n: int, missing: list[int]) -> None:
 @pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases/logs beside the repository")
 def test_a_trace_of_changes() -> None:
     """A setpoint that is written when it changes, and an encoder that is sampled half as often."""
-    log = read_log(CASES / "sinumerik_axis7_blank_cells.csv", may_miss=True)
+    log = read_log(CASES / "sinumerik_axis7_blank_cells.csv")
     assert (len(log.t), log.T_s, log.unit, int(np.isnan(log.x_meas).sum())) == (3000, 2e-3, "rad", 1500)
     assert not log.x_d.any()
     assert log.remarks[-1] == (
@@ -237,7 +232,7 @@ def test_a_trace_of_changes() -> None:
 )
 def test_spellings_of_a_missing_measurement(tmp_path: Path, missing: str) -> None:
     rows = [*ROWS[:10], f"0.010,3,{missing}", *ROWS[11:]]
-    log = read_log(write_csv(tmp_path / "log.csv", "\n".join(["t,x_d,x", *rows])), may_miss=True)
+    log = read_log(write_csv(tmp_path / "log.csv", "\n".join(["t,x_d,x", *rows])))
     assert np.flatnonzero(np.isnan(log.x_meas)).tolist() == [10]
 
 

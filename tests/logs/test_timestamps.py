@@ -15,9 +15,8 @@ from log_files import write_csv
 from properties import examples
 
 from hybridsep.base.errors import LogError
-from hybridsep.intake.check import check
 from hybridsep.logs.formats import open_source
-from hybridsep.logs.log import open_log, read_log
+from hybridsep.logs.log import read_log
 
 SECOND = 1_000_000_000
 """In nanoseconds, in which the truth is computed."""
@@ -114,8 +113,8 @@ def test_stamps_are_seconds_since_the_first(
     for step in steps:
         times.append(times[-1] + -(-step // last) * last)
     folder = tmp_path_factory.mktemp("stamps")
-    log = read_log(write_csv(folder / "log.csv", spelling.log(times)), uniform=False)
-    truth = read_log(write_csv(folder / "seconds.csv", in_seconds(times)), uniform=False)
+    log = read_log(write_csv(folder / "log.csv", spelling.log(times)))
+    truth = read_log(write_csv(folder / "seconds.csv", in_seconds(times)))
     np.testing.assert_array_equal(log.t, truth.t)
     np.testing.assert_array_equal(log.x_d, truth.x_d)
     np.testing.assert_array_equal(log.x_meas, truth.x_meas)
@@ -148,7 +147,7 @@ def test_intervals_at_the_end_of_a_day(tmp_path: Path, rate: int) -> None:
     assert log.T_s == 1 / rate
     np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(ns))
     late = np.concatenate((ns[:1], ns[1:] + 86_400 * SECOND))
-    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(late.tolist())), uniform=False)
+    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(late.tolist())))
     np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(late))
 
 
@@ -228,7 +227,7 @@ def test_order_of_day_and_month(tmp_path: Path, dates: list[str], days: list[int
         table(f"{date} 10:20:30.5" for date in dates),
         table((f"{date};10:20:30.5" for date in dates), ";").replace("t;", "date;t;"),
     ):
-        log = read_log(write_csv(tmp_path / "log.csv", text), uniform=False)
+        log = read_log(write_csv(tmp_path / "log.csv", text))
         np.testing.assert_array_equal(log.t, 86_400.0 * np.array(days))
 
 
@@ -340,7 +339,7 @@ def test_what_is_no_date_is_refused_with_its_column(tmp_path: Path, date: str, m
             r"column 'x_d' must be a position, it holds timestamps; name another",
         ),
         ("10:20:30,1,2\n10:20:31,3,4\n", r"has no line of names, its first line is numbers"),
-        ("t,x_d,x\n10:20:31,1,2\n10:20:30,3,4\n", r"line 3: time 't' runs backwards: a value above 0 s .* got -1 s"),
+        ("t,x_d,x\n10:20:31,1,2\n10:20:30,3,4\n", r"time 't' must increase, it never does"),
     ],
 )
 def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
@@ -349,18 +348,13 @@ def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_milliseconds_at_4_khz(tmp_path: Path) -> None:
-    """Times that repeat are refused as repeated seconds are; the checks say what to do."""
+    """Times that repeat are refused with the option that takes the rows in their order."""
     spelling = Spelling("%Y-%m-%d ", "%H:%M:%S", "", 3, ".", ";")
     text = spelling.log([1_772_706_030 * SECOND + k // 4 * 1_000_000 for k in range(400)])
     path = write_csv(tmp_path / "log.csv", text)
-    with pytest.raises(
-        LogError, match=r"line 3: time 't' repeats: .* rounded too coarsely, remove .* give T_s \(--T_s\)"
-    ):
-        open_log(path)
-    finding = next(one for one in check(read_log(path, uniform=False)).findings if one.name == "time order")
-    assert finding.evidence["n"] == 300
-    assert "300 times are not above the one before, 0 of them run backwards" in finding.words
-    assert finding.words.endswith("; if they are rounded too coarsely, remove the column and give T_s")
+    with pytest.raises(LogError, match=r"time 't' is rounded too coarsely, 75.2 % .*\(--T_s 0.00025\)$"):
+        read_log(path)
+    np.testing.assert_array_equal(read_log(path, T_s=2.5e-4).t, 2.5e-4 * np.arange(400))
 
 
 def test_datetimes_of_numpy(tmp_path: Path) -> None:
@@ -378,7 +372,7 @@ def test_any_text_is_read_or_refused(cells: list[str], tmp_path_factory: pytest.
     rows = [*(f"2026-03-05 10:20:{i:02d}" for i in range(12)), *(cell.strip() for cell in cells)]
     path = write_csv(tmp_path_factory.mktemp("any") / "log.csv", table(rows, ";"))
     try:
-        log = read_log(path, uniform=False)
+        log = read_log(path)
     except LogError as error:
         assert "log.csv" in str(error)  # noqa: PT017
     else:

@@ -1,6 +1,6 @@
 """Random good logs of simulated axes: kinds of drives, of commands and of encoders, each a pure function of a seed.
 
-Thresholds of the checks were chosen on seeds below 1000.
+The statistic of the checks was chosen on seeds below 1000.
 """
 
 from __future__ import annotations
@@ -8,21 +8,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import chirp, lfilter
-from spoiled_logs import log_of
 
 from hybridsep import ModalModel, Mode
 from hybridsep.base.signals import Array
 from hybridsep.logs.log import Log
 
-__all__ = ["ACCUSED_BEFORE", "COMMANDS", "DRIVES", "GeneratedLog", "generated_log"]
+__all__ = ["ACCUSED_BEFORE", "COMMANDS", "DRIVES", "GeneratedLog", "generated_log", "log_of"]
 
 _N = 3000
 """Samples of a log."""
 
 Numbers = np.random.Generator
+
+
+def log_of(x_d: Array, x_meas: Array, T_s: float = 1e-3) -> Log:
+    return Log(T_s * np.arange(len(x_d), dtype=np.float64), x_d, x_meas, T_s, Path("log.csv"))
 
 
 def _moves(numbers: Numbers, f: float, T_s: float, *, share: float = 0.3, moves: int = 12) -> Array:

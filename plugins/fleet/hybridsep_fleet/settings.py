@@ -62,7 +62,6 @@ class FleetSettings:
             unit=self.unit,
             T_s=self.T_s,
             axis=axis or None,
-            uniform=False,
         )
 
 

@@ -21,8 +21,7 @@ from hybridsep.fitting.advice import Judged, extent, recommendation
 from hybridsep.fitting.fit import FitOptions, fit
 from hybridsep.fitting.replay import Recording, Replay, replay
 from hybridsep.fitting.report import fit_report, judged_by, write_errors, write_findings
-from hybridsep.intake.finding import Finding, findings_table
-from hybridsep.intake.repair import changes, take_in
+from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
 from hybridsep.machines.agree import check_interval, check_unit
 from hybridsep.machines.machine import Machine, load_machine
@@ -83,14 +82,15 @@ def work(task: AxisTask) -> dict[str, Any]:
 
 
 def _fitted(task: AxisTask, path: Path) -> _Judged:
-    used, findings = take_in([task.settings.read(path, task.axis)], fix=False)
+    log = task.settings.read(path, task.axis)
+    findings = {log.path.name: checked(log)}
     folder = _folder(task)
     name = machine_name(path, task.axis)
     options = FitOptions(task.settings.Np, name)
-    result = fit(used, folder, options, changes=changes(findings), fmus=task.settings.fmus)
+    result = fit([log], folder, options, fmus=task.settings.fmus)
     if task.settings.reports:
-        fit_report(result, used, findings).write(folder / "report.html")
-    judged = judged_by(result, used[0].shown)
+        fit_report(result, [log], findings).write(folder / "report.html")
+    judged = judged_by(result, log.shown)
     return _Judged(judged, result.machine, findings, result.identification["modes"], _below(task, folder))
 
 
@@ -99,16 +99,16 @@ def _replayed(task: AxisTask, path: Path) -> _Judged:
     machine = _machine(task)
     check_unit(path.name, log, machine)
     check_interval(path.name, log.T_s, machine)
-    (used,), findings = take_in([log], fix=False)
+    findings = {log.path.name: checked(log)}
     predictor = HybridPredictor(machine.model, machine.predictor_settings)
-    recordings = [Recording(one.x_d, one.x_meas, 0) for one in used.segments()]
-    judged = Judged(replay(predictor, recordings).with_peers(), used.T_s, used.shown, "the log")
+    recordings = [Recording(one.x_d, one.x_meas, 0) for one in log.segments()]
+    judged = Judged(replay(predictor, recordings).with_peers(), log.T_s, log.shown, "the log")
     folder = _folder(task)
     if task.settings.reports:
-        report = Report(f"{machine.title}: {path.name}", extent([used]))
+        report = Report(f"{machine.title}: {path.name}", extent([log]))
         report.paragraph(recommendation(judged), "verdict")
         write_errors(report, judged, "Errors of the replay", "The predictor began without any knowledge.")
-        write_findings(report, findings)
+        write_findings(report, [log], findings)
         report.write(folder / "report.html")
     return _Judged(judged, machine, findings, [], _below(task, folder))
 

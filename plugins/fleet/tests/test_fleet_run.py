@@ -136,7 +136,7 @@ def test_a_fit_is_that_of_fit(folder: Path) -> None:
     settings = FleetSettings(Np=20, fmus=False)
     (row,) = run_fleet([str(source)], folder / "out", settings, engine).rows
     (folder / "single").mkdir()
-    single = fit([read_log(source / "X.csv", uniform=False)], folder / "single", FitOptions(20, "X"), fmus=False)
+    single = fit([read_log(source / "X.csv")], folder / "single", FitOptions(20, "X"), fmus=False)
     judged = single.summary()["judged"]
     assert {name: row[name] for name in ("rms_pb", "rms_hold", "rms_h", "ratio", "best", "verdict")} == {
         name: judged[name] for name in ("rms_pb", "rms_hold", "rms_h", "ratio", "best", "verdict")

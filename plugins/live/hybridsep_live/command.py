@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from hybridsep.intake.finding import Finding
+    from hybridsep.logs.checks import Finding
     from hybridsep.logs.units import Shown
 
 __all__ = ["live"]

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 
 import numpy as np
 
-from hybridsep.intake.check import check
-from hybridsep.intake.finding import HOPELESS, Finding
+from hybridsep.logs.checks import Finding, check
 from hybridsep.logs.log import Log
 
 from .sample import Sample
@@ -20,13 +18,6 @@ __all__ = ["FirstSeconds"]
 
 _SECONDS, _SAMPLES = 3.0, (500, 5000)
 """Time from the first motion on that is checked, and its least and most samples: the checks need a few moves."""
-
-_NAMES = (
-    HOPELESS, "same column", "columns swapped", "following error", "velocity for position", "sign", "scale", "offset",
-    "unit",
-)  # fmt: skip
-"""Findings about what the columns mean. Samples that miss, repeat or jitter are counted as they come, and others, such
-as clipped positions, need more than seconds."""
 
 
 class FirstSeconds:
@@ -88,5 +79,5 @@ class FirstSeconds:
             return
         t = self._T_s * np.arange(len(x), dtype=np.float64)
         log = Log(t, x_d, x, self._T_s, Path("stream"), unit=self._unit, unit_stated=self._stated)
-        found = [replace(one, fix=None) for one in check(log).findings if one.name in _NAMES]
+        found = [one for one in check(log) if one.refused]  # others are counted as they come, or need more than seconds
         self._say(found)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from hybridsep.base.errors import HybridSepError, ParameterError, SignalError
-from hybridsep.logs.log import LogReader, check_reading, open_log
+from hybridsep.logs.log import Log, check_reading, read_log
 from hybridsep.machines.agree import check_interval
 from hybridsep.machines.machine import Machine
 
@@ -95,7 +95,7 @@ class RecordedSource(LiveSource):
 
     Parameters
     ----------
-    log : LogReader
+    log : Log
     speed : float
         Times the recorded one; 0: as fast as they are taken.
 
@@ -105,7 +105,7 @@ class RecordedSource(LiveSource):
         If ``speed`` is negative.
     """
 
-    def __init__(self, log: LogReader, speed: float = 1.0) -> None:
+    def __init__(self, log: Log, speed: float = 1.0) -> None:
         if not 0.0 <= speed <= 1e6:
             raise ParameterError(f"speed must be 0 … 1e6, 0 for as fast as possible, got {speed:g}")
         self.name, self.file_unit = str(log.path), log.file_unit
@@ -113,18 +113,15 @@ class RecordedSource(LiveSource):
 
     def samples(self) -> Iterator[Sample | None]:
         """Yield the samples, each at its time."""
-        T_s, k = self._log.T_s, 0
-        begun = time.perf_counter()
-        for commands, measured in self._log.chunks():
-            for x_d, x_meas in zip(commands.tolist(), measured.tolist(), strict=True):
-                if self._speed:
-                    due = begun + k * T_s / self._speed
-                    while (wait := due - time.perf_counter()) > 0.0:
-                        time.sleep(min(max(wait, _PAUSE), _IDLE))
-                        if wait > _IDLE:
-                            yield None
-                yield Sample(x_d, x_meas, k, k * T_s)
-                k += 1
+        T_s, begun = self._log.T_s, time.perf_counter()
+        for k, (x_d, x_meas) in enumerate(zip(self._log.x_d.tolist(), self._log.x_meas.tolist(), strict=True)):
+            if self._speed:
+                due = begun + k * T_s / self._speed
+                while (wait := due - time.perf_counter()) > 0.0:
+                    time.sleep(min(max(wait, _PAUSE), _IDLE))
+                    if wait > _IDLE:
+                        yield None
+            yield Sample(x_d, x_meas, k, k * T_s)
 
 
 class UdpSource(LiveSource):
@@ -312,7 +309,7 @@ def open_source(
         return UdpSource(check_port(udp["port"], address), (udp["host"] or _LOCAL).strip("[]"), reading, say)
     if address.startswith("udp:") or "://" in address:
         raise ParameterError(f"SOURCE must be {FORMS}; got {address!r}")
-    log = open_log(Path(address), columns=columns, unit=unit, T_s=given.T_s, axis=given.axis or own.axis, may_miss=True)
+    log = read_log(Path(address), columns=columns, unit=unit, T_s=given.T_s, axis=given.axis or own.axis)
     check_interval(Path(address).name, log.T_s, machine)
     if log.file_unit and unit is None and log.unit != machine.unit:
         raise ParameterError(

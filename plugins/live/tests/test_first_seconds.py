@@ -10,7 +10,7 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import backtest, load_machine
-from hybridsep.intake.finding import Finding
+from hybridsep.logs.checks import Finding
 from hybridsep.machines.machine import machine_path
 from hybridsep_live.first_seconds import FirstSeconds
 from hybridsep_live.sample import Sample

@@ -19,7 +19,7 @@ from hybridsep.cosim.adapters import FmuController
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.weights import warm_predictor
-from hybridsep.logs.log import open_log
+from hybridsep.logs.log import read_log
 from hybridsep_live.core import Row, StepTimes
 from hybridsep_live.run import LiveRun, run_live
 from hybridsep_live.sample import Sample
@@ -115,7 +115,7 @@ def test_a_replay_agrees_from_the_second_window_on(fmus: BuiltFmus, case: Case) 
 
 def test_a_log_at_its_speed(fmus: BuiltFmus, case: Case, tmp_path: Path) -> None:
     run, late, arrived = case
-    log = open_log(write_rows(tmp_path / "log.csv", run.x_d, np.array(arrived)), may_miss=True)
+    log = read_log(write_rows(tmp_path / "log.csv", run.x_d, np.array(arrived)))
     kept = Kept()
     done = run_live(
         RecordedSource(log, speed=8.0), FmuController(fmus("HybridPredictor"), {"measurement_delay": late}, 0.0), [kept]
@@ -128,7 +128,7 @@ def test_a_log_at_its_speed(fmus: BuiltFmus, case: Case, tmp_path: Path) -> None
 
 
 def test_the_pace_of_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log = open_log(write_rows(tmp_path / "log.csv", commanded()[:300], commanded()[:300]))
+    log = read_log(write_rows(tmp_path / "log.csv", commanded()[:300], commanded()[:300]))
     now = [50.0]
     monkeypatch.setattr("time.perf_counter", lambda: now[0])
     monkeypatch.setattr("time.sleep", lambda time: now.__setitem__(0, now[0] + time))

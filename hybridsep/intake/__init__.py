@@ -1,1 +1,0 @@
-"""Intake of recorded logs: what may be wrong with one, in words and numbers, and how it is put right."""

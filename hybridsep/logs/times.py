@@ -1,0 +1,261 @@
+"""Times of a log: counters that wrap, gaps and clocks that were set back, the interval between the samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ..base.errors import LogError, brief
+from ..base.signals import Array, Indices
+
+__all__ = ["Times", "given_times", "recorded_times"]
+
+_DAY = 86_400.0
+
+_CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _DAY}
+"""Units, s, that a column of times may be in which states none and is not in seconds."""
+
+_PLAUSIBLE = (2e-6, 0.5)
+"""Intervals, s, of a log of an axis; where none is stated, the unit of the times is unknown beyond."""
+
+_COUNTED = 10
+"""Fewest times whose unit is doubted: two or three seconds are no index yet."""
+
+_NOT_LATER = 0.05
+"""Share of times not above the one before from which on they are rounded too coarsely to tell an interval or a gap."""
+
+_RESOLVED = 0.2
+"""Largest resolution of times of single precision, in intervals, with which they tell a gap."""
+
+_GAP, _LATE, _AROUND = 1.5, 0.6, 9
+"""Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how
+much later or earlier the times must stay then, and over how many samples: jitter alone does not last."""
+
+_TOLERANCE = 0.01
+"""Largest relative difference between a given interval and that of the times: more than any clock's drift."""
+
+_ROUNDING, _ERRORS, _ROUNDING_MAX = 1e-8, 3.0, 1e-4
+"""Relative change by which an interval may be rounded at least, in standard errors, and at most."""
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times of a log in the order of the file.
+
+    Attributes
+    ----------
+    t : (n,) array, s
+    T_s : float, s
+        Sampling interval.
+    starts : tuple of int
+        First samples of the segments; the first is 0.
+    remarks : tuple of str
+        What was unwrapped, and why segments begin.
+    """
+
+    t: Array
+    T_s: float
+    starts: tuple[int, ...] = (0,)
+    remarks: tuple[str, ...] = ()
+
+
+def given_times(n: int, T_s: float) -> Times:
+    """Return the times of ``n`` samples of a given interval, s."""
+    return Times(np.arange(n, dtype=np.float64) * T_s, T_s)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # times may be any finite numbers
+def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated: bool, given: float | None) -> Times:
+    """Return what a column of times tells.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        Of the column, for messages.
+    times : (n,) array
+        As in the file, n ≥ 2.
+    factor : float, s
+        Their unit.
+    stated : bool
+        Whether the file states it.
+    given : float, s, optional
+        Sampling interval that the user gives. It tells the unit of times that state none, and replaces times that are
+        rounded too coarsely.
+
+    Raises
+    ------
+    LogError
+        If the times never increase, their unit is unknown, they are too coarse, or another interval was given.
+    """
+    coarse = _is_coarse(times)
+    t, remarks = _unwrapped(times * factor)
+    steps = np.diff(t)
+    if not (steps > 0.0).any():
+        raise LogError(f"{path}: time {brief(name)} must increase, it never does")
+    if coarse or np.mean(steps <= 0.0) > _NOT_LATER:
+        return _rows(path, name, t, given, remarks)
+    interval, error = _mean_interval(t)
+    told = stated or len(t) < _COUNTED
+    counts = not told and float(np.median(steps)) == 1.0
+    if given is None:
+        if counts or not (told or _PLAUSIBLE[0] <= interval <= _PLAUSIBLE[1]):
+            raise _unknown_unit(path, name, float(t[0]), interval, counts=counts)
+        if not 1e-300 <= interval <= 1e300:
+            raise LogError(f"{path}: time {brief(name)} must be in seconds, got an interval of {interval:g} s")
+        T_s = _rounded(interval, _ROUNDING + min(_ROUNDING_MAX, _ERRORS * error))
+    elif counts or (not stated and _is_one_of(given / interval, *_CLOCKS.values())):
+        t, T_s = (t - t[0]) * (given / interval), given  # precise, as it may be of 1970
+        interval = given
+    elif _is_one_of(given / interval, 1.0):
+        T_s = given
+    else:
+        raise LogError(
+            f"{path}: T_s = {given:g} s was given, but column {brief(name)} has an interval of {interval:g} s; leave "
+            "T_s out, or correct it or the column"
+        )
+    starts = _starts(t, interval)
+    return Times(t, T_s, (0, *starts.tolist()), (*remarks, *_words(t, starts, T_s)))
+
+
+def _unwrapped(t: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return times without the wraps of a counter of 16 or 32 bits, or of a time of day, and what was done."""
+    steps = np.diff(t)
+    back = np.flatnonzero(steps < 0.0)
+    if not len(back) or not (steps > 0.0).any():
+        return t, ()
+    usual, remarks = float(np.median(steps[steps > 0.0])), []
+    counters = [(2.0**bits * unit, f"{bits} bits") for bits in (16, 32) for unit in (1.0, 1e-3, 1e-6, 1e-9)]
+    for period, what in (*counters, (_DAY, "a day")):
+        wraps = back[np.abs(steps[back] + period - usual) <= usual / 2]
+        if len(wraps):
+            added = np.zeros(len(t))
+            added[wraps + 1] = period
+            t = t + np.cumsum(added)
+            many = "once" if len(wraps) == 1 else f"{len(wraps)} times"
+            remarks.append(f"the time wraps {many}, after {what}: unwrapped")
+    return t, tuple(remarks)
+
+
+def _is_coarse(times: Array) -> bool:
+    """Return whether times are numbers of single precision that do not resolve the interval."""
+    single = times.astype(np.float32)
+    if not np.array_equal(single, times):
+        return False
+    return float(np.spacing(np.abs(single).max())) > _RESOLVED * abs(float(times[-1] - times[0])) / (len(times) - 1)
+
+
+def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[str, ...]) -> Times:
+    """Return rows a given interval apart whose times are too coarse; they still tell long gaps, and clocks set back."""
+    steps = np.diff(t)
+    resolution = float(np.median(steps[steps > 0.0]))
+    usual = steps[(steps >= 0.0) & (steps <= 2.0 * resolution)]
+    mean = float(usual.mean())
+    about = _rounded(mean, resolution / max(float(usual.sum()), resolution))
+    if given is None:
+        error = LogError(
+            f"{path}: time {brief(name)} is rounded too coarsely, {100 * np.mean(steps <= 0.0):.3g} % of the times are "
+            f"not above the one before; say the interval between the rows, about {about:g} s (--T_s {about:g})"
+        )
+        error.options = ((f"--T_s {about:g}", "the rows in their order, so far apart"),)
+        raise error
+    scale = given / mean
+    beyond = (scale * steps > scale * resolution + _GAP * given) | (steps < -2.0 * resolution)
+    starts = np.flatnonzero(beyond) + 1
+    found = given_times(len(t), given)
+    said = f"the times are rounded coarsely: the rows are taken {given:g} s apart"
+    return Times(found.t, given, (0, *starts.tolist()), (*remarks, said, *_words(scale * t, starts, given)))
+
+
+def _unknown_unit(path: Path, name: str, first: float, interval: float, *, counts: bool) -> LogError:
+    """Return the error of times that state no unit and are not in seconds, with the intervals that they may have."""
+    units = [unit for unit, size in _CLOCKS.items() if _PLAUSIBLE[0] <= size * interval <= _PLAUSIBLE[1]]
+    since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < 1e10), "")  # 1980 to 2286
+    units = [since] if since else units
+    guess = f", or a time in {units[0]}{' since 1970' if since else ''}" if units else ""
+    hint = f"--T_s {interval * _CLOCKS[units[0]]:.4g}" if units else ""
+    says = "counts samples: it is an index" if counts else f"has an interval of {interval:.6g}, no axis's in s"
+    error = LogError(
+        f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}), or name its unit in the file, "
+        f"'{name:.60} [ms]'"
+    )
+    error.options = ((hint, "the interval between the rows, s"),) if hint else ()
+    return error
+
+
+def _is_one_of(ratio: float, *known: float) -> bool:
+    return any(abs(ratio / one - 1.0) <= _TOLERANCE for one in known)
+
+
+def _words(t: Array, starts: Indices, T_s: float) -> list[str]:
+    """Return why segments begin."""
+    steps = np.diff(t)[starts - 1]
+    gaps, back, said = starts[steps > 0.0], starts[steps <= 0.0], []
+    if len(gaps):
+        lost = np.round(steps[steps > 0.0] / T_s) - 1.0
+        longest = float(steps[steps > 0.0].max())
+        said.append(
+            f"{lost.sum():.6g} sample{'s are' if lost.sum() > 1 else ' is'} missing in {len(gaps)} "
+            f"gap{'s' if len(gaps) > 1 else ''}, the longest of {longest:.4g} s; the first is before sample "
+            f"{gaps[0] + 1}: another segment begins after each (--resample: short ones get rows without measurement)"
+        )
+    if len(back):
+        said.append(
+            f"the time goes back {len(back)} time{'s' if len(back) > 1 else ''}, first at sample {back[0] + 1}, by "
+            f"{-float(steps[steps <= 0.0].min()):.6g} s at most: the file's order is kept, another segment begins"
+        )
+    return said
+
+
+def _starts(t: Array, T_s: float) -> Indices:
+    """Return the samples that are later than the one before by more than an interval, or earlier, and all after them.
+
+    Parameters
+    ----------
+    t : (n,) array, s
+        Times.
+    T_s : float, s
+        Sampling interval.
+    """
+    steps = np.diff(t) / T_s
+    at = np.flatnonzero((steps > _GAP) | (steps < 1.0 - _GAP)) + 1
+    if not len(at):
+        return at
+    phase = t / T_s - np.arange(len(t))
+    around = sliding_window_view(np.pad(phase, _AROUND, constant_values=np.nan), _AROUND)
+    # Window i ends before sample i, window i + _AROUND begins with it
+    late = np.nanmedian(around[at + _AROUND], axis=1) - np.nanmedian(around[at], axis=1)
+    return at[(np.abs(late) > _LATE) & (late * steps[at - 1] > 0.0)]
+
+
+def _mean_interval(t: Array) -> tuple[float, float]:
+    """Return the mean interval, segments apart, and its relative standard error if times scatter independently.
+
+    Without gaps it is ``(t_end − t_0)/(n − 1)``.
+    """
+    steps = np.diff(t)
+    interval = float(np.median(steps[steps > 0.0]))
+    inner = np.ones(len(steps), dtype=np.bool_)
+    for _ in range(2):  # once more with the mean, as jitter moves a median
+        inner[:] = True
+        inner[_starts(t, interval) - 1] = False
+        if inner.any() and steps[inner].sum() > 0.0:
+            interval = float(steps[inner].sum() / inner.sum())
+    n_pieces = len(steps) - int(inner.sum()) + 1
+    deviation = float(np.std(steps[inner] / interval)) if inner.any() else 0.0
+    return interval, deviation * math.sqrt(n_pieces) / max(int(inner.sum()), 1)  # the ends of the pieces alone count
+
+
+def _rounded(mean: float, tolerance: float) -> float:
+    """Return the interval, s, or inverse of a rate, with the fewest digits within a relative tolerance of a mean."""
+    # 0.001 s, or 1/3000 s; twelve digits always are within the tolerance
+    candidates = (
+        candidate
+        for digits in range(12)
+        for candidate in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}"))
+    )
+    return next((one for one in candidates if abs(one - mean) <= tolerance * mean), mean)
