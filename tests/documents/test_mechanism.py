@@ -10,15 +10,12 @@ from mechanism import (
     Drive,
     characteristic,
     coulomb,
-    decay,
     innovation,
     lifted,
     linear_mode,
-    markov,
     moving_average,
     polynomial,
     quadratic,
-    recursion_with_mode,
     response,
     simulate,
     sinusoid,
@@ -48,34 +45,6 @@ def test_the_model_beside_the_disturbance_is_the_librarys() -> None:
     run = simulate(DRIVE, X_D, lambda *_: 0.0)
     np.testing.assert_allclose(run.x_pb, x_pb, rtol=0, atol=1e-16)
     np.testing.assert_array_equal(run.e_pb, 0.0)
-
-
-def test_a_force_moves_the_drive_as_a_force_does() -> None:
-    # A constant force F from rest: m ẍ + c ẋ + k x = F.
-    force, wn = 50.0, np.sqrt(K / M)
-    zeta = C / (2 * np.sqrt(K * M))
-    wd = wn * np.sqrt(1 - zeta**2)
-    decay = np.exp(-zeta * wn * T)
-    expected = force / K * (1 - decay * (np.cos(wd * T) + zeta * wn / wd * np.sin(wd * T)))
-    run = simulate(DRIVE, np.zeros(N), lambda *_: force)
-    np.testing.assert_allclose(run.x, expected, rtol=0, atol=1e-15)
-
-
-def test_velocity_is_that_of_the_drive() -> None:
-    seen: list[float] = []
-    command = np.full(60, 0.01)
-
-    def record(k: int, xi: Array, x_d: float) -> float:
-        seen.append(float(DRIVE.V @ xi) + DRIVE.V_d * x_d)
-        return 0.0
-
-    simulate(DRIVE, command, record)
-    # The step response of (11) starts with velocity c/m times the step; elsewhere a central difference at 10 µs.
-    assert seen[0] == pytest.approx(C / M * 0.01, rel=1e-12)
-    fine = ModalModel.spring_mass_damper(M, C, K).discretise(1e-5)
-    x, _ = fine.forced_response(fine.rest(), np.full(6000, 0.01))
-    slope = (x[101:5902:100] - x[99:5900:100]) / 2e-5
-    np.testing.assert_allclose(seen[1:60], slope, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -131,24 +100,6 @@ def test_the_papers_argument_needs_the_response_to_have_decayed() -> None:
     assert np.max(alone[600:]) < 0.02 * np.max(alone)  # exp(−600 T_s c/2m) = 0.009
 
 
-def test_decay_is_that_of_the_mode() -> None:
-    left = decay(DRIVE.A, DRIVE.Gamma, DRIVE.C, 3000)
-    assert left[0] == 1.0
-    assert np.all(np.diff(left) <= 0)
-    assert left[50] > 0.7  # at the paper's p the response is far from gone
-    period = 2 * np.pi / np.sqrt(K / M - (C / (2 * M)) ** 2)
-    assert 0 <= np.argmax(left < 1e-3) * TS - (np.log(1e3) / (C / (2 * M)) - period) < period
-
-
-def test_cayley_and_hamilton() -> None:
-    assert len(CHI) == len(DRIVE.B) + 1
-    power = sum(a * np.linalg.matrix_power(DRIVE.A, len(CHI) - 1 - i) for i, a in enumerate(CHI))
-    np.testing.assert_allclose(power, 0.0, atol=1e-14)
-    run = simulate(DRIVE, X_D, lambda k, *_: float(np.cos(k * k)))
-    driven = np.convolve(moving_average(DRIVE.A, DRIVE.Gamma, DRIVE.C), run.h)[:N]
-    np.testing.assert_allclose(innovation(run.e_pb, CHI, driven), 0.0, atol=1e-17)
-
-
 def test_friction_is_news_at_a_reversal_alone() -> None:
     force = 2.0
     run = simulate(DRIVE, X_D, coulomb(force, X_D))
@@ -164,59 +115,6 @@ def test_friction_is_news_at_a_reversal_alone() -> None:
     np.testing.assert_allclose(news[reversals + 2], n_2 * jumps[reversals], rtol=1e-9)
     quiet = np.setdiff1d(np.arange(N), np.concatenate((reversals + 1, reversals + 2)))
     np.testing.assert_allclose(news[quiet], 0.0, atol=1e-13 * np.max(np.abs(run.e_pb)))
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
-def test_polynomials_of_time_are_known_after_the_start(degree: int) -> None:
-    run = simulate(DRIVE, X_D, lambda k, *_: float((1 + T[k]) ** degree))
-    exact = innovation(run.e_pb, np.convolve(CHI, polynomial(degree)))
-    np.testing.assert_allclose(exact[degree + 3 :], 0.0, atol=1e-15)
-    if degree:
-        fewer = innovation(run.e_pb, np.convolve(CHI, polynomial(degree - 1)))
-        assert np.all(np.abs(fewer[degree + 2 :]) > 10 * np.max(np.abs(exact[degree + 3 :])))
-
-
-def test_sinusoids_of_time_are_known_after_the_start() -> None:
-    run = simulate(DRIVE, X_D, lambda k, *_: float(np.sin(40 * T[k] + 1)))
-    right = innovation(run.e_pb, np.convolve(CHI, sinusoid(40 / (2 * np.pi), TS)))
-    wrong = innovation(run.e_pb, np.convolve(CHI, sinusoid(50 / (2 * np.pi), TS)))
-    np.testing.assert_allclose(right[4:], 0.0, atol=1e-15)
-    assert np.max(np.abs(wrong[4:])) > 1e-11
-
-
-def test_an_unmodelled_mode_is_known_with_its_order_and_past_x_pb() -> None:
-    run = simulate(DRIVE, X_D, linear_mode(DRIVE, MODE))
-    r, s = recursion_with_mode(DRIVE, MODE)
-    assert len(r) == len(s) == 5
-    assert np.max(np.abs(np.roots(r))) < 1  # the coupled drive is stable
-    size = float(np.max(np.abs(run.e_pb)))
-    known = np.convolve(s, run.x_pb)[:N]
-    np.testing.assert_allclose(innovation(run.e_pb, r, known), 0.0, atol=1e-12 * size)
-    assert np.max(np.abs(innovation(run.e_pb, CHI))) > 1e-3 * size
-    assert np.max(np.abs(innovation(run.e_pb, r))) > 1e-6 * size
-
-
-def test_a_mode_starts_each_run_at_rest() -> None:
-    disturbance = linear_mode(DRIVE, MODE)
-    first, second = (simulate(DRIVE, X_D[:200], disturbance) for _ in range(2))
-    np.testing.assert_array_equal(first.x, second.x)
-
-
-def test_a_smooth_nonlinearity_leaves_little_and_less_with_each_order() -> None:
-    run = simulate(DRIVE, X_D, quadratic(DRIVE, 100.0, 1000.0))
-    left = []
-    for degree in range(3):
-        news = innovation(run.e_pb, np.convolve(CHI, polynomial(degree)))
-        left.append(np.sqrt(np.mean(news**2) / np.mean(run.e_pb**2)))
-    assert left[0] < 1e-3
-    assert left[1] < left[0] / 10
-    assert left[2] < left[1] / 3
-    assert left[2] > 1e-8  # little, but not nothing: rounding is at 1e-13
-
-
-def test_markov_parameters_are_the_impulse_response() -> None:
-    run = simulate(DRIVE, np.zeros(20), lambda k, *_: float(k == 0))
-    np.testing.assert_allclose(markov(DRIVE.A, DRIVE.Gamma, DRIVE.C, 19), run.e_pb[1:], rtol=1e-12)
 
 
 def test_demonstration() -> None:

@@ -19,7 +19,6 @@ from stream import (
     CANNOT,
     COMPENSATOR,
     LOOK_AHEADS,
-    NATIVE,
     PLANTS,
     PREDICTOR,
     TRAJECTORY,
@@ -32,7 +31,7 @@ N_SAMPLES = 160
 
 Clock = list[Fraction]
 
-every = on_all((*LOOK_AHEADS, TRAJECTORY), alike=(NATIVE,))  # its clock is the C core's
+every = on_all((*LOOK_AHEADS, TRAJECTORY))
 
 
 def steps_of(pattern: str) -> list[Fraction]:

@@ -103,10 +103,10 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, ali
     """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
 
     With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
-    and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and the latter
-    where a test is of agreement or says so by ``alike`` (``one_set``); the other sets run at night.
+    and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and so does the
+    latter but for a test of adapters, and what ``alike`` names (``one_set``); the other sets run at night.
     """
-    once = (PYTHON, NATIVE) if needs == "agreement" else (PYTHON, *alike)
+    once = (PYTHON, *alike) if adapters and needs != "agreement" else (PYTHON, NATIVE, *alike)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
     if adapters:
         pairs.append((FMI3, models[0]))
