@@ -51,6 +51,7 @@ MODULE_LICENSE("Dual BSD/GPL");
 #define HSEP_ALIKE 0.25     /* of such a step: what fb may differ by from cmd, and what out may move by itself */
 #define HSEP_FADE 0.2       /* 1/periods, rate at which a change without a model fades, if the limits allow it */
 #define HSEP_GONE 1e-3      /* of the largest acceleration and jerk: a change that may end by a step */
+#define HSEP_NOISE 4.0      /* of the largest acceleration, a period: what a command at rest may move by */
 #define HSEP_OTHER_T_S 0.01 /* deviation of the period, relative to the sampling interval, that is another one */
 
 static char *axes[HSEP_AXES];
@@ -194,6 +195,30 @@ static void axis_choose(axis_data *self)
 #endif
 }
 
+/* Let the command be where it rests since look-ahead periods. */
+static void axis_rest(axis_data *self)
+{
+    for (size_t i = 0; i < self->n_ring; i++) {
+        self->ring[i] = self->command;
+    }
+    self->still = self->n_ring;
+}
+
+/* Become active. LinuxCNC's command was the feedback until then: if it moved by no more than noise, it rested. */
+static void axis_activate(axis_data *self)
+{
+    double low = self->command, high = low;
+    for (size_t i = 0; i < self->n_ring; i++) {
+        low = fmin(low, self->ring[i]);
+        high = fmax(high, self->ring[i]);
+    }
+    if (high - low <= HSEP_NOISE * self->limit[1]) {
+        self->change = self->out[0] - self->command;
+        self->velocity = 0.0;
+        axis_rest(self);
+    }
+}
+
 /* Move the origin: what is remembered stays where it is. */
 static void axis_move_origin(axis_data *self, double by)
 {
@@ -211,9 +236,7 @@ static void axis_begin(axis_data *self)
     hsep_instance *instance = &self->instance;
     const double command = self->command + self->origin;
     axis_move_origin(self, (instance->context.angular ? HSEP_TURN * rint(command / HSEP_TURN) : 0.0) - self->origin);
-    for (size_t i = 0; i < self->n_ring; i++) {
-        self->ring[i] = self->command;
-    }
+    axis_rest(self);
     self->k = 0;
     self->ending = 0;
     *axis_value(self, HSEP_VR_x_d_ahead) = *axis_value(self, HSEP_VR_x_meas) = self->command;
@@ -333,11 +356,8 @@ static int axis_meet(axis_data *self)
     self->command = self->begun ? command : 0.0;
     self->measured = isfinite(feedback) ? feedback : self->command;
     self->feedback[0] = self->feedback[1] = self->measured;
-    for (size_t i = 0; i < self->n_ring; i++) {
-        self->ring[i] = self->command;
-    }
     self->out[0] = self->out[1] = self->out[2] = self->out[3] = self->command;
-    self->still = self->n_ring;
+    axis_rest(self);
     return self->begun;
 }
 
@@ -366,6 +386,9 @@ static void axis_step(void *data, long period)
         self->acceleration = 0.0;
         axis_write(self, delayed, AXIS_INACTIVE);
         return;
+    }
+    if (*pins->state == AXIS_INACTIVE) {
+        axis_activate(self);
     }
     if (resets) {
         self->faulty = self->unknown = 0;

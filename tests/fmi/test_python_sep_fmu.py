@@ -140,7 +140,7 @@ def test_parameters_may_be_set_one_after_the_other(compensator: FmuInstance) -> 
     compensator.slave.enterInitializationMode()
     compensator.set("x_d_ahead", 0.1)
     compensator.set("Np", 75)  # which spacing = 2 does not divide
-    assert outputs(compensator) == [0.1] * 4 + [0.0] * 9
+    assert outputs(compensator) == [0.1] * 4 + [0.0] * 10
     compensator.set("spacing", 3)
     assert outputs(compensator)[6] == SepState.PHYSICS
     compensator.slave.exitInitializationMode()

@@ -328,7 +328,7 @@ def test_nothing_steps(
     # Relative to the origin: the command of look-ahead periods ago
     origin, past = np.array(origins[1:]), np.array(held[1:]) - np.array(origins[1:])
     delayed = np.concatenate((np.zeros(component.look_ahead), past))[: len(past)]
-    np.testing.assert_allclose(shown[:, DELAYED] - origin, delayed, atol=1e-6)
+    np.testing.assert_allclose(shown[:, DELAYED] - origin, delayed, rtol=0, atol=4 * A)
     np.testing.assert_allclose(np.where(active, 0.0, out - shown[:, FB_JOINT]), 0.0, atol=1e-9)
     here = out - origin
     ongoing = active[1:]

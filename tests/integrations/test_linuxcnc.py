@@ -198,6 +198,40 @@ def halrun(place: Path, *lines: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.nightly
 @IN_LINUXCNC
+@pytest.mark.parametrize("enable", [0, 1])
+@pytest.mark.parametrize("faster", [0.95, 1.5, 2.2, 4.0])
+def test_a_rapid_of_any_speed_does_not_step(installed: Path, faster: float, enable: int) -> None:
+    """A move of 120 mm, faster than the limit of 100 mm/s, of a drive that follows by a low-pass."""
+    contour.hybridsep("hal", "spring_mass_damper", "--out", str(installed / "hal"))
+    axis, samples = "hsep.spring_mass_damper", installed / "rapid.txt"
+    samples.touch()
+    shutil.chown(samples, USER)
+    done = halrun(
+        installed,
+        "loadrt threads name1=servo period1=1000000",
+        f"loadrt hsep axes={installed}/hal/spring_mass_damper",
+        *("loadrt limit3 count=1", "loadrt lowpass count=1", "loadrt sampler depth=4000 cfg=ffs"),
+        *(f"addf {name} servo" for name in ("limit3.0", axis, "lowpass.0", "sampler.0")),
+        f"net c limit3.0.out => {axis}.cmd",
+        f"net o {axis}.out => lowpass.0.in sampler.0.pin.0",
+        f"net f lowpass.0.out => {axis}.fb",
+        f"net d {axis}.delayed => sampler.0.pin.1",
+        f"net s {axis}.state => sampler.0.pin.2",
+        *("setp lowpass.0.gain 0.15", f"setp limit3.0.maxv {100.0 * faster}", "setp limit3.0.maxa 2000"),
+        *(f"setp {axis}.active 1", f"setp {axis}.enable {enable}"),
+        *("start", "setp limit3.0.in 120", f"loadusr -w halsampler -n 2500 {samples}"),
+    )
+    out, delayed, state = np.loadtxt(samples).T
+    assert len(out) == 2500, done.stderr
+    assert out[-1] == pytest.approx(120.0)
+    assert np.max(np.abs(np.diff(out, 2))) <= 2e-3 + 16e-3 + 4e-6  # mm a period²: the command's, the limit, six decimals
+    fast = np.abs(np.diff(delayed, prepend=delayed[0])) > 0.1 * (1 + 1e-4)
+    assert np.max(np.abs(out - delayed)[fast], initial=0.0) < 2e-6
+    assert np.any(state >= 2) == bool(enable)
+
+
+@pytest.mark.nightly
+@IN_LINUXCNC
 def test_what_an_operator_does_in_motion_keeps_the_joints_limits(installed: Path) -> None:
     contour.run("stops.py", installed / "stops.txt", installed, {}, USER)
     samples = contour.Samples.read(installed / "stops.txt")

@@ -1,0 +1,56 @@
+"""A modified command never steps: its differences are the command's, or within the drive's limits, whatever comes in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from driving import T_S, initialise
+from properties import share
+from stream import COMPENSATOR, OUTPUTS, Array, Stream
+from streams import StreamMaker, on_all
+
+LIMITS = {"v_max": 0.1, "a_max": 16.0, "j_max": 5000.0}
+
+
+def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
+    """Step through rests, moves up to ten times as fast as the limit, jumps, gaps and changed parameters."""
+    rng = np.random.default_rng(seed)
+    position = velocity = wanted = x = 0.0
+    gap, outputs = 0, []
+    for k in range(n):
+        what = rng.integers(0, 150)
+        if what < 3:
+            wanted = rng.choice((0.0, 0.09, -0.09, 0.3, -1.0)) * rng.uniform(0.5, 1.0)
+            velocity = wanted if what == 0 else velocity
+        elif what == 3:
+            position += rng.uniform(-0.02, 0.02)
+        elif what == 4:
+            gap = rng.integers(1, 120)
+        elif what == 5:
+            stream.set("compensate", int(rng.integers(0, 3)))
+        elif what == 6:
+            stream.set("change_max", float(10.0 ** rng.uniform(-6.0, -2.0)))
+        velocity += np.clip(wanted - velocity, -8.0 * T_S, 8.0 * T_S)
+        position += float(velocity) * T_S
+        stream.set("x_d_ahead", position)
+        stream.set("x_meas", math.nan if gap > 0 else x + 1e-6 * float(rng.standard_normal()))
+        stream.step(k * T_S, T_S)
+        outputs.append(stream.outputs())
+        x += 0.15 * (outputs[-1][0] - x)
+        gap -= 1
+    return np.array(outputs)
+
+
+@on_all((COMPENSATOR,))
+@pytest.mark.parametrize("seed", range(share(30)))
+def test_whatever_comes_in(new_stream: StreamMaker, seed: int) -> None:
+    stream = new_stream()
+    initialise(stream, measurement_timeout=0.05, **LIMITS)
+    outputs = random_run(stream, seed)
+    x_dm, x_d = (outputs[:, OUTPUTS[COMPENSATOR].index(name)] for name in ("x_dm", "x_d"))
+    assert np.max(np.abs(x_dm - x_d)) > 0.0
+    for order, limit in enumerate(LIMITS.values(), start=1):
+        allowed = np.maximum(np.abs(np.diff(x_d, order)), limit * T_S**order)
+        assert np.all(np.abs(np.diff(x_dm, order)) <= allowed * (1 + 1e-6) + 1e-12), order
