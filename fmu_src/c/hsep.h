@@ -7,8 +7,8 @@
  * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
  * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.
  * Arguments are as said at each function: positions are finite and within +- 1000 m or +- 1e6 rad, pointers are not
- * NULL unless said so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it returns 0 where one is
- * out of its range, and no other function may be called with such parameters.
+ * NULL unless said so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it
+ * returns 0 where one is out of its range, and no other function may be called with such parameters.
  *
  *   function                 | bounded cost                                          | what may fail
  *   hsep_defaults            | constant                                              | nothing
