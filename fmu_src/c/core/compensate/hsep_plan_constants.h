@@ -20,7 +20,6 @@
 #define HSEP_QP_ROUNDING 1e-09
 #define HSEP_QP_INTERIOR 1e-10
 #define HSEP_QP_MOVES 1e-12
-#define HSEP_QP_BINDS 0.99
 
 /* hybridsep/compensate/newton.py */
 #define HSEP_NEWTON_APART 4
