@@ -1,4 +1,4 @@
-"""A modified command never steps: its differences are the command's, or within the drive's limits, whatever comes in."""
+"""A modified command never steps: its differences are the command's, or within the limits, whatever comes in."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
         elif what == 3:
             position += rng.uniform(-0.02, 0.02)
         elif what == 4:
-            gap = rng.integers(1, 120)
+            gap = int(rng.integers(1, 120))
         elif what == 5:
             stream.set("compensate", int(rng.integers(0, 3)))
         elif what == 6:
