@@ -9,13 +9,14 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from html import unescape
 from http.client import HTTPConnection
 from typing import Any
 
 import pytest
+from bokeh.protocol import Protocol
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
@@ -57,19 +58,25 @@ def handshake(page: Page, token: str, query: str, origin: str) -> int:
     return fetch(page, f"/ws{query}", **upgrade, **keys)[0]
 
 
-def gets(page: Page, token: str, *wanted: str) -> bool:
-    """Return whether a session with its token gets texts with all that is wanted; not if it is closed before."""
+def gets(page: Page, token: str, *wanted: str, more: Sequence[Row] = ()) -> bool:
+    """Return whether a session gets texts with all that is wanted, with more rows; not if it is closed before."""
 
     async def listen() -> bool:
         request = HTTPRequest(f"ws://127.0.0.1:{page.port}/ws{query(page)}", headers={"Origin": here(page)})
         connection = await websocket_connect(request, subprotocols=["bokeh", token])
         left = set(wanted)
         while left:
-            message = await asyncio.wait_for(connection.read_message(), 20.0)
-            if message is None:
+            text = await asyncio.wait_for(connection.read_message(), 20.0)
+            if text is None:
                 connection.close()
                 return False
-            left -= {one for one in left if isinstance(message, str) and one in message}
+            left -= {one for one in left if isinstance(text, str) and one in text}
+            if '"ACK"' in str(text):  # then all of the document, as a browser: frames may have gone before
+                message = Protocol().create("PULL-DOC-REQ")
+                for part in (message.header_json, message.metadata_json, message.content_json):
+                    await connection.write_message(part)
+                if more:
+                    page.take(more, {"n_samples": 3100})
         connection.close()
         while await asyncio.wait_for(connection.read_message(), 20.0) is not None:
             pass
@@ -111,7 +118,7 @@ def test_without_the_token_there_is_nothing(page: Page) -> None:
 
 
 def test_who_has_it_gets_the_run_and_its_frames(page: Page) -> None:
-    assert gets(page, session_token(text_of(page)), '"ACK"', '"PATCH-DOC"', "n_samples", "ndarray")
+    assert gets(page, session_token(text_of(page)), '"ACK"', '"PATCH-DOC"', "n_samples", "ndarray", more=rows(3000, 50))
 
 
 def test_the_page_asks_this_machine_alone(page: Page) -> None:
