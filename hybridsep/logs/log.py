@@ -33,8 +33,6 @@ _SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm"}
 _OWN_NAMES = ("x_d", "x", "x_meas")
 """Names of columns of positions that leave no doubt."""
 
-_BLOCK = 10_000
-
 
 @dataclass(frozen=True)
 class Log:
@@ -182,15 +180,13 @@ def read_log(
 
 def _read(source: Source, columns: Mapping[str, Column]) -> dict[str, Array]:
     """Return the columns by role as they are in the file, checked to be finite; LogError for fewer than 2 samples."""
-    parts: dict[str, list[Array]] = {role: [] for role in columns}
-    for block in source.blocks([column.name for column in columns.values()], _BLOCK):
-        for (role, column), values in zip(columns.items(), block.columns, strict=True):
-            _check_finite(source.path, block, column.name, values, role)
-            parts[role].append(values)
-    read = {role: np.concatenate(values or [np.empty(0)]) for role, values in parts.items()}
+    whole = source.read([column.name for column in columns.values()])
+    read = dict(zip(columns, whole.columns, strict=True))
     n = len(read["x_d"])
     if n < 2:
         raise LogError(f"{source.path}: a log needs at least 2 samples, got {n or 'none'}")
+    for role, column in columns.items():
+        _check_finite(source.path, whole, column.name, read[role], role)
     if np.isnan(read["x"]).all():
         raise LogError(
             f"{source.path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or "
@@ -245,17 +241,19 @@ def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
     """
     for role, column in columns.items():
         twins: Sequence[str] = source.twins.get(column.name, ())
-        for block in source.blocks([column.name, *twins], _BLOCK) if twins else ():
-            values = np.stack(block.columns)
-            differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
-            if differ.any():
-                i = int(np.argmax(differ))
-                other = next(value for value in values[1:, i] if value != values[0, i])
-                ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
-                raise LogError(
-                    f"{source.path}, {block.where(i)}: column {brief(column.name)} occurs {1 + len(twins)} times, "
-                    f"with different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
-                )
+        if not twins:
+            continue
+        whole = source.read([column.name, *twins])
+        values = np.stack(whole.columns)
+        differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
+        if differ.any():
+            i = int(np.argmax(differ))
+            other = next(value for value in values[1:, i] if value != values[0, i])
+            ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
+            raise LogError(
+                f"{source.path}, {whole.where(i)}: column {brief(column.name)} occurs {1 + len(twins)} times, "
+                f"with different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
+            )
 
 
 def check_reading(unit: str | None, T_s: float | None) -> float | None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -138,12 +137,6 @@ class Source(ABC):
     def read(self, names: Sequence[str]) -> Block:
         """Return the columns ``names``; LogError if they cannot be read, or differ in length."""
 
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        whole = self.read(names)
-        for i in range(0, len(whole.columns[0]), n):
-            yield Block([column[i : i + n] for column in whole.columns], partial(_later, whole.where, i))
-
     def channels(self) -> list[Channel]:
         """Return the columns with what the file says of them."""
         roles = {name: role for role, name in self.roles.items()}
@@ -170,10 +163,6 @@ class ArraysSource(Source):
             text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
             raise LogError(f"{self.path}: all columns must have the same number of samples, got: {text}")
         return Block(columns, lambda i: f"sample {i + 1} (the first is 1)")
-
-
-def _later(where: Callable[[int], str], start: int, i: int) -> str:
-    return where(start + i)
 
 
 def line_number(numbers: Sequence[int] | NDArray[np.int64]) -> Callable[[int], str]:
