@@ -75,6 +75,16 @@ def test_damaged_members_of_an_npz(tmp_path: Path) -> None:
         read_log(path)
 
 
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+@pytest.mark.parametrize("dtype", ["<f4", ">f8", "<i4"])
+@pytest.mark.parametrize("shape", [(-1, 1), (1, -1)])
+def test_types_and_orientations(tmp_path: Path, suffix: str, dtype: str, shape: tuple[int, int]) -> None:
+    data = {"t": np.arange(5.0), "x_d": np.arange(5).astype(dtype).reshape(shape), "x": np.ones((5, 1))}
+    log = read_log(write(tmp_path / f"log{suffix}", data))
+    np.testing.assert_array_equal(log.x_d, np.arange(5.0))
+    assert log.x_d.dtype == np.float64
+
+
 # MATLAB
 
 

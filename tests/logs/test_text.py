@@ -59,33 +59,6 @@ def test_latin_1_far_down(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "factor", "si"),
-    [("mm", 1e-3, "m"), ("nm", 1e-9, "m"), ("in", 0.0254, "m"), ("°", np.pi / 180, "rad"), ("rev", 2 * np.pi, "rad")],
-)
-def test_units(tmp_path: Path, unit: str, factor: float, si: str) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", f"t,x_d [{unit}],x [{unit}]\n0,1,2\n1,3,4\n"))
-    np.testing.assert_allclose(log.x_meas, [2 * factor, 4 * factor], rtol=1e-15)
-    assert (log.unit, log.unit_stated) == (si, True)
-
-
-def test_an_index_is_told_from_time(tmp_path: Path) -> None:
-    rows = "".join(f"{i},{i},{i}\n" for i in range(20))
-    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
-    message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s 0.001\), or .*'t \[ms\]'"
-    with pytest.raises(LogError, match=message):
-        read_log(path)
-    log = read_log(path, T_s=2e-3)
-    np.testing.assert_allclose(log.t, 2e-3 * np.arange(20))
-    assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3
-    assert read_log(write_csv(path, "t [s],x_d,x\n" + rows)).T_s == 1.0
-    assert read_log(write_csv(path, "index,x_d,x\n" + rows), T_s=2e-3).T_s == 2e-3
-    with pytest.raises(
-        LogError, match=r"column 't' is missing, the file has 'index', 'x_d', 'x'; name it: --t NAME \(or --T_s"
-    ):
-        read_log(path)
-
-
-@pytest.mark.parametrize(
     ("text", "message"),
     [
         (
@@ -115,18 +88,6 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
 def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(LogError, match=message):
         read_log(write_csv(tmp_path / "log.csv", text))
-
-
-def test_a_given_unit_must_not_contradict_the_names(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "t,x_d [mm],x [mm]\n0,1,2\n1,3,4\n")
-    with pytest.raises(
-        LogError, match=r"unit='um' \(--unit um\) was given, but column 'x_d \[mm\]' states 'mm'; leave"
-    ):
-        read_log(path, unit="um")
-    assert read_log(path, unit="mm").x_d[1] == read_log(path, unit="millimetre").x_d[1] == 3e-3
-    assert read_log(path, columns={"x": "x"}).x_meas[1] == 4e-3
-    with pytest.raises(LogError, match=r"axis 'X1' is missing; no names tell axes: name the columns, --x_d and --x"):
-        read_log(path, axis="X1")
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.99])
@@ -168,23 +129,45 @@ def test_nothing_else_may_be_missing(tmp_path: Path, row: str, problem: str) -> 
         read_log(path)
 
 
-def test_counts_are_read_with_their_length(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "t,x_d [counts],x [inc]\n0,10,20\n0.001,30,40\n")
-    np.testing.assert_allclose(read_log(path, unit="0.1um").x_meas, [2e-6, 4e-6])
-    path = write_csv(tmp_path / "log.csv", "t;x_d;x\ns;0.1um;0.1um\n0;10;20\n0.001;30;40\n")
-    np.testing.assert_allclose(read_log(path).x_meas, [2e-6, 4e-6])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,x_d,x\n0,1,2\n1,3,4\n",
+        "t, x_d, x\r\n0, 1, 2\r\n1, 3, 4\r\n",
+        "t;x_d;x\n0;1;2\n1;3;4",
+        "t\tx_d\tx\n0\t1\t2\n1\t3\t4\n",
+        "t x_d   x\n0 1 2\n 1  3 4\n",
+        "# t x_d x\n0 1 2\n1 3 4\n",
+        '"t","x_d","x"\n"0","1","2"\n1,3,4\n',
+        "'t','x_d','x'\n'0','1','2'\n'1','3','4'\n",
+        "\n\nt,x_d,x\n\n0,1,2\n\n1,3,4\n\n",
+        "\ufefft,x_d,x\n0,1,2\n1,3,4\n",
+        "note,x,t,x_d\n9,2,0,1\nno number,4,1,3\n",
+        "t,x_d,x,\n0,1,2,\n1,3,4,\n",
+    ],
+)
+def test_spellings_of_csv(tmp_path: Path, text: str) -> None:
+    log = read_log(write_csv(tmp_path / "log.csv", text))
+    assert (log.t.tolist(), log.x_d.tolist(), log.x_meas.tolist(), log.T_s) == ([0, 1], [1, 3], [2, 4], 1.0)
 
 
-def test_columns_that_were_recognised_are_said(tmp_path: Path) -> None:
-    text = "t [s],X_cmd [mm],X_act [mm],Y_cmd [mm],Y_act [mm]\n0,1,2,3,4\n0.001,1,2,3,4\n"
-    path = write_csv(tmp_path / "log.csv", text)
-    axis, remark = read_log(path).remarks
-    assert axis == "axis X of X, Y is read; axis='…' (--axis) chooses another"
-    assert remark.startswith(
-        "columns 'X_cmd [mm]' and 'X_act [mm]' are read as the commanded and the measured position"
-    )
-    assert read_log(path, columns={"x_d": "Y_cmd", "x": "Y_act"}).remarks == ()
-    assert read_log(write_csv(path, "t,x_d [mm],x_meas\n0,1,2\n1,1,2\n")).remarks == ()
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0,0\n1,nan,0\n", r"log\.csv, line 3: column 'x_d' must be finite, got nan"),
+        ("0,0,0\n1,-inf,0\n", r"line 3: column 'x_d' must be finite, got -inf"),
+        ("0,0,0\n1,abc,0\n", r"line 3: column 'x_d' must be a number, got 'abc'"),
+        ("0,,0\n1,0,0\n", r"line 2: column 'x_d' must be a number, got nothing"),
+        ("0,0,0\n1,1_0,0\n", r"line 3: column 'x_d' must be a number, got '1_0'"),
+        ("0,0,0\n\n1,0\n", r"line 4: 3 columns were expected as in line 1, got 2"),
+        ("0,0,0\n1,0,0,0\n", r"line 3: 3 columns were expected as in line 1, got 4"),
+        ("0;0;0\n", r"line 2: column 't' must be a number, got '0;0;0'"),
+    ],
+)
+def test_bad_csv_rows(tmp_path: Path, rows: str, message: str) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
+    with pytest.raises(LogError, match=message):
+        read_log(path)
 
 
 # What recorders write beside their numbers
