@@ -51,7 +51,6 @@ __all__ = [
     "expanded",
     "has_native",
     "host_target",
-    "is_kept_here",
     "kept",
     "libraries",
     "library_paths",
@@ -382,14 +381,6 @@ def kept(library: Library) -> Path | None:
     shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
     places = (shipped, _place(ZIG, library))
     return next((place for place in places if place.is_file()), None)
-
-
-def is_kept_here(kind: str) -> bool:
-    """Return whether a kind's library for this machine is there, and need not be compiled."""
-    try:
-        return kept((kind, host_target())) is not None
-    except FmuError:  # a platform that no library is for
-        return False
 
 
 def check_available(targets: Sequence[str]) -> None:

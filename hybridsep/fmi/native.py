@@ -33,8 +33,8 @@ from .description import (
 )
 from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .flavours import FMI_VERSIONS
-from .pages import compile_note, dependencies_note, icon, index_page, reference_note
-from .reference import has_reference, reference_run
+from .pages import compile_note, documentation, icon
+from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .variables import FmuTable
 
@@ -84,11 +84,6 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
-    content |= dependencies_note(_DEPENDENCIES)
-    reference = "this FMU" if has_reference(table) else None
-    if reference:
-        content |= reference_note(table)
-    content["documentation/index.html"] = index_page(spec, needs, reference=reference, sources=compile_note(name, fmi))
     if fmi == "3":
         content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
     else:
@@ -100,6 +95,8 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
         from .weights import WEIGHTS_FILE, weights_file
 
         weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
+    reference = reference_run(spec, content)
+    content |= documentation(spec, needs, _DEPENDENCIES, reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()
@@ -109,8 +106,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
         content["modelDescription.xml"] = fmi3_description(spec, guid, tool)
     else:
         content["modelDescription.xml"] = model_description(spec, guid, tool)
-    if reference:
-        content |= reference_run(spec, guid, content)
+    content |= reference
     if spec.origin is not None:
         content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
     compiled = libraries(table.kind, targets or default_targets())

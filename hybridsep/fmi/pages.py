@@ -4,24 +4,16 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from string import Template
 
 from .description import fmi3_variables
 from .extras import AGREEMENT, RELATED_FOLDER
 from .spec import FmuSpec
-from .variables import FmuTable, Variable
+from .variables import Variable
 
-__all__ = [
-    "compile_note",
-    "dependencies_note",
-    "filled",
-    "grouped_table",
-    "icon",
-    "index_page",
-    "reference_note",
-]
+__all__ = ["compile_note", "documentation", "filled", "grouped_table", "icon"]
 
 _HERE = Path(__file__).parent
 
@@ -65,24 +57,25 @@ def filled(template: str, **values: object) -> str:
     return Template(text.rstrip("\n")).substitute(values)
 
 
-def index_page(
+def documentation(
     spec: FmuSpec,
     needs: str,
+    dependencies: str,
+    reference: Collection[str],
     *,
-    reference: str | None = None,
     limits: str = "",
     sources: str = "",
-) -> bytes:
-    """Return the documentation page of an FMU.
+) -> dict[str, bytes]:
+    """Return the pages of an FMU, ``documentation/index.html`` among them: archive name → content.
 
     Parameters
     ----------
     spec : FmuSpec
         The machine's sources are listed, and types named as its version of FMI has them.
-    needs : str
-        Requirements of the FMU, one sentence.
-    reference : str, optional
-        What the archive's reference result comes from; None if it has none.
+    needs, dependencies : str
+        Requirements of the FMU: one sentence, and in detail, the text of ``externalDependencies.txt``.
+    reference : collection of str
+        Files of its reference experiment; empty if it has none.
     limits, sources : str
         Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
     """
@@ -94,7 +87,8 @@ def index_page(
     )
     has_inputs = model != "ReferenceTrajectory"
     table_of_inputs = f'<a href="../{RELATED_FOLDER}/{name}_in.csv">{name}_in.csv</a>'
-    run = {"folder": RELATED_FOLDER, "origin": reference, "inputs": f", fed with {table_of_inputs}" * has_inputs}
+    origin = "this FMU" if spec.flavour == "native" else "its native twin"
+    run = {"folder": RELATED_FOLDER, "origin": origin, "inputs": f", fed with {table_of_inputs}" * has_inputs}
     digits = AGREEMENT.get(model, 11)
     named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
@@ -112,25 +106,20 @@ def index_page(
         compiling=sources,
         sources="\n".join(f"<li>{html.escape(source)}</li>" for source in named),
     )
-    return f"{page}\n".encode()
+    content = {
+        "documentation/index.html": f"{page}\n".encode(),
+        "documentation/externalDependencies.txt": dependencies.encode(),
+    }
+    if reference:
+        given = f"{name}_in.csv   inputs at every communication point\n" if has_inputs else ""
+        text = _REFERENCE_NOTE.format(name=name, inputs=given, digits=digits)
+        content["documentation/fmi-ls-ref.txt"] = text.encode()
+    return content
 
 
 def compile_note(name: str, fmi: str) -> str:
     """Return the section on compiling the sources of an FMU with a model identifier, HTML."""
     return filled("compile", name=name, version=f"{fmi}.0", plain=_PLAIN_NAMES[fmi])
-
-
-def dependencies_note(text: str) -> dict[str, bytes]:
-    """Return the file that says what an FMU needs, FMI's name for it → its content."""
-    return {"documentation/externalDependencies.txt": text.encode()}
-
-
-def reference_note(table: FmuTable) -> dict[str, bytes]:
-    """Return the file that says how to use the reference experiment, LS-REF's name for it → its content."""
-    model, name = table.model, table.name
-    inputs = f"{name}_in.csv   inputs at every communication point\n" if model != "ReferenceTrajectory" else ""
-    text = _REFERENCE_NOTE.format(name=name, inputs=inputs, digits=AGREEMENT.get(model, 11))
-    return {"documentation/fmi-ls-ref.txt": text.encode()}
 
 
 def _rows(group: list[tuple[str, str, str, str, str, str]]) -> str:

@@ -22,8 +22,8 @@ from ..base.errors import FmuError
 from ..base.version import __version__
 from .description import model_description
 from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
-from .pages import dependencies_note, filled, icon, index_page, reference_note
-from .reference import has_reference, reference_run
+from .pages import documentation, filled, icon
+from .reference import reference_run
 from .spec import FmuSpec, content_guid
 
 __all__ = [
@@ -79,12 +79,8 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)
     content["model.png"] = icon(model)
-    content |= dependencies_note(_DEPENDENCIES.format(version))
-    reference = "its native twin" if has_reference(spec.table) else None
-    if reference:
-        content |= reference_note(spec.table)
-    page = index_page(spec, needs, limits=limits, reference=reference)
-    content["documentation/index.html"] = page
+    reference = reference_run(spec, content)
+    content |= documentation(spec, needs, _DEPENDENCIES.format(version), reference, limits=limits)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
@@ -96,8 +92,7 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
     ).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
     content["modelDescription.xml"] = model_description(spec, guid, tool)
-    if reference:
-        content |= reference_run(spec, guid, content)
+    content |= reference
     if spec.origin is not None:
         content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
     content[MANIFEST_FILE] = manifest(content)

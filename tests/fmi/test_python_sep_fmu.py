@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from library_models import trained_predictor
+from reference_models import library_models
 
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.signals import Array
@@ -21,7 +22,7 @@ from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.extras import RELATED_FOLDER
-from hybridsep.fmi.reference import library_models, reference_files
+from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.spec import FmuSpec
 from hybridsep.fmi.variables import FmuTable
 from hybridsep.machines.machine import load_machine

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
+from reference_models import library_model, library_models
 
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.extras import RELATED_FOLDER
-from hybridsep.fmi.reference import library_model, library_models, reference_files
+from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.spec import FmuSpec, fmu_names
 from hybridsep.machines.machine import load_machine, machine_names
 
