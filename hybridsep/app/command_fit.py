@@ -49,28 +49,32 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
+    from ..logs.log import read_log
+    from ..machines.naming import checked_name, machine_name
+    from .outputs import check_outputs, keep_written, written_before
+
+    machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
+    inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
+    check_outputs((), inputs)
+    found = [read_log(path, **reading.arguments) for path in logs]
+    # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.advice import recommendation
     from ..fitting.compensation import drive_limits
     from ..fitting.fit import FitOptions, fit_files
     from ..fitting.fit import fit as fit_logs
     from ..fitting.report import fit_report, judged_by, next_steps
     from ..logs.checks import checked, findings_table
-    from ..logs.log import read_log
-    from ..machines.naming import checked_name, machine_name
     from .logs import different_logs, show
-    from .outputs import check_outputs, keep_written, written_before
     from .progress import progress_bar
     from .tables import console, print_json
 
-    machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(machine)
     limits = drive_limits(parameters)
     files = fit_files(folder, machine, compensator=bool(limits), fmi=fmi)
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
-    inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     outputs = [("--out", path, ()) for path in files.values()]
     check_outputs(outputs, inputs, force=force, ours=written_before(files["results"], logs))
-    used = different_logs([read_log(path, **reading.arguments) for path in logs])
+    used = different_logs(found)
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     findings = {log.path.name: checked(log) for log in used}

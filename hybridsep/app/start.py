@@ -63,9 +63,8 @@ def demo(
 
     Its FMUs are built first; index.html in the folder shows what came out.
     """
-    from ..demo.cases import read_recorded
-    from ..demo.demo import demo as run_demo
-    from ..demo.demo import demo_files, processor_time
+    from ..demo.cases import demo as run_demo
+    from ..demo.cases import demo_files, processor_time, read_recorded
     from ..fmi.archive import default_flavour
     from .logs import show
     from .outputs import check_outputs

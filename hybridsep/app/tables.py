@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ..base.metrics import shown_figure
-from ..demo.tables import Table as CaseTable
-from ..demo.tables import compensation_table, prediction_table
+from ..demo.page import Table as CaseTable
+from ..demo.page import compensation_table, prediction_table
 from ..logs.units import Shown, shown_in
 
 if TYPE_CHECKING:

@@ -1,28 +1,127 @@
-"""Cases of the demonstration: the paper's staircase and spiral, and a recorded axis, predicted with its settings."""
+"""The paper's cases, predicted and compensated, FMU against FMU: what ``hybridsep demo`` runs, scores and draws."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..base.metrics import largest, rms
+from ..base.metrics import contour_error, largest, rms
+from ..base.output import written_text
+from ..base.settings import PARAMETERS
+from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
 from ..evaluate.backtest import backtest, replayed_run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
-from ..fmi.archive import build_pair
-from ..fmi.flavours import FMI_VERSIONS
+from ..fmi.archive import build_here, build_pair, default_flavour
+from ..fmi.flavours import FMI_VERSIONS, versions_of
+from ..fmi.spec import fmu_names
 from ..logs.log import Log, read_log
-from ..machines.machine import load_machine
+from ..machines.machine import Machine, load_machine
 from ..machines.paper import PAPER_SETTINGS, paper_machine
-from ..plants.trajectory import spiral, staircase
-from .compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
+from ..plants.encoder import Encoder
+from ..plants.trajectory import archimedean_spiral, spiral, staircase
+from .page import PRINTED, write_page
 
-__all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
+__all__ = ["COMPENSATED", "demo", "demo_files", "processor_time", "read_recorded"]
+
+TRAINING_SEED = 1000
+"""Noise seed of the training run of a warm compensator; no case uses it."""
+
+COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
+"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
+
+Runs = dict[str, Run]
+
+
+def compensate(
+    machine: Machine,
+    plant: Path,
+    command: Array,
+    out: Path,
+    flavour: str,
+    fmi: str = FMI_VERSIONS[0],
+    *,
+    seeds: Sequence[int] = (0,),
+    label: str = "",
+    advance: Callable[[str], object] = lambda message: None,
+) -> tuple[Runs, dict[str, Any]]:
+    """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
+
+    Parameters
+    ----------
+    machine : Machine
+    plant : Path
+        Its plant FMU.
+    command : (n,) array, m
+        Commanded positions.
+    out : Path
+        Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
+    flavour : {"native", "python"}
+        Flavour of the FMU.
+    fmi : str
+        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`.
+    seeds : sequence of int
+        Noise seeds.
+    label : str
+        Name of the case.
+    advance : callable
+        Called with it and the name of each run before that.
+
+    Returns
+    -------
+    runs : dict
+        The first seed's, by the keys of :data:`COMPENSATED`.
+    summary : dict
+        The same keys → means over the seeds of :meth:`Run.summary`, with the spread
+        ``tracking_rms_um_std``.
+    """
+    cold = build_here(machine, "SepCompensator", out / "fmus", flavour, fmi=fmi)
+    weights = out / f"{machine.name}.state"
+    advance(f"{label}, a run to learn from")
+    train(machine, command, weights)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights, fmi=fmi)
+    runs: Runs = {}
+    summary: dict[str, Any] = {}
+    for key, choice in COMPENSATED.items():
+        advance(f"{label}, {key.replace('_', ' ')}")
+        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
+        fmu = warm if key == "hybrid_warm" else cold
+        of_seeds = [
+            cosimulate(fmu, plant, command, controller_values=values, plant_values={"seed": seed}) for seed in seeds
+        ]
+        runs[key] = of_seeds[0]
+        summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
+    return runs, summary
+
+
+def train(machine: Machine, command: Array, path: Path) -> None:
+    """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
+    assert machine.plant is not None
+    compensator = machine.new_compensator()
+    encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
+    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
+    compensator.predictor.save(path)
+
+
+def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
+    """Return the contour errors on the paper's spiral, ``(n,)``, m, of the runs of X and Y with the same key."""
+    path = archimedean_spiral(0.030, 5.0)
+    return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
+
+
+def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:
+    """Return the mean of each figure over several runs, and the standard deviation of one of them."""
+    mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
+    mean["n_samples"] = summaries[0]["n_samples"]
+    mean[f"{spread}_std"] = float(np.std([s[spread] for s in summaries]))
+    return mean
+
 
 Summary = dict[str, dict[str, Any]]
 
@@ -137,3 +236,115 @@ def _worse(run: Run) -> dict[str, Any]:
             for j in worse
         ],
     }
+
+
+SEEDS = 10
+"""Noise seeds that a full demonstration's staircase is averaged over."""
+
+_PROCESSOR_TIME = {
+    ("native", False): "10 seconds",
+    ("native", True): "a minute",
+    ("python", False): "2 minutes",
+    ("python", True): "20 minutes",
+}
+"""Rough processor time of a demonstration, by flavour and whether it is a full one."""
+
+Progress = Callable[[str, float], object]
+
+
+def demo_files(
+    out: str | Path, flavour: str, *, full: bool = False, emps: bool = False, fmi: str = FMI_VERSIONS[0]
+) -> list[Path]:
+    """Return all files that :func:`demo` writes, with or without the recorded axis; ParameterError as there."""
+    out = Path(out)
+    own = ["index.html", "summary.json", *(["spiral.png", "spiral_contour.png"] if full else [])]
+    files = [out / name for name in (*own, *(["emps.png"] if emps else []))]
+    for case, name in MACHINES.items() if full else [*MACHINES.items()][:1]:
+        files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
+        files.append(out / f"{name}.state")
+        names = [fmu_names(load_machine(name), flavour, version) for version in versions_of(fmi, flavour)]
+        for fmu, model in (item for of_version in names for item in of_version.items()):
+            if model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
+                files.append(out / "fmus" / f"{fmu}.fmu")
+            if model == "SepCompensator":
+                files.append(out / "fmus" / "warm" / f"{fmu}.fmu")
+    return files
+
+
+def processor_time(flavour: str, full: bool = False) -> str:
+    """Return roughly how much processor time a demonstration takes, in words."""
+    return f"about {_PROCESSOR_TIME[flavour, full]}"
+
+
+def demo(
+    out: str | Path,
+    *,
+    full: bool = False,
+    emps: str | Path | None = None,
+    flavour: str | None = None,
+    fmi: str = FMI_VERSIONS[0],
+    progress: Progress = lambda message, fraction: None,
+) -> Summary:
+    """Build the FMUs, co-simulate the staircase, write figures, ``summary.json`` and ``index.html``.
+
+    First the predictor beside the uncompensated drive, then the compensator in its place.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder for FMUs, figures, results and ``summary.json``; made if needed.
+    full : bool
+        Average the staircase over :data:`SEEDS` noise seeds instead of running the first one, and co-simulate the
+        spiral's axes too.
+    emps : str or Path, optional
+        A ``DATA_EMPS.mat`` to replay too.
+    flavour : {"native", "python"}, optional
+        Flavour of the FMUs; native where their libraries are there, if left out.
+    fmi : str
+        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both FMUs are written, and 2.0's are run.
+    progress : callable
+        Called with a message and the fraction done.
+
+    Returns
+    -------
+    dict
+        As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
+        ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
+        ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
+        :func:`hybridsep.demo.cases.compensate` found, for the spiral's axes with the contour error of both
+        together, ``contour_rms_um`` and ``contour_max_um``.
+
+    Raises
+    ------
+    LogError
+        If ``emps`` cannot be read; nothing has been done then.
+    ParameterError
+        If ``fmi`` is another word, or a version that the flavour has not.
+    """
+    flavour = flavour or default_flavour()
+    versions_of(fmi, flavour)
+    recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
+    out = Path(out)
+    seeds = SEEDS if full else 1
+    cases = len(MACHINES) if full else 1
+    total = seeds + 6 * full + cases * (1 + len(COMPENSATED)) + (recorded is not None)
+    done = 0
+
+    def advance(message: str) -> None:
+        nonlocal done
+        progress(message, done / total)
+        done += 1
+
+    summary: Summary = {"staircase": staircase_case(out, seeds, flavour, advance, fmi)}
+    if full:
+        summary |= spiral_case(out, flavour, advance, fmi)
+    if recorded is not None:
+        advance("EMPS, a recorded axis")
+        summary["emps"] = recorded_case(recorded, out)
+    for name, case in summary.items():
+        case["printed"] = PRINTED[name]
+    with written_text(out / "summary.json") as file:
+        file.write(json.dumps(summary, indent=2) + "\n")
+    write_page(out, summary, demo_files(out, flavour, full=full, emps=recorded is not None, fmi=fmi))
+    progress("done", 1.0)
+    return summary

@@ -13,7 +13,7 @@ from command_line import Run, write_log
 from log_files import write
 
 from hybridsep.app.outputs import written_before
-from hybridsep.demo import demo
+from hybridsep.demo.cases import demo_files
 from hybridsep.machines.machine import machine_path
 from hybridsep.machines.naming import machine_name
 
@@ -250,7 +250,7 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
 
 
 def test_the_demos_list_of_files_needs_no_demo(tmp_path: Path) -> None:
-    files = demo.demo_files(tmp_path, "python", full=True, emps=True)
+    files = demo_files(tmp_path, "python", full=True, emps=True)
     assert len(files) == len(set(files)) == 5 + 3 * (4 + 1 + 3 + 1)
 
 

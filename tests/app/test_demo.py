@@ -20,8 +20,7 @@ from benchmarks.pictures import RECORD, demonstrated
 from hybridsep.app import tables
 from hybridsep.base.metrics import shown_figure
 from hybridsep.demo import cases
-from hybridsep.demo.compensation import COMPENSATED
-from hybridsep.demo.demo import demo, demo_files
+from hybridsep.demo.cases import COMPENSATED, demo, demo_files
 from hybridsep.fmi.archive import default_flavour
 from hybridsep.plants.trajectory import spiral
 

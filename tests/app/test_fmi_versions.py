@@ -14,7 +14,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.adapters import FmuController
 from hybridsep.cosim.fmu import read_description
 from hybridsep.demo import cases
-from hybridsep.demo.demo import demo, demo_files
+from hybridsep.demo.cases import demo, demo_files
 from hybridsep.fitting.fit import fit_files
 
 NP = 20

@@ -12,7 +12,7 @@ import pytest
 
 from hybridsep.app import progress
 from hybridsep.app.progress import progress_bar
-from hybridsep.demo.demo import processor_time
+from hybridsep.demo.cases import processor_time
 
 
 class Clock:

@@ -57,11 +57,11 @@ def test_packages_import_nothing() -> None:
         assert isinstance(docstring, ast.Expr), path
 
 
-def loaded(code: str) -> set[str]:
+def loaded(code: str, status: int = 0) -> set[str]:
     """Return the modules that are loaded at the end of a process."""
     at_exit = "import atexit, json, sys; atexit.register(lambda: print('\\n' + json.dumps(sorted(sys.modules))))\n"
     done = subprocess.run([sys.executable, "-c", at_exit + code], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == status, done.stderr
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
@@ -94,3 +94,11 @@ def test_a_replay_loads_no_plots_and_no_fmus(tmp_path: Path) -> None:
     modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()")
     assert "hybridsep.evaluate.backtest" in modules
     assert not {"matplotlib", "control", "fmpy", "pythonfmu", "ruckig"} & modules
+
+
+def test_a_log_that_is_not_there_is_said_before_what_computes_is_imported(tmp_path: Path) -> None:
+    """It took four seconds."""
+    arguments = ["fit", str(tmp_path / "none.csv")]
+    modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()", 2)
+    assert "hybridsep.logs.log" in modules
+    assert not {"scipy", "matplotlib", "fmpy"} & modules
