@@ -238,16 +238,13 @@ class Following(NamedTuple):
         Share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1.
     gain, lag : float
         Sum of the mixture's weights, and their mean lag, samples.
-    left_by_one : float
-        Share that the best single lag leaves.
     gain_at_one, lag_of_one : float
-        Its weight, and that lag.
+        Weight of the best single lag, and that lag.
     """
 
     left: float
     gain: float
     lag: float
-    left_by_one: float
     gain_at_one: float
     lag_of_one: int
 
@@ -263,7 +260,7 @@ def following(u: Array, x: Array) -> Following:
     A, y = A - A.mean(axis=0), x[known] - x[known].mean()
     scale, total = float(np.abs(A).max()), float(np.abs(y).max())
     if not (scale > 0.0 and total > 0.0):
-        return Following(1.0, 0.0, 0.0, 1.0, 0.0, 0)
+        return Following(1.0, 0.0, 0.0, 0.0, 0)
     A, y = A / scale, y / total
     squares, products = (A * A).sum(axis=0), A.T @ y
     alone = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
@@ -276,7 +273,6 @@ def following(u: Array, x: Array) -> Following:
         left,
         gain * total / scale,
         float(h @ lags) / gain if gain > 0.0 else 0.0,
-        1.0 - float(alone[one]),
         float(products[one] / squares[one]) * total / scale if squares[one] > 0.0 else 0.0,
         int(lags[one]),
     )
@@ -330,8 +326,10 @@ def _meaning(log: Log, part: slice, given: Following) -> Iterator[Finding]:
             "it another axis (--x NAME)?"
         )
         yield Finding("hardly follows", words, evidence, picture, refused=True)
-    elif given.left_by_one < _POOR and not _GAINS[0] <= given.gain_at_one <= _GAINS[1]:
-        gain = given.gain_at_one
+    elif given.left < _POOR and (
+        max(given.gain, given.gain_at_one) < _GAINS[0] or min(given.gain, given.gain_at_one) > _GAINS[1]
+    ):
+        gain = given.gain  # above a drive's bandwidth the other is smaller
         words = (
             f"the measured position moves {gain:.4g} times as far as the commanded one{_as_units(gain)}: state the "
             "unit of each column in its name, such as 'x [mm]', or name another column (--x NAME)"
@@ -367,8 +365,7 @@ def _other_meaning(x_d: Array, x: Array, filled: Array, given: Following) -> str
         "following error": min(errors),
         "velocity": min(following(x_d, np.cumsum(filled)).left, following(np.cumsum(x_d - x_d[0]), x).left),
     }
-    best = min(found, key=lambda name: found[name])
-    return best if _BETTER * found[best] < given.left else ""
+    return next((name for name, left in found.items() if _BETTER * left < given.left), "")
 
 
 def _as_units(gain: float) -> str:
@@ -510,7 +507,7 @@ def _note_held(log: Log) -> Iterator[Finding]:
         )
         yield Finding("repeated samples", words, {"share": share}, _over_time(log, "Repeated samples", where))
     edges = np.flatnonzero(~np.concatenate(([False], same, [False])))  # a run is from edge to edge
-    moved = np.abs(x_d[edges[1:] - 1] - x_d[edges[:-1]]) / _travel(x_d)
+    moved = (np.maximum.reduceat(x_d, edges[:-1]) - np.minimum.reduceat(x_d, edges[:-1])) / _travel(x_d)
     longest = int(np.argmax(moved))
     if moved[longest] > _HELD:
         first, last = int(edges[longest]), int(edges[longest + 1])
