@@ -12,8 +12,7 @@ from typing import Any
 import typer
 
 from hybridsep import load_machine
-from hybridsep.app.cli import app
-from hybridsep.app.panels import EXAMPLES
+from hybridsep.app.cli import EXAMPLES, app
 from hybridsep.base import errors
 from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation

@@ -1,37 +1,158 @@
-"""Command line ``hybridsep``: one function a command."""
+"""Command line ``hybridsep``: its commands and their help, and how failures end it.
+
+An error is one line on standard error and exit status 2, Ctrl-C another and 130; the status is 1 where the reader of
+standard output has gone.
+"""
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from ..base.errors import ParameterError
+from ..base.errors import HybridSepError, LogError, ParameterError, brief
+from ..base.settings import DRIVE_LIMIT_ENTRIES
 from ..base.version import version_text
 from .command_backtest import backtest
-from .command_build import build
-from .command_cosim import cosim
 from .command_fit import fit
-from .command_hal import hal
-from .command_header import header
 from .command_identify import identify
 from .command_report import report
-from .command_system import system
 from .command_tune import tune
-from .failures import DEBUG_VARIABLE, Commands, run
-from .panels import EXAMPLES, PanelledCommand
+from .cosim import cosim, system
+from .fmus import build, hal, header
+from .options import COMPENSATOR_ENTRIES, KNOWN_ENTRIES, PREDICTOR_ENTRIES
 from .start import demo, example_log, init
 
-__all__ = ["app", "main"]
+__all__ = ["EXAMPLES", "app", "main"]
 
 PLUG_INS = ("fleet", "live", "modal")
 """Commands that this repository has as plug-ins, in ``plugins``."""
 
+DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
+"""Environment variable: if it is set, an unexpected error shows its traceback."""
 
-class _WithPlugIns(Commands):
-    """Commands, and those of plug-ins: functions that are installed as entry points ``hybridsep.commands``."""
+_WANTED = {"int": "must be a whole number", "float": "must be a number"}
+"""What an option takes, by the beginning of a type of typer's errors."""
+
+_READING = ("unit", "T_s", "axis", "t", "x_d", "x", "delay", "resample", "list_channels")
+_OUTPUT = ("out", "figure", "save", "fmus", "reports", "full", "force", "as_json")
+
+_PANELS = {
+    **dict.fromkeys(PREDICTOR_ENTRIES, "Parameters of the predictor"),
+    **dict.fromkeys(COMPENSATOR_ENTRIES, "Parameters of the compensator"),
+    **dict.fromkeys(KNOWN_ENTRIES, "What is known of the axis"),
+    **dict.fromkeys(DRIVE_LIMIT_ENTRIES, "Limits of the drive, for a compensator"),
+    **dict.fromkeys(_READING, "Reading the file"),
+    **dict.fromkeys(_OUTPUT, "Output"),
+}
+"""Panel of an option by its name; the others are the command's own, the first."""
+
+_KNOWN_OF_A_REPLAY = ("backtest", "report", "cosim", "tune")
+"""Commands that take all parameters of the predictor, also the entries that are known of an axis."""
+
+EXAMPLES = {
+    "fit": (
+        "hybridsep fit my_axis.csv --Np 100",
+        "hybridsep fit my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4",
+    ),
+    "identify": (
+        "hybridsep identify my_axis.csv --out machine.toml",
+        "hybridsep identify my_axis.csv --unit-gain --figure identified.png",
+    ),
+    "tune": (
+        "hybridsep tune my_axis.csv -m my_axis/machine.toml",
+        "hybridsep tune my_axis.csv -m my_axis/machine.toml --p 10,50",
+    ),
+    "init": ("hybridsep init machine.toml", "hybridsep init machine.toml --f_n 42 --zeta 0.35"),
+    "demo": ("hybridsep demo --out demo", "hybridsep demo --out demo --force"),
+    "build": (
+        "hybridsep build -m my_axis/machine.toml --out dist",
+        "hybridsep build HybridPredictor_my_axis -m my_axis/machine.toml --weights my_axis/trained.state",
+    ),
+    "cosim": (
+        "hybridsep cosim -m my_axis/machine.toml --compensate hybrid",
+        "hybridsep cosim --trajectory moves.csv --compensate off --figure run.png",
+    ),
+    "system": (
+        "hybridsep system -m my_axis/machine.toml --compensate hybrid",
+        "hybridsep system --ssp 2 --target host",
+    ),
+    "backtest": (
+        "hybridsep backtest my_axis.csv -m my_axis/machine.toml",
+        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --figure errors.png --save trained.state",
+    ),
+    "report": (
+        "hybridsep report my_axis.csv -m my_axis/machine.toml",
+        "hybridsep report my_axis.csv -m my_axis/machine.toml --weights my_axis/trained.state --out today.html",
+    ),
+    "hal": ("hybridsep hal my_axis/machine.toml --out hal", "hybridsep hal x/machine.toml y/machine.toml --out hal"),
+    "header": (
+        "hybridsep header my_axis/machine.toml --predictor",
+        "hybridsep header my_axis/machine.toml --predictor --weights my_axis/trained.state",
+    ),
+    "example-log": ("hybridsep example-log --out my_axis.csv", "hybridsep example-log --out my_axis.csv.gz"),
+}
+"""Two lines for each command."""
+
+
+class _PanelledCommand(TyperCommand):
+    """Command whose help shows its options by panels."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        replays = self.name in _KNOWN_OF_A_REPLAY
+        for one in self.params:
+            panel = _PANELS.get(one.name or "")
+            if panel and one.param_type_name == "option":
+                if replays and one.name in KNOWN_ENTRIES:
+                    panel = _PANELS["p"]
+                if replays or one.name != "Np":  # the look-ahead of a fit is the controller's
+                    one.rich_help_panel = panel  # type: ignore[attr-defined]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments, then options panel by panel."""
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for one in self.get_params(ctx):
+            if record := one.get_help_record(ctx):
+                panel = getattr(one, "rich_help_panel", None) or "Options"
+                panels.setdefault("Arguments" if one.param_type_name == "argument" else panel, []).append(record)
+        for name in sorted(panels, key=lambda name: (name != "Arguments", name != "Options", name == "Output")):
+            with formatter.section(name):
+                formatter.write_dl(panels[name])
+
+
+class _Commands(TyperGroup):
+    """Commands, and those of plug-ins: functions that are installed as entry points ``hybridsep.commands``.
+
+    A refusal of an option's value names the value.
+    """
+
+    def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        """Run the command that the arguments name."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            if type(error).__name__ == "MissingParameter" and getattr(error.param, "name", "") == "machine":
+                error.message = _machine_files(sys.argv[2:])
+            cause = error.__cause__
+            if type(cause).__name__ == "ValidationError":  # of typer's converter; older versions name the value
+                first = cause.errors()[0]  # type: ignore[union-attr]
+                wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
+                error.message = f"{wanted}, got {brief(first['input'])}"
+            raise
+        except KeyboardInterrupt:
+            from .console import errors_console
+
+            errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
+            raise typer.Exit(130) from None
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
@@ -51,7 +172,7 @@ class _WithPlugIns(Commands):
         if found is None:
             return None
         alone = typer.Typer(rich_markup_mode=None, add_completion=False)
-        alone.command(cmd_name, cls=PanelledCommand)(found.load())
+        alone.command(cmd_name, cls=_PanelledCommand)(found.load())
         return typer.main.get_command(alone)
 
 
@@ -60,7 +181,7 @@ def _plug_ins() -> dict[str, EntryPoint]:
 
 
 app = typer.Typer(
-    cls=_WithPlugIns,
+    cls=_Commands,
     help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",
     epilog=f"An error is one line and exit status 2, Ctrl-C 130. {DEBUG_VARIABLE}=1 in the environment shows "
     "the traceback of an unexpected error.",
@@ -85,7 +206,7 @@ for _command in (
     example_log,
 ):
     _name = _command.__name__.replace("_", "-")
-    app.command(cls=PanelledCommand, epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(
+    app.command(cls=_PanelledCommand, epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(
         _command
     )
 
@@ -98,8 +219,95 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print vers
 
 
 def main() -> None:
-    """Run the command line; an error is one line on stderr and exit status 2, Ctrl-C another and 130."""
-    sys.exit(run(app))
+    """Run the command line."""
+    sys.exit(_run())
+
+
+def _to_paste(error: HybridSepError) -> list[str]:
+    """Return this command with each of the options that would put an error right, to paste."""
+    options = error.options if isinstance(error, LogError) else ()
+    given = shlex.join(sys.argv[1:])
+    width = max((len(option) for option, _ in options), default=0)
+    return [f"  hybridsep {given} {option:{width}}  # {meaning}" for option, meaning in options]
+
+
+def _machine_files(arguments: Sequence[str]) -> str:
+    """Return which machine files fit wrote for a command's log, or that it writes one, in words."""
+    logs = [Path(one) for one in arguments if not one.startswith("-")]
+    folders = [folder for log in logs for folder in (log.with_suffix(""), Path(log.stem), log.parent)]
+    found = list(dict.fromkeys(str(one) for folder in folders if (one := folder / "machine.toml").is_file()))
+    others = sorted(str(one) for one in Path().glob("*/machine.toml"))
+    if found or others:
+        return f"There is {' and '.join(found or others[:3])}: add -m {shlex.quote((found or others)[0])}"
+    log = shlex.quote(str(logs[0])) if logs else "LOG"
+    return f"It is the axis's machine file, which hybridsep fit {log} writes, or the name of one of the library's"
+
+
+def _run() -> int:
+    """Run the command line; return its exit status."""
+    _open_closed()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    try:
+        status = _status()
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        _abandon_stdout()
+        return 1
+    except HybridSepError as error:
+        return _fail("\n".join([str(error), *_to_paste(error)]))
+    except OSError as error:
+        if error.filename is None:  # files name theirs
+            _abandon_stdout()
+        return _fail(f"cannot read or write {error.filename or 'standard output'}: {error.strerror or error}")
+    except MemoryError as error:
+        return _fail(f"out of memory: {error}; use a smaller Np, p or q, or a shorter log".replace(": ;", ";"))
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        return _fail(
+            f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep "
+            f"{version_text()}: please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
+        )
+
+
+def _open_closed() -> None:
+    """Open the null device in the place of standard streams that the caller has closed (``>&-``).
+
+    Otherwise Python has None there, and the next file that is opened gets what an FMU prints.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            descriptor = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(descriptor, True)
+            setattr(sys, name, os.fdopen(descriptor, mode, encoding="utf-8"))
+
+
+def _status() -> int:
+    try:
+        app()
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    return 0
+
+
+def _fail(message: str) -> int:
+    from .console import errors_console
+
+    errors_console.print("error: ", style="bold red", end="")
+    errors_console.print(message, soft_wrap=True)
+    return 2
+
+
+def _abandon_stdout() -> None:
+    """Redirect standard output to the null device, so that flushing it at exit cannot fail."""
+    with suppress(OSError, ValueError):  # a stream without a descriptor is not flushed at exit
+        descriptor = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(descriptor, sys.stdout.fileno())
+        os.close(descriptor)
 
 
 if __name__ == "__main__":

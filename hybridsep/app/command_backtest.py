@@ -58,10 +58,17 @@ def backtest(
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..predict.predictor import HybridPredictor
+    from .console import (
+        FIGURES,
+        RUNS,
+        check_outputs,
+        console,
+        print_scores,
+        print_without_first,
+        print_written,
+        progress_bar,
+    )
     from .logs import read_checked, reading_of
-    from .outputs import FIGURES, RUNS, check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_scores, print_without_first, print_written
 
     if figure is not None:
         from ..evaluate.figures import prediction_figure

@@ -51,7 +51,7 @@ def fit(
     """From the log of an axis to its model, FMUs and a report."""
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
-    from .outputs import check_outputs, keep_written, written_before
+    from .console import check_outputs, keep_written, written_before
 
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
@@ -64,9 +64,8 @@ def fit(
     from ..fitting.fit import fit as fit_logs
     from ..fitting.report import fit_report, judged_by, next_steps
     from ..logs.checks import checked, findings_table
+    from .console import console, print_json, progress_bar
     from .logs import different_logs, show
-    from .progress import progress_bar
-    from .tables import console, print_json
 
     folder = out or Path(machine)
     limits = drive_limits(parameters)
@@ -124,7 +123,7 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     from ..base.metrics import shown_figure
     from ..fitting.advice import extent
     from ..fitting.compensation import tracking_lines
-    from .tables import console
+    from .console import console
 
     unit, shown = logs[0].unit, logs[0].shown  # of all of them
     factor, position = shown.position

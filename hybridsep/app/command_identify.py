@@ -66,10 +66,8 @@ def identify(
     from ..logs.checks import checked
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
+    from .console import check_outputs, console, print_json, print_written, progress_bar
     from .logs import show
-    from .outputs import check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_json, print_written
 
     outputs = (("--out", out, (".toml",)), ("--figure", figure, (".png",)))
     machine = checked_name(name) if name else machine_name(out or recording)
@@ -118,7 +116,7 @@ def _print_identified(found: IdentifiedModel, title: str, shown: Shown) -> None:
     from rich.table import Table
 
     from ..identify.model import deviation_words, shown_estimates
-    from .tables import console
+    from .console import console
 
     table = Table(
         *("", "value", "± (1σ)", "unit"), title=f"{title}: {found.structure}, {found.input_hold}", box=box.SIMPLE

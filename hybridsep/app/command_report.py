@@ -50,10 +50,8 @@ def report(
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
     from ..predict.predictor import HybridPredictor
+    from .console import check_outputs, console, progress_bar
     from .logs import read_checked, reading_of
-    from .outputs import check_outputs
-    from .progress import progress_bar
-    from .tables import console
 
     page = out or Path(f"{machine_name(log)}_report.html")
     outputs = [("--out", page, (".html",))]

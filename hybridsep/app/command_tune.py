@@ -57,10 +57,8 @@ def tune(
     from ..fitting.tuning import n_unjudged, over_windows
     from ..fitting.tuning import tune as tune_on
     from ..machines.machine import load_machine, machine_path
+    from .console import FIGURES, check_outputs, console, print_json, print_written, progress_bar
     from .logs import show
-    from .outputs import FIGURES, check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_json, print_written
     from .tune_table import print_tuning, tuning_summary
 
     if figure is not None:

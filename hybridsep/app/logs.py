@@ -15,7 +15,7 @@ from ..logs.log import Log, read_log
 from ..logs.remedies import Samples, whole_turns
 from ..machines.agree import check_interval, check_unit
 from ..machines.machine import Machine
-from .failures import errors_console
+from .console import errors_console
 from .options import ReadingOptions
 
 __all__ = ["Reading", "different_logs", "read_checked", "reading_of", "show"]

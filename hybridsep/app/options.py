@@ -239,7 +239,7 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
 
     def given(values: dict[str, Any], others: dict[str, Any]) -> ReadingOptions:
         if values.pop(_LIST):
-            from .channel_table import print_channels
+            from .console import print_channels
 
             logs = others.get("logs") or [Path(others.get("log") or others["source"])]
             print_channels(logs, as_json=bool(others.get("as_json")))

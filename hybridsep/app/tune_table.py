@@ -16,7 +16,7 @@ from ..base.signals import Array
 from ..fitting.choice import WORTH
 from ..fitting.tuning import TUNED, Tuning, joint_ratio
 from ..logs.units import Shown
-from .tables import console
+from .console import console
 
 __all__ = ["entries", "print_tuning", "tuning_summary"]
 

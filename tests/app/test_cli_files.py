@@ -12,7 +12,7 @@ import pytest
 from command_line import Run, write_log
 from log_files import write
 
-from hybridsep.app.outputs import written_before
+from hybridsep.app.console import written_before
 from hybridsep.demo.cases import demo_files
 from hybridsep.machines.machine import machine_path
 from hybridsep.machines.naming import machine_name

@@ -17,7 +17,7 @@ from places import EMPS, ROOT
 from rich.console import Console
 
 from benchmarks.pictures import RECORD, demonstrated
-from hybridsep.app import tables
+from hybridsep.app import console, start
 from hybridsep.base.metrics import shown_figure
 from hybridsep.demo import cases
 from hybridsep.demo.cases import COMPENSATED, demo, demo_files
@@ -259,13 +259,12 @@ def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_tables_fit_into_80_columns(shown: Demonstration, monkeypatch: pytest.MonkeyPatch) -> None:
     narrow = Console(width=80, record=True, file=io.StringIO())
-    monkeypatch.setattr(tables, "console", narrow)
+    monkeypatch.setattr(console, "console", narrow)
     case = shown.summary["staircase"]
     contours = {kind: {**figures, "contour_rms_um": 1234.56} for kind, figures in case["compensation"].items()}
     axis = {**case, "friction_alone": case, "stiffness_alone": case, "compensation": contours}
     summary = {**shown.summary, "spiral_x": axis, "spiral_y": axis}
-    tables.print_compensation(summary)
-    tables.print_predictions(summary)
+    start.print_figures(summary)
     text = narrow.export_text()
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80

@@ -8,8 +8,7 @@ import pytest
 import typer
 from command_line import Run
 
-from hybridsep.app.cli import app
-from hybridsep.app.panels import EXAMPLES
+from hybridsep.app.cli import EXAMPLES, app
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 

@@ -10,8 +10,8 @@ from threading import Timer
 
 import pytest
 
-from hybridsep.app import progress
-from hybridsep.app.progress import progress_bar
+from hybridsep.app import console
+from hybridsep.app.console import progress_bar
 from hybridsep.demo.cases import processor_time
 
 
@@ -27,7 +27,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(progress, "monotonic", clock)
+    monkeypatch.setattr(console, "monotonic", clock)
     return clock
 
 

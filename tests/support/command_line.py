@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from staircase_data import commanded, measured
 
-from hybridsep.app import cli, progress
+from hybridsep.app import cli, console
 
 __all__ = ["Run", "run_line", "run_page", "write_log", "write_rows"]
 
@@ -27,7 +27,7 @@ class Run:
     def __call__(self, *arguments: object) -> tuple[int, str, str]:
         self.monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])
         self.monkeypatch.setenv("COLUMNS", "200")
-        self.monkeypatch.setattr(progress, "_SILENT", math.inf)  # what stderr has depends on no processor's speed
+        self.monkeypatch.setattr(console, "_SILENT", math.inf)  # what stderr has depends on no processor's speed
         status = 0
         try:
             cli.main()

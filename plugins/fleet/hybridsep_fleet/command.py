@@ -57,7 +57,7 @@ def fleet(
 
     hybridsep fleet report RESULTS writes one page about the results.
     """
-    from hybridsep.app.progress import progress_bar
+    from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
 
     from .engine import cluster

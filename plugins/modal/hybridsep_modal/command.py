@@ -49,7 +49,7 @@ def modal(
 
     A frequency response, the log of a swept sine that is at rest at both ends, or Klipper's accelerometer file.
     """
-    from hybridsep.app.progress import progress_bar
+    from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
     from hybridsep.base.output import written_text
     from hybridsep.machines.naming import checked_name, machine_name

@@ -1,7 +1,8 @@
-"""Command ``hybridsep build``."""
+"""Commands that write FMUs and sources for controllers: ``build``, ``hal`` and ``header``."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,6 @@ import typer
 
 from ..base.errors import ParameterError
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
-from .estimates import warn_of_estimates
 from .options import (
     FlavourOption,
     FmiOption,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Job = tuple[Machine, str, str, str]
     """An FMU to build: its machine, name and model, and the version of FMI."""
 
-__all__ = ["build"]
+__all__ = ["build", "hal", "header"]
 
 CONTROLLERS = ("twincat",)
 """Controllers that ``--for`` takes."""
@@ -87,9 +87,7 @@ def build(
     from ..fmi.compile import library_paths, missing
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
-    from .outputs import check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_json
+    from .console import check_outputs, console, print_json, progress_bar, warn_of_estimates
 
     if embed_weights and flavour != "native":
         raise ParameterError(f"--embed-weights is for native FMUs; with --flavour {flavour} leave it out")
@@ -239,3 +237,99 @@ def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Ma
             f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
         )
     return found[0][0], found[0][2]
+
+
+def hal(
+    machine: Annotated[list[str], typer.Argument(help="Machine files (.toml) or names, an axis each.")],
+    out: Annotated[Path, typer.Option(help="Folder for the component's sources and the folders of the axes.")] = Path(
+        "linuxcnc"
+    ),
+    predictor: Annotated[
+        bool, typer.Option("--predictor", help="The component that predicts alone; it needs no limits of the drive.")
+    ] = False,
+    weights: WeightsOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Write the HAL component for LinuxCNC, and its axes.
+
+    It is compiled there: sudo halcompile --install linuxcnc/hsep.c
+
+    The component (compensator, or predictor) is the same for all machines; each axis has a folder of its name that
+    ``loadrt hsep axes=`` takes.
+    """
+    from ..base.output import written_whole
+    from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
+    from ..fmi.weights import WEIGHTS_FILE, load_trained
+    from ..machines.machine import load_machine
+    from .console import check_outputs, warn_of_estimates
+
+    model = "HybridPredictor" if predictor else "SepCompensator"
+    axes = [load_machine(source) for source in machine]
+    names = [axis.name for axis in axes]
+    if weights is not None and len(axes) > 1:
+        raise ParameterError(f"--weights belong to one axis, got {len(axes)} machines; write them one by one")
+    component = COMPONENTS[model]
+    check_names(model, names)
+    if re.search(r"""[\s,"'#$(\[\\]""", str(out.resolve())):
+        raise ParameterError(
+            "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt "
+            f"takes axes= apart, got {out.resolve()}"
+        )
+    trained = None if weights is None else load_trained(weights, axes[0], model)
+    files = {out / name: content for name, content in component_files(model).items()}
+    for axis in axes:
+        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
+    # of an earlier call: the axis would start with them
+    stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
+    changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
+    check_outputs(
+        [("--out", path, ()) for path in (*changed, *stale)],
+        {"saved predictor": weights},
+        force=force,
+    )
+    for path, content in files.items():
+        with written_whole(path) as file:
+            file.write(content)
+    if not predictor:
+        warn_of_estimates(axes)
+    for path in stale:
+        path.unlink()
+        typer.echo(f"{path} removed: without --weights the axis starts cold")
+    typer.echo(
+        f"{out / component}.c written, with its sources; install it: sudo halcompile --install {out / component}.c"
+    )
+    typer.echo(f"loadrt {component} axes={','.join(str((out / name).resolve()) for name in names)}")
+
+
+def header(
+    machine: Annotated[str, typer.Argument(help="Machine file (.toml) or name.")],
+    out: Annotated[Path | None, typer.Option(help="The header; named after the machine if left out.")] = None,
+    predictor: Annotated[
+        bool, typer.Option("--predictor", help="Of the predictor alone; it needs no limits of the drive.")
+    ] = False,
+    weights: WeightsOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Write an axis as a C header for the library in C.
+
+    The library is fmu_src/c: a compensator, or a predictor, for a controller that runs no FMU. The header has the
+    axis's modes, settings and, with ``--weights``, what an earlier run has learned.
+    """
+    from ..base.output import written_text
+    from ..fmi.controllers import axis_header
+    from ..fmi.weights import load_trained
+    from ..machines.machine import load_machine, machine_path
+    from .console import check_outputs, warn_of_estimates
+
+    axis = load_machine(machine)
+    model = "HybridPredictor" if predictor else "SepCompensator"
+    trained = None if weights is None else load_trained(weights, axis, model)
+    text = axis_header(axis, model, trained)
+    path = Path(f"{axis.name}.h") if out is None else out
+    inputs = {f"machine file {machine}": machine_path(machine), "saved predictor": weights}
+    check_outputs([("--out", path, (".h",))], inputs, force=force)
+    if not predictor:
+        warn_of_estimates([axis])
+    with written_text(path) as file:
+        file.write(text)
+    typer.echo(f"{path} written: include it after installing the library, whose README.md says how (fmu_src/c)")

@@ -1,4 +1,4 @@
-"""``hybridsep cosim``."""
+"""Commands of a controller and a drive together: ``cosim`` runs them, ``system`` writes them as one file."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from .options import (
     ForceOption,
     JsonOption,
     MachineOption,
+    TargetOption,
     TrajectoryOption,
     TsOption,
     UnitOption,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from ..base.signals import Array
     from ..machines.machine import Machine
 
-__all__ = ["cosim", "default_trajectory", "read_command"]
+__all__ = ["cosim", "system"]
 
 
 @takes_parameters(PREDICTOR_ENTRIES, COMPENSATOR_ENTRIES)
@@ -75,20 +76,18 @@ def cosim(
     from ..cosim.loop import cosimulate
     from ..fmi.archive import build_here
     from ..machines.machine import load_machine, machine_path
-    from .outputs import RUNS, check_outputs
-    from .progress import progress_bar
-    from .tables import print_run, print_written
+    from .console import RUNS, check_outputs, print_run, print_written, progress_bar
 
     if figure is not None:
         from ..evaluate.figures import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
-    trajectory = trajectory or default_trajectory(machine)
+    trajectory = trajectory or _default_trajectory(machine)
     outputs = (("--out", out, RUNS), ("--figure", figure, (".png",)))
     if compensate is not None:
         check("compensate", compensate, label="--compensate")
     model = "HybridPredictor" if compensate is None else "SepCompensator"
-    command = read_command(trajectory, axis, unit, T_s)
+    command = _read_command(trajectory, axis, unit, T_s)
     if compensate is None and (wrong := [f"--{name}" for name in parameters if name in COMPENSATOR_ENTRIES]):
         raise ParameterError(f"{', '.join(wrong)} must come with --compensate")
     values = dict(parameters)
@@ -130,14 +129,14 @@ def cosim(
         print_written(out, figure)
 
 
-def default_trajectory(machine: str | Path) -> str:
+def _default_trajectory(machine: str | Path) -> str:
     """Return what is played where nothing is given: a fit's commands beside the machine file, else the staircase."""
     path = Path(machine)
     commands = path.with_name(COMMANDS)
     return str(commands) if path.suffix == ".toml" and commands.is_file() else "staircase"
 
 
-def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
+def _read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
     """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
     from ..logs.log import check_reading
     from ..machines.agree import check_interval
@@ -209,3 +208,63 @@ def _check_pair(
         check_plant(plant)
     if flavour == "native" and None in (predictor, plant):
         check_available(("host",))
+
+
+def system(
+    machine: MachineOption = DEFAULT_MACHINE,
+    compensate: Annotated[
+        str | None,
+        typer.Option(
+            help=f"{PARAMETERS['compensate'].help}. A SepCompensator modifies the command; if left out, a "
+            "HybridPredictor only predicts."
+        ),
+    ] = None,
+    trajectory: TrajectoryOption = None,
+    unit: UnitOption = None,
+    T_s: TsOption = None,
+    weights: WeightsOption = None,
+    ssp: Annotated[
+        str, typer.Option(help="Version of SSP: 1 with FMI 2.0 FMUs, or 2 with FMI 3.0 FMUs, for tools that read it.")
+    ] = "1",
+    target: TargetOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The archive, .ssp; named after the machine in this folder if left out.")
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a whole system as one file, SSP 1.0 or 2.0.
+
+    Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
+    """
+    from ..fmi.compile import check_available
+    from ..fmi.ssp import build_system, check_system
+    from ..machines.machine import load_machine, machine_path
+    from .console import check_outputs, console, print_json, progress_bar
+
+    axis = load_machine(machine)
+    if compensate is not None:
+        check("compensate", compensate, label="--compensate")
+    trajectory = trajectory or _default_trajectory(machine)
+    out = out or Path(f"{axis.name}.ssp")
+    check_system(axis, compensate=compensate, ssp=ssp)
+    command = _read_command(trajectory, axis, unit, T_s)
+    check_available(target or ("host",))
+    file = None if trajectory in TRAJECTORIES else trajectory
+    inputs = {"machine file": machine_path(machine), "trajectory": file, "saved predictor": weights}
+    check_outputs([("--out", out, (".ssp",))], inputs, force=force)
+    with progress_bar(as_json) as advance:
+        build_system(
+            axis,
+            out,
+            command,
+            compensate=compensate,
+            targets=target or None,
+            weights=weights,
+            ssp=ssp,
+            progress=advance,
+        )
+    if as_json:
+        print_json([str(out)])
+    else:
+        console.print(f"{out}  {out.stat().st_size / 1024:.0f} KiB", soft_wrap=True)

@@ -1,0 +1,405 @@
+"""What commands print and write: consoles, progress, tables or JSON; and the check of files before the work."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import shlex
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ..base.errors import ParameterError, brief
+from ..base.metrics import shown_figure
+
+if TYPE_CHECKING:
+    from ..cosim.run import Run
+    from ..evaluate.verdict import Verdict
+    from ..logs.source import Channel
+    from ..logs.units import Shown
+    from ..machines.machine import Machine
+
+__all__ = [
+    "FIGURES",
+    "RUNS",
+    "Output",
+    "check_outputs",
+    "console",
+    "errors_console",
+    "keep_written",
+    "print_channels",
+    "print_json",
+    "print_run",
+    "print_scores",
+    "print_without_first",
+    "print_written",
+    "progress_bar",
+    "warn_of_estimates",
+    "written_before",
+]
+
+
+class _WholeLines(Console):
+    """Console that breaks no line of text where it is no terminal: what reads it may look for one."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as rich does."""
+        if not self.is_terminal and all(isinstance(one, str) for one in objects):
+            options.setdefault("soft_wrap", True)
+        super().print(*objects, **options)
+
+
+errors_console = Console(stderr=True, emoji=False, markup=False, highlight=False)
+console = _WholeLines(emoji=False, markup=False, highlight=False)
+"""Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
+
+
+PREDICTIONS = {"pb": "physics", "hold": "hold", "arx20": "ARX20", "arx40": "ARX40", "h": "hybrid"}
+"""Names in summaries, and what they are called; ARX models are of replays of logs only."""
+
+
+def print_scores(
+    summary: Mapping[str, Any],
+    verdict: Verdict,
+    as_json: bool,
+    title: str,
+    *,
+    unit: str = "m",
+    shown: Shown | None = None,
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print prediction errors, of a run or of a backtest, and what they mean.
+
+    Parameters
+    ----------
+    summary : mapping
+        Scores, in millionths of the axis's unit.
+    verdict : Verdict
+    as_json : bool
+        Print them as JSON, with ``more``; the names of a rotary axis's end in ``_urad``.
+    title : str
+    unit : {"m", "rad"}
+        Unit of the axis's positions.
+    shown : Shown, optional
+        Units of the table; ``unit``'s if left out.
+    more : mapping, optional
+    """
+    if as_json:
+        print_json(
+            {
+                **{name.replace("_um", f"_u{unit}"): value for name, value in summary.items()},
+                "verdict": str(verdict),
+                **(more or {}),
+            }
+        )
+        return
+    from ..logs.units import shown_in
+
+    factor, name = (shown or shown_in(unit)).error(1e-6 * float(summary["rms_pb_um"]))
+    keys = [key for key in PREDICTIONS if f"rms_{key}_um" in summary]
+    table = Table(
+        title=f"{title}: prediction error in {name} against the measured position",
+        box=box.SIMPLE,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    for column in ("", *(PREDICTIONS[key] for key in keys), "reduction", "× hold"):
+        table.add_column(column, justify="right", no_wrap=True)
+    warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
+    parts = (("", ""), ("_after_warm_up", " after warm-up"))
+    for suffix, label in parts if warmed_up else parts[:1]:
+        for quantity in ("rms", "max"):
+            if f"{quantity}_pb_um{suffix}" in summary:
+                figures = [summary[f"{quantity}_{key}_um{suffix}"] for key in keys]
+                compared = [summary[f"{key}{suffix}"] for key in ("reduction_percent", "ratio_to_hold")]
+                ratios = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
+                label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
+                shown_sizes = [one if isinstance(one, str) else shown_figure(1e-6 * factor * one) for one in figures]
+                table.add_row(label_text, *shown_sizes, *ratios)
+    console.print(table)
+    console.print(str(verdict))
+
+
+def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
+    """Print RMS errors, m or rad, without the first window of a log in motion, by their names in summaries."""
+    factor, name = shown.error(rms["pb"])
+    figures = ", ".join(f"{peer} {shown_figure(factor * rms[key])}" for key, peer in PREDICTIONS.items() if key in rms)
+    console.print(f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.")
+
+
+def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:
+    """Print the figures of a run: its prediction errors, or its tracking errors and the ``limits`` that bind them."""
+    from ..cosim.run import PREDICTOR
+    from ..evaluate.verdict import verdict_of
+
+    if run.kind == PREDICTOR:
+        print_scores(run.summary(), verdict_of(run), as_json, title)
+    else:
+        _print_tracking(run.summary(), as_json, title, limits)
+
+
+def _print_tracking(
+    summary: Mapping[str, float | int], as_json: bool, title: str, limits: Mapping[str, float] | None
+) -> None:
+    """Print tracking errors, change of the command and its peaks."""
+    from ..fitting.compensation import binding_words
+
+    if as_json:
+        print_json({**summary, **({} if limits is None else {"limits_that_bind": limits})})
+        return
+    table = Table(title=title)
+    for column in ("", "RMS [µm]", "max [µm]"):
+        table.add_column(column, justify="right" if column else "left")
+    for name, label in (
+        ("tracking", "tracking error, true position"),
+        ("tracking_measured", "tracking error, measured position"),
+        ("change", "change of the command"),
+    ):
+        table.add_row(label, *(shown_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
+    console.print(table)
+    peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
+    console.print(
+        f"command to the drive: at most {1e3 * peaks[0]:.1f} mm/s, {peaks[1]:.2f} m/s², {peaks[2]:.0f} m/s³\n"
+        f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
+        f"not compensated {summary['share_off']:.1%} of the samples"
+    )
+    if limits is not None:
+        console.print(binding_words(limits))
+
+
+def print_written(*paths: Path | None) -> None:
+    """Print the names of files that were written, None being none."""
+    for path in paths:
+        if path is not None:
+            console.print(f"wrote {path}", soft_wrap=True)
+
+
+def print_json(result: Any) -> None:
+    """Print JSON; figures that are not finite, such as scores over no sample, are null."""
+    typer.echo(json.dumps(_finite(result), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+_ROLES = {"t": "time", "x_d": "commanded", "x": "measured"}
+
+
+def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
+    """Print what files hold: names, units, samples, rates, and what is read without a word.
+
+    Raises
+    ------
+    LogError
+        If a file cannot be read.
+    """
+    from ..logs.columns import channels
+    from ..logs.formats import open_source
+
+    found = {str(path): channels(open_source(path)) for path in logs}
+    if as_json:
+        print_json({path: [asdict(one) for one in listed] for path, listed in found.items()})
+        return
+    for path, listed in found.items():
+        table = Table("channel", "unit", "samples", "interval [s]", "read as", title=path, box=box.SIMPLE)
+        for one in listed:
+            table.add_row(*_cells(one))
+        console.print(table)
+        missing = [role for role in _ROLES if role != "t" and role not in {one.role for one in listed}]
+        if missing and not all(one.role for one in listed):
+            words = " and ".join(_ROLES[role] for role in missing)
+            options = " ".join(f"--{role} NAME" for role in missing)
+            console.print(
+                f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}",
+                soft_wrap=True,
+            )
+
+
+def _cells(one: Channel) -> tuple[str, ...]:
+    n = "" if one.n_samples is None else str(one.n_samples)
+    interval = "" if one.interval is None else f"{one.interval:.9g}"
+    return one.name, one.unit, n, interval, _ROLES.get(one.role, "")
+
+
+def warn_of_estimates(machines: Iterable[Machine]) -> None:
+    """Say on standard error whose limits of the drive are estimated from a log's motion."""
+    from ..fitting.compensation import LIMITS_WORDS
+
+    for machine in machines:
+        if machine.drive_limits is not None and machine.drive_limits.estimated:
+            errors_console.print(f"warning: [drive_limits] of {machine.name}: {LIMITS_WORDS}", soft_wrap=True)
+
+
+# Progress -------------------------------------------------------------------------------------------------------------
+
+_SILENT = 2.0
+"""Time for which no line is printed, s: what is done by then needs no progress."""
+
+_PAUSE = 5.0
+"""Time without a line after which one says how far the stage is, s."""
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """Show progress on stderr; yield a function of a message, which names the stage, and the fraction done."""
+    if quiet or not errors_console.is_terminal:
+        yield _nothing if quiet else _Lines()
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=errors_console, transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda message, fraction: bar.update(task, description=message, completed=fraction)
+
+
+def _nothing(_message: str, _fraction: float) -> None:
+    """Show nothing."""
+
+
+class _Lines:
+    """Prints a line where a stage begins, and while it lasts one after each pause."""
+
+    def __init__(self) -> None:
+        self._begun = monotonic()
+        self._stage, self._printed = "", 0.0
+
+    def __call__(self, message: str, fraction: float) -> None:
+        now = monotonic()
+        if now - self._begun < _SILENT or fraction >= 1.0:
+            return
+        if message != self._stage or now - self._printed >= _PAUSE:
+            self._stage, self._printed = message, now
+            errors_console.print(f"[{fraction:4.0%}] {message}", soft_wrap=True)
+
+
+# Files ----------------------------------------------------------------------------------------------------------------
+
+FIGURES = (".png", ".pdf", ".svg")
+RUNS = (".csv", ".npz")
+"""Endings of figures and of runs."""
+
+Output = tuple[str, Path | None, tuple[str, ...]]
+"""Option that names a file, the file where it is given, and the endings that it may have; any where there are none."""
+
+_WRITTEN = "written"
+"""Entry of ``fit.json``: the logs of the fit, and the hash of each file."""
+
+
+def check_outputs(
+    outputs: Iterable[Output],
+    inputs: Mapping[str, str | Path | None],
+    *,
+    force: bool = False,
+    ours: Collection[Path] = (),
+) -> None:
+    """Check that files can be written where they will be.
+
+    Parameters
+    ----------
+    outputs : iterable of Output
+    inputs : mapping
+        Role of a file that is read → its path; None if it is not given.
+    force : bool
+        Whether existing files may be overwritten; an input never is.
+    ours : collection of Path
+        Existing files that may be overwritten without ``force``.
+
+    Raises
+    ------
+    ParameterError
+        If an output is an input, by whatever name, or another output; a folder; an existing file; of another ending; or
+        cannot be written for its name or its folder.
+    """
+    taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
+    for _, given in taken:
+        _check_name("the name of a file that is read", given)
+    for option, path, endings in outputs:
+        if path is None:
+            continue
+        if endings and path.suffix.lower() not in endings:
+            raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")
+        _check_name(option, path)
+        for what, other in taken:
+            if _same_file(path, other):
+                raise ParameterError(f"{option} {path} is the same file as {what}; choose another name")
+        taken.append((f"{option} {path}", path))
+        if path.is_dir():
+            raise ParameterError(f"{option} must be a file, got the folder {path}")
+        if path.is_file() and not force and path not in ours:
+            raise ParameterError(f"{option} {path} exists; choose another name, or overwrite it with --force")
+        folder = next(one for one in Path(os.path.realpath(path)).parents if one.exists())
+        if not folder.is_dir():
+            raise ParameterError(f"{option} {path}: {folder} is a file, not a folder; choose another")
+        if not os.access(folder, os.W_OK):
+            raise ParameterError(f"{option} {path}: no file can be written in {folder}")
+
+
+def _check_name(option: str, path: Path) -> None:
+    """Raise ParameterError if a path cannot be a file's, or not be written into a text."""
+    try:
+        str(path).encode()
+        path.lstat()
+    except UnicodeEncodeError as error:
+        raise ParameterError(
+            f"{option} must be in UTF-8, got {brief(str(path))}; rename the file or the folder"
+        ) from error
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        raise ParameterError(f"{option} {brief(str(path))}: {error.strerror}; choose a shorter name") from error
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    """Return whether two names lead to one file, by symbolic and hard links too, whether it exists yet or not."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return os.path.realpath(one) == os.path.realpath(other)
+
+
+def written_before(results: Path, logs: Sequence[Path]) -> set[Path]:
+    """Return the files beside a ``fit.json`` that the fit of the same logs wrote, and that nobody has edited since."""
+    try:
+        written = json.loads(results.read_bytes())[_WRITTEN]
+        same = written["logs"] == _absolute(logs)
+        hashes = {results.with_name(name): str(known) for name, known in written["files"].items()}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return set()
+    return (
+        {results, *(path for path, known in hashes.items() if path.is_file() and _hash(path) == known)}
+        if same
+        else set()
+    )
+
+
+def keep_written(results: Path, logs: Sequence[Path], files: Iterable[Path]) -> None:
+    """Add to a ``fit.json`` which logs it is of, and the hashes of the files that were written beside it."""
+    from ..base.output import written_text
+
+    found = json.loads(results.read_bytes())
+    hashes = {path.name: _hash(path) for path in files if path != results}
+    with written_text(results) as file:
+        file.write(json.dumps({**found, _WRITTEN: {"logs": _absolute(logs), "files": hashes}}, indent=2) + "\n")
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _absolute(logs: Sequence[Path]) -> list[str]:
+    return [os.path.realpath(log) for log in logs]
