@@ -243,9 +243,9 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
     assert hybridsep("backtest", log, "-m", MACHINE, "--out", out)[0] == 0
     before = out.read_bytes()
     with log.open("a") as file:
-        file.write("1.0,0.0,none\n")
+        file.write("1.0,0.0,broken\n")
     again = ("backtest", log, "-m", MACHINE, "--out", out, "--force")
-    assert "column 'x' must be a number, got 'none'" in refusal(hybridsep, *again)
+    assert "column 'x' must be a number, got 'broken'" in refusal(hybridsep, *again)
     assert out.read_bytes() == before
 
 
