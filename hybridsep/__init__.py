@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .cosim.fmu import FmuInstance
     from .cosim.loop import cosimulate
     from .cosim.run import Run
-    from .evaluate.backtest import backtest, backtest_stream
+    from .evaluate.backtest import backtest
     from .fmi.archive import build_fmu
     from .fmi.spec import fmu_names
     from .logs.log import Log, read_log
@@ -57,7 +57,6 @@ __all__ = [
     "SepState",
     "__version__",
     "backtest",
-    "backtest_stream",
     "build_fmu",
     "cosimulate",
     "fmu_names",
@@ -91,7 +90,6 @@ _MODULES = {
     "SepCompensator": "compensate.compensator",
     "SepState": "compensate.planning",
     "backtest": "evaluate.backtest",
-    "backtest_stream": "evaluate.backtest",
     "build_fmu": "fmi.archive",
     "cosimulate": "cosim.loop",
     "fmu_names": "fmi.spec",

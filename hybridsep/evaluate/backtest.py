@@ -28,7 +28,7 @@ from .verdict import Tally, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Backtest", "Batch", "Score", "Scores", "backtest", "backtest_stream", "replayed_run"]
+__all__ = ["Backtest", "Batch", "Score", "Scores", "backtest", "replayed_run"]
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Backtest(Scores):
-    """Result of a replay over arrays: scores and predictions.
+    """Result of a replay: scores and predictions.
 
     It prints as one line, and as a table in a notebook; :meth:`plot` draws the errors window by window.
 
@@ -223,7 +223,7 @@ def backtest(
     starts: Sequence[int] = (0,),
     on_batch: OnBatch | None = None,
 ) -> Backtest:
-    """Replay a log that is in memory.
+    """Replay a log.
 
     The predictor goes on from its present state; call its ``restart`` before for another run with the weights kept.
 
@@ -260,7 +260,7 @@ def backtest(
         return np.concatenate([np.atleast_1d(getattr(batch, name)) for batch in batches])
 
     both = np.stack((command, measured))
-    segments = [[both[:, start:end]] for start, end in zip(starts, (*starts[1:], len(command)), strict=True)]
+    segments = [both[:, start:end] for start, end in zip(starts, (*starts[1:], len(command)), strict=True)]
     scores = _replayed(predictor, segments, keep)
     return Backtest(
         scores.overall,
@@ -273,42 +273,14 @@ def backtest(
     )
 
 
-def backtest_stream(
-    predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]], *, on_batch: OnBatch | None = None
-) -> Scores:
-    """Replay a log that arrives in chunks; nothing that is kept grows with the length of the log.
-
-    Parameters
-    ----------
-    predictor : HybridPredictor
-        It learns the log on the way.
-    chunks : iterable of pairs ``(x_d, x)`` of (m,) array_like, m
-        Commanded and measured positions in chunks of any sizes; they are predicted ``Np`` samples at a time. With trust
-        ``x`` is NaN where it is missing; missing samples are not scored.
-    on_batch : callable, optional
-        Called with each :class:`Batch` when it is finished.
-
-    Returns
-    -------
-    Scores
-
-    Raises
-    ------
-    SignalError
-        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. The windows before are
-        learned.
-    """
-    return _replayed(predictor, [_checked(predictor, chunks)], on_batch)
-
-
 @one_blas_thread
-def _replayed(predictor: HybridPredictor, segments: Iterable[Iterable[Array]], on_batch: OnBatch | None) -> Scores:
-    """Replay segments in chunks, (2, m) each, whose samples are checked."""
+def _replayed(predictor: HybridPredictor, segments: Iterable[Array], on_batch: OnBatch) -> Scores:
+    """Replay segments, (2, m) each, whose samples are checked."""
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
     j = k = n_rejected = n_missing = 0
     late: Array | None = None
     residual, begin = 0.0, 0
-    for new, commands, x in _windows_of(segments, predictor.Np):
+    for new, commands, x in _windows(segments, predictor.Np):
         if new and j:
             predictor.restart()
             late, residual, begin = None, 0.0, k
@@ -337,8 +309,7 @@ def _replayed(predictor: HybridPredictor, segments: Iterable[Iterable[Array]], o
         n_rejected += predictor.n_rejected - n_before
         n_missing += int(np.isnan(x).sum())
         j, k = j + 1, k + n
-        if on_batch is not None:
-            on_batch(batch)
+        on_batch(batch)
     if j == 0:
         raise SignalError("a log must have at least one sample, got none")
     return Scores(Score.of(overall), Score.of(after), j, tally.verdict(n_rejected=n_rejected, n_missing=n_missing))
@@ -374,39 +345,11 @@ def _measure(error: Array, k: int) -> tuple[int, list[float], list[float]]:
     return error.shape[1], [float(row.dot(row)) for row in error], peaks
 
 
-def _windows_of(segments: Iterable[Iterable[Array]], Np: int) -> Iterator[tuple[bool, Array, Array]]:
-    """Yield the windows of segments, each with whether it is the first of one."""
-    for chunks in segments:
-        for i, (x_d, x) in enumerate(_windows(chunks, Np)):
-            yield i == 0, x_d, x
-
-
-def _windows(chunks: Iterable[Array], Np: int) -> Iterator[tuple[Array, Array]]:
-    """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
-    waiting = np.empty((2, 0))
-    for samples in chunks:
-        if waiting.size:
-            samples = np.concatenate((waiting, samples), axis=1)
-        whole = samples.shape[1] // Np * Np
-        for i in range(0, whole, Np):
-            yield samples[0, i : i + Np], samples[1, i : i + Np]
-        waiting = samples[:, whole:]
-    if waiting.size:
-        yield waiting[0], waiting[1]
-
-
-def _checked(predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]]) -> Iterator[Array]:
-    """Yield each chunk's samples, (2, m); SignalError names the chunk by its first sample."""
-    k = 0
-    for chunk in chunks:
-        place = f" of the chunk from sample {k} on" if k else ""
-        try:
-            first, second = chunk
-        except (TypeError, ValueError):
-            raise SignalError(f"each chunk must be a pair (x_d, x), got {type(chunk).__name__}{place}") from None
-        x_d = as_samples(first, f"x_d{place}")
-        yield np.stack((x_d, _measured(predictor, second, f"x{place}", len(x_d))))
-        k += len(x_d)
+def _windows(segments: Iterable[Array], Np: int) -> Iterator[tuple[bool, Array, Array]]:
+    """Yield the windows of segments, (2, m) each, with whether it is the first of one; a last one may be shorter."""
+    for samples in segments:
+        for i in range(0, samples.shape[1], Np):
+            yield i == 0, samples[0, i : i + Np], samples[1, i : i + Np]
 
 
 def _measured(predictor: HybridPredictor, x: ArrayLike, name: str, length: int) -> Array:

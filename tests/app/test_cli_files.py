@@ -232,7 +232,7 @@ def test_arguments_are_checked_before_any_work(
     monkeypatch.chdir(folder)
     for module in ("hybridsep.fmi.archive", "hybridsep.fmi.archive"):
         monkeypatch.setattr(f"{module}.build_fmu", work)
-    monkeypatch.setattr("hybridsep.evaluate.backtest.backtest_stream", work)
+    monkeypatch.setattr("hybridsep.evaluate.backtest.backtest", work)
     names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy")}
     assert message in refusal(hybridsep, *(argument.format(**names) for argument in arguments))
     assert [path for path in folder.rglob("*") if path.is_file()] == []

@@ -23,7 +23,6 @@ from hybridsep import (
     HybridPredictor,
     SepCompensator,
     backtest,
-    backtest_stream,
     cosimulate,
     load_machine,
     paper_machine,
@@ -91,7 +90,6 @@ def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callabl
         return x_meas
 
     backtest(machine.new_predictor(), x_d, x_d, on_batch=look)
-    backtest_stream(machine.new_predictor(), iter([(x_d, x_d)]), on_batch=look)
     cosimulate(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
     cosimulate(python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"), x_d[:3], progress=look)
     assert len(seen) > 100

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
-from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +15,7 @@ from properties import examples
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream, replayed_run
+from hybridsep.evaluate.backtest import Batch, backtest, replayed_run
 from hybridsep.logs.log import Log, read_log
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -69,14 +66,6 @@ def test_recorded_axis(emps: Log) -> None:
     assert summary["reduction_percent"] > 60
     assert (summary["n_samples"], summary["n_batches"]) == (24_841, 249)
     assert summary["n_samples_after_warm_up"] == 24_841 - 1242
-
-
-@pytest.mark.slow
-def test_recorded_axis_in_chunks(emps: Log) -> None:
-    whole = backtest(emps_predictor(), emps.x_d, emps.x_meas)
-    chunks = ((emps.x_d[i : i + 777], emps.x_meas[i : i + 777]) for i in range(0, len(emps.t), 777))
-    streamed = backtest_stream(emps_predictor(), chunks)
-    assert streamed.summary() == whole.summary()
 
 
 def test_scores_are_those_of_the_predictions() -> None:
@@ -170,34 +159,14 @@ def test_no_prediction_depends_on_what_is_measured_in_its_window_or_later(k: int
     np.testing.assert_array_equal(first.x_hold[:end], other.x_hold[:end])
 
 
-@given(cuts=st.lists(st.integers(0, 1010), max_size=30), Np=st.integers(5, 130))
-@examples(40)
-def test_stream_equals_arrays_whatever_the_chunks(cuts: list[int], Np: int) -> None:
-    x_d, x = log()
-    edges = [0, *sorted(cuts), 1010]
-    chunks = [(x_d[a:b], x[a:b]) for a, b in pairwise(edges)]
-    batches: list[Batch] = []
-    whole, learned = predictor(Np), predictor(Np)
-    result = backtest(whole, x_d, x)
-    streamed = backtest_stream(learned, chunks, on_batch=batches.append)
-    assert streamed.summary() == result.summary()
-    assert learned.to_bytes() == whole.to_bytes()
-    for name in ("x_pb", "x_hold", "x_h"):
-        joined = np.concatenate([getattr(batch, name) for batch in batches])
-        np.testing.assert_array_equal(joined, getattr(result, name))
-    np.testing.assert_array_equal(np.concatenate([batch.x_d for batch in batches]), x_d)
-    np.testing.assert_array_equal(np.concatenate([batch.x for batch in batches]), x)
-    np.testing.assert_array_equal([batch.rms_h for batch in batches], result.batch_rms_h)
-    assert [batch.j for batch in batches] == list(range(result.n_batches))
-    assert [batch.k for batch in batches] == list(range(0, 1010, Np))
-    assert all(len(batch.x) == Np for batch in batches[:-1])
-
-
 def test_on_batch_over_arrays() -> None:
-    numbers: list[int] = []
-    result = backtest(predictor(), *log(), on_batch=lambda batch: numbers.append(len(batch.x)))
-    assert isinstance(result, Backtest)
-    assert numbers == [20] * 50 + [10]
+    batches: list[Batch] = []
+    x_d, x = log()
+    result = backtest(predictor(), x_d, x, on_batch=batches.append)
+    for name, signal in (("x_d", x_d), ("x", x), ("x_h", result.x_h)):
+        np.testing.assert_array_equal(np.concatenate([getattr(batch, name) for batch in batches]), signal)
+    assert [(batch.j, batch.k) for batch in batches] == [(j, 20 * j) for j in range(51)]
+    np.testing.assert_array_equal([batch.rms_h for batch in batches], result.batch_rms_h)
 
 
 def test_second_run_starts_warm() -> None:
@@ -208,29 +177,6 @@ def test_second_run_starts_warm() -> None:
     warm = backtest(learning, x_d, x)
     assert warm.active.all()
     assert warm.overall.rms_h < cold.overall.rms_h
-
-
-@pytest.mark.slow
-def test_memory_does_not_grow_with_the_stream() -> None:
-    x_d, x = log(1000)
-
-    def peak(repetitions: int) -> int:
-        def chunks() -> Iterator[tuple[Array, Array]]:
-            for _ in range(repetitions):
-                yield x_d, x
-
-        replaying = predictor()
-        tracemalloc.start()
-        assert backtest_stream(replaying, chunks()).overall.n_samples == 1000 * repetitions
-        _, highest = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        return highest
-
-    peak(1)  # what is imported or cached on first use
-    # Peaks differ by some kB, whatever their length; one number kept for each sample would be 96 kB. What other tests
-    # have left behind may be freed or made meanwhile: it is in one peak, not in all.
-    most = peak(4) + 20_000
-    assert any(peak(16) < most for _ in range(3))
 
 
 @pytest.mark.parametrize(
@@ -252,18 +198,6 @@ def test_bad_arrays(x_d: list[float], x: list[float], message: str) -> None:
     assert replaying.to_bytes() == before
 
 
-def test_bad_chunks() -> None:
-    good = np.zeros(70)
-    with pytest.raises(SignalError, match="x of the chunk from sample 70 on must be finite, got nan at sample 1"):
-        backtest_stream(predictor(), [(good, good), (good[:2], np.array([0.0, math.nan]))])
-    with pytest.raises(SignalError, match="x of the chunk from sample 70 on must have 70 samples, got 69"):
-        backtest_stream(predictor(), [(good, good), (good, good[1:])])
-    with pytest.raises(SignalError, match=r"each chunk must be a pair \(x_d, x\), got ndarray"):
-        backtest_stream(predictor(), [good])  # type: ignore[list-item]
-    with pytest.raises(SignalError, match="at least one sample, got none"):
-        backtest_stream(predictor(), [])
-
-
 def test_missing_measurements_are_bridged_with_trust_and_refused_without() -> None:
     x_d, x = log()
     holes = x.copy()
@@ -273,10 +207,6 @@ def test_missing_measurements_are_bridged_with_trust_and_refused_without() -> No
         SignalError, match="x_meas must be finite, got nan at sample 300: missing measurements need trust"
     ):
         backtest(predictor(), x_d, holes)
-    with pytest.raises(
-        SignalError, match="x of the chunk from sample 500 on must be finite, got nan at sample 0: miss"
-    ):
-        backtest_stream(predictor(), [(x_d[:500], x[:500]), (x_d[500:], holes[500:])])
     settings = PredictorSettings(Np=20, p=5, q=2, t_init=-1.0)
     batches: list[Batch] = []
     result = backtest(HybridPredictor(predictor().model, settings), x_d, holes, on_batch=batches.append)

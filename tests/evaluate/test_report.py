@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,8 +138,3 @@ def test_a_phone_shows_that_a_table_goes_on(page: str) -> None:
     assert "white-space: normal" in phone["th"]
     assert "white-space: normal" in phone["td:first-child"]
     assert re.search(r"\.tables \{[^}]*overflow-x: auto;[^}]*\blocal\b[^}]*\bscroll;", page)
-
-
-def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="nowhere"):
-        Report("a", "b").write(tmp_path / "nowhere" / "report.html")
