@@ -98,7 +98,8 @@ def command_pages() -> dict[Path, str]:
         "`hybridsep COMMAND --help` prints the same. An error is one line on standard error and exit status 2, Ctrl-C "
         "130; "
         "with `HYBRIDSEP_DEBUG=1` in the environment an unexpected error shows its traceback. "
-        "[What messages mean](messages.md).",
+        "[What messages mean](messages.md). Commands of plug-ins are on their pages: [`live`](../howto/live.md), "
+        "[`fleet`](../howto/fleet.md), [`modal`](../howto/modal.md).",
         _table(
             ("command", "what"),
             ((f"[`{name}`](command-line/{name}.md)", one.help.partition("\n")[0]) for name, one in commands.items()),
