@@ -15,13 +15,7 @@ from hybridsep.machines.machine import machine_path
 from hybridsep_live.first_seconds import FirstSeconds
 from hybridsep_live.sample import Sample
 
-WRONG = {
-    "": (1.0, 1.0, False),
-    "unit": (1e3, 1e3, False),
-    "scale": (1.0, 1e3, False),
-    "sign": (1.0, -1.0, False),
-    "columns swapped": (1.0, 1.0, True),
-}
+WRONG = {"": (1.0, 1.0), "unit": (1e3, 1e3), "scale": (1.0, 1e3), "sign": (1.0, -1.0)}
 
 
 def found(x_d: np.ndarray, x: np.ndarray, *, ahead: bool = False) -> list[Finding]:
@@ -36,9 +30,8 @@ def found(x_d: np.ndarray, x: np.ndarray, *, ahead: bool = False) -> list[Findin
 @pytest.mark.parametrize("name", WRONG)
 @pytest.mark.parametrize("ahead", [False, True])
 def test_wrong_columns_are_said(name: str, ahead: bool) -> None:
-    of_command, of_position, swapped = WRONG[name]
+    of_command, of_position = WRONG[name]
     x_d, x = of_command * commanded()[:4000], of_position * measured(0)[:4000]
-    x_d, x = (x, x_d) if swapped else (x_d, x)
     if ahead:  # commands come a look-ahead of 100 samples before
         x_d, x = x_d[100:], x[:-100]
     said = [one.name for one in found(x_d, x, ahead=ahead)]
@@ -48,7 +41,7 @@ def test_wrong_columns_are_said(name: str, ahead: bool) -> None:
 def test_an_axis_that_rests_is_said_and_a_few_samples_are_not_judged() -> None:
     rest = np.full(20_000, commanded()[0])
     [finding] = found(rest, rest)
-    assert "the command never moves" in finding.words
+    assert finding.name == "no motion"
     assert found(commanded()[:400], -measured(0)[:400]) == []
     x_d, x = commanded()[:4000], measured(0)[:4000]
     assert [one.name for one in found(np.r_[rest, x_d], np.r_[rest, -x])] == ["sign"]
