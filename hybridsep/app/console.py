@@ -26,7 +26,7 @@ from ..base.metrics import shown_figure
 if TYPE_CHECKING:
     from ..cosim.run import Run
     from ..evaluate.verdict import Verdict
-    from ..logs.source import Channel
+    from ..logs.columns import Channel
     from ..logs.units import Shown
     from ..machines.machine import Machine
 
@@ -211,6 +211,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     """
     from ..logs.columns import channels
     from ..logs.formats import open_source
+    from ..logs.names import guesses
 
     found = {str(path): channels(open_source(path)) for path in logs}
     if as_json:
@@ -224,7 +225,8 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
         missing = [role for role in _ROLES if role != "t" and role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):
             words = " and ".join(_ROLES[role] for role in missing)
-            options = " ".join(f"--{role} NAME" for role in missing)
+            meant = guesses([one.name for one in listed], missing)
+            options = " ".join(f"--{role} {shlex.quote(name) if name else 'NAME'}" for role, name in meant)
             console.print(
                 f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}",
                 soft_wrap=True,

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
 from .names import ROLES, axes_of, guesses, known_names
-from .source import ArraysSource, Channel, Source
+from .source import ArraysSource, Source
 from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
@@ -238,12 +238,32 @@ def _position(source: Source, name: str, given: str | None) -> Column:
     return Column(name, chosen or POSITION_UNITS["m"], chosen is not None)
 
 
-def channels(source: Source) -> list[Channel]:
-    """Return a file's columns with what it states of them, and what reading it tells of what it does not.
+@dataclass(frozen=True)
+class Channel:
+    """Column of a file, as it is listed.
 
-    Samples are counted, and the interval is the mean of the times, s, where a column is the time. What is read without
-    a word of the user's has a role.
+    Attributes
+    ----------
+    name : str
+    unit : str
+        As the file states it, or the format's convention; empty if there is none.
+    role : str
+        What it is read as without a word of the user's, ``"t"``, ``"x_d"`` or ``"x"``; empty otherwise.
+    n_samples : int, optional
+        None where it cannot be read.
+    interval : float, s, optional
+        Mean of its times' intervals, where it has times.
     """
+
+    name: str
+    unit: str = ""
+    role: str = ""
+    n_samples: int | None = None
+    interval: float | None = None
+
+
+def channels(source: Source) -> list[Channel]:
+    """Return a file's columns with their units, roles, samples and intervals, as far as they can be told."""
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
         roles.update((name, role) for role, name in _positions(source, {}, None)[0].items())
@@ -262,22 +282,14 @@ def channels(source: Source) -> list[Channel]:
 
     # The rows of a text are counted by one column for all
     probe = t or next((name for name in source.names if not whole and extent(name)[0] is not None), None)
-    completed = []
-    for one in source.channels():
-        clock = source.times.get(one.name) or (one.name if one.name in clocks or whole else probe)
-        n, interval = extent(clock)
+    units = {**source.assumed_units, **source.units}
+    found = []
+    for name in source.names:
+        n, interval = extent(source.times.get(name) or (name if name in clocks or whole else probe))
         if interval is None and t is not None and extent(t)[0] == n:
             interval = extent(t)[1]
-        completed.append(
-            Channel(
-                one.name,
-                unit=one.unit or stated_unit(one.name)[1],
-                role=one.role or roles.get(one.name, ""),
-                n_samples=n if one.n_samples is None else one.n_samples,
-                interval=interval if one.interval is None else one.interval,
-            )
-        )
-    return completed
+        found.append(Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, ""), n, interval))
+    return found
 
 
 def _extent(source: Source, name: str, *, is_time: bool) -> tuple[int | None, float | None]:

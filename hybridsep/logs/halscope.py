@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .source import Block, Channel, Source, line_number
+from .source import Block, Source, line_number
 from .text import TextSource, bounded_lines, decimal_points, is_number, split, with_own_names
 
 __all__ = ["HalscopeCsvSource", "HalscopePairsSource"]
@@ -55,10 +55,6 @@ class _HalscopeSource(Source):
                     self.axes.setdefault(joint, (name, f"{joint}.{measured}"))
         self.roles = {"t": _TIME}
         self.remarks = [_UNIT]
-
-    def channels(self) -> list[Channel]:
-        """Return the columns with what the file says of them."""
-        return [replace(one, interval=self._period) for one in super().channels()]
 
     def _times(self, n: int) -> Array:
         return self._period * np.arange(n, dtype=np.float64)

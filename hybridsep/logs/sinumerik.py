@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .source import N_COLUMNS, ArraysSource, Channel, check_declared
+from .source import N_COLUMNS, ArraysSource, check_declared
 from .text import is_number
 
 __all__ = ["SinumerikSource"]
@@ -132,14 +132,6 @@ class SinumerikSource(ArraysSource):
     def recognises(head: bytes) -> bool:
         """Return whether it is XML with a trace session near its beginning."""
         return head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") and _ROOT in head
-
-    def channels(self) -> list[Channel]:
-        """Return the columns with what the file says of them."""
-        known = self._signals
-        return [
-            replace(one, n_samples=known[one.name].n, interval=known[one.name].interval) if one.name in known else one
-            for one in super().channels()
-        ]
 
     def column(self, name: str) -> Array:
         """Return the times of a clock, or a signal's values, each held until the next one."""

@@ -18,7 +18,6 @@ __all__ = [
     "N_COLUMNS",
     "ArraysSource",
     "Block",
-    "Channel",
     "Source",
     "check_column",
     "check_declared",
@@ -49,30 +48,6 @@ class Block:
 
     columns: list[Array]
     where: Callable[[int], str]
-
-
-@dataclass(frozen=True)
-class Channel:
-    """Column of a file, as it is listed.
-
-    Attributes
-    ----------
-    name : str
-    unit : str
-        As the file states it, or the format's convention; empty if there is none.
-    role : str
-        What the format itself has it for, one of ``"t"``, ``"x_d"`` and ``"x"``; empty otherwise.
-    n_samples : int, optional
-        None where the file would have to be read to count them.
-    interval : float, s, optional
-        Between its samples, where the file states it.
-    """
-
-    name: str
-    unit: str = ""
-    role: str = ""
-    n_samples: int | None = None
-    interval: float | None = None
 
 
 class Source(ABC):
@@ -137,12 +112,6 @@ class Source(ABC):
     def read(self, names: Sequence[str]) -> Block:
         """Return the columns ``names``; LogError if they cannot be read, or differ in length."""
 
-    def channels(self) -> list[Channel]:
-        """Return the columns with what the file says of them."""
-        roles = {name: role for role, name in self.roles.items()}
-        units = {**self.assumed_units, **self.units}
-        return [Channel(name, units.get(name, ""), roles.get(name, "")) for name in self.names]
-
     def notes(self) -> list[str]:
         """Return what the last pass over the file left out or filled."""
         return []
@@ -189,6 +158,6 @@ def check_declared(path: Path, n_bytes: int) -> None:
     size = path.stat().st_size
     if n_bytes > max(_SMALL, _COMPRESSION_MAX * size):
         raise LogError(
-            f"{path}: declares {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
+            f"{path}: has {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
             "the memory; save the log again, without compression"
         )

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
-from .source import Block, Source, line_number
+from .source import Block, Source, check_declared, line_number
 from .timestamps import CELL, Clock, cell, stamp_kind
 from .units import plain_name, position_unit, time_unit
 
@@ -139,7 +139,7 @@ class TextSource(Source):
             for i in use
             if i in self._table.clocks
         }
-        line = self._table.first - 1
+        line, size = self._table.first - 1, 0
         self._left_out, self._held, self._last = [], 0, math.nan
         parts, numbers = [], []
         try:
@@ -148,6 +148,8 @@ class TextSource(Source):
                 while lines := list(islice(rest, _BLOCK)):
                     numbered = [one for one in enumerate(lines, line + 1) if not self._is_skipped(*one)]
                     line += len(lines)
+                    size += sum(map(len, lines))
+                    check_declared(self.path, size)  # gzip packs a text of zeros a thousand times
                     if numbered:
                         parts.append(self._block(numbered, use, clocks))
                         numbers.append(np.array([number for number, _ in numbered]))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
-from .source import ArraysSource, Channel
+from .source import ArraysSource
 from .text import bounded_lines, decimal_points, is_number
 
 __all__ = ["TwinCatSource"]
@@ -79,10 +79,6 @@ class TwinCatSource(ArraysSource):
         mark = first[len(_NAME) : len(_NAME) + 1]
         begin = _NAME.encode() + mark
         return first.startswith(begin) and mark in _MARKS and b"\n" + begin in b"\n" + rest
-
-    def channels(self) -> list[Channel]:
-        """Return the columns with what the file says of them."""
-        return [replace(one, interval=self._intervals.get(one.name)) for one in super().channels()]
 
     def _channels(self, first: tuple[int, list[str]]) -> dict[str, _Place]:
         """Return the columns by name, times among them; set what is known of them."""

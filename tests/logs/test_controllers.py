@@ -110,7 +110,7 @@ def test_damaged_traces(tmp_path: Path, before: str, after: str, message: str) -
 def test_a_trace_that_fills_the_memory(tmp_path: Path) -> None:
     """Values are held between records: an interval of 10 ns makes 40 million of 0.4 s."""
     text = trace_xml(SIGNALS).replace('interval="0.001000"', 'interval="1e-8"').replace('Count="400"', 'Count="1e9"')
-    with pytest.raises(LogError, match=r"declares 957600024 bytes of values in a file of \d+: "):
+    with pytest.raises(LogError, match=r"has 957600024 bytes of values in a file of \d+: "):
         read_log(trace(tmp_path / "log", text))
 
 

@@ -106,6 +106,17 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path: Path) -> None:
         read_log(path)
 
 
+def test_a_text_that_fills_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten megabytes of zeros in ten kilobytes."""
+    monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(b"t,x_d,x\n" + b"0,0,0\n" * 1_700_000))
+    with pytest.raises(
+        LogError, match=r"has \d{7} bytes of values in a file of \d{5}: is truncated, damaged or made to"
+    ):
+        read_log(path)
+
+
 @pytest.mark.parametrize("nothing", ["", "nan", "NaN"])
 def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
     path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n1,3,{nothing}\n2,5,6\n")
