@@ -90,7 +90,7 @@ def backtest(
     states = [path for path in saved if path.suffix.lower() == ".state"]
     predictions = [path for path in saved if path not in states]
     with progress_bar(as_json) as advance:
-        replayed = replay_log(predictor, read, progress=advance)
+        replayed = replay_log(predictor, read, advance)
         for path in predictions:
             replayed.run.save(path)
         if figure is not None:

@@ -63,15 +63,6 @@ class Score:
         """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
         return reduction_percent(self.rms_h, self.rms_pb)
 
-    def rms_without(self, n: int, rms: Sequence[float]) -> list[float]:
-        """Return the RMS of physics model, hold and hybrid without ``n`` of the samples, which have ``rms``, m."""
-        left = self.n_samples - n
-        pairs = zip((self.rms_pb, self.rms_hold, self.rms_h), rms, strict=True)
-        return [
-            math.sqrt(max(self.n_samples * own**2 - n * other**2, 0.0) / left) if left > 0 else math.nan
-            for own, other in pairs
-        ]
-
     @classmethod
     def of(cls, errors: RunningErrors) -> Score:
         """Return the score of the errors of physics model, hold baseline and hybrid."""

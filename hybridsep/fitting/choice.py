@@ -6,8 +6,9 @@ best of all, so ``Np`` is the controller's look-ahead and is never chosen.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,12 +21,10 @@ from .replay import Recording, Replay, replay
 
 __all__ = [
     "WORTH",
-    "Choice",
-    "Tried",
-    "WindowScore",
     "choose_settings",
     "settings_for",
     "settings_to_try",
+    "trained_rms",
     "window_scores",
     "window_sizes",
     "with_window",
@@ -42,54 +41,6 @@ _Q = (1,)
 
 _WINDOWS = (0.2, 0.5, 1.0, 2.0)
 """Lengths of window over which the error is shown, relative to the controller's."""
-
-
-@dataclass(frozen=True)
-class Tried:
-    """Settings that were tried.
-
-    Attributes
-    ----------
-    settings : PredictorSettings
-    rms_h : float
-        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The earlier
-        half shows which learns fastest, but machines run warm.
-    """
-
-    settings: PredictorSettings
-    rms_h: float
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Chosen settings.
-
-    Attributes
-    ----------
-    settings : PredictorSettings
-    tried : tuple of Tried
-        All that was tried, the default first.
-    """
-
-    settings: PredictorSettings
-    tried: tuple[Tried, ...]
-
-
-@dataclass(frozen=True)
-class WindowScore:
-    """Errors with another look-ahead window.
-
-    Attributes
-    ----------
-    Np : int
-    rms_pb, rms_hold, rms_h : float
-        RMS over the test samples, m; of the physics model with its offset.
-    """
-
-    Np: int
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
 
 
 def settings_for(Np: int, T_s: float, input_hold: str) -> PredictorSettings:
@@ -117,7 +68,7 @@ def choose_settings(
     recordings: Sequence[Recording],
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
-) -> Choice:
+) -> tuple[PredictorSettings, dict[PredictorSettings, float]]:
     """Return the settings with the least error of causal replays over the training samples.
 
     Parameters
@@ -129,22 +80,30 @@ def choose_settings(
         The default, which stays unless others are better by 5 %.
     progress : callable, optional
         Called with the fraction done.
+
+    Returns
+    -------
+    chosen : PredictorSettings
+    tried : dict
+        All that was tried, the default first → :func:`trained_rms`, infinite where the prediction diverged.
     """
-    tried: list[Tried] = []
-    candidates = settings_to_try(settings)
+    candidates, tried = settings_to_try(settings), {}
     for i, candidate in enumerate(candidates):
-        tried.append(Tried(candidate, _train_rms(model, candidate, recordings)))
+        try:
+            tried[candidate] = trained_rms(model, candidate, recordings)
+        except SignalError:  # it diverges
+            tried[candidate] = math.inf
         progress((i + 1) / len(candidates))
-    best = min(tried, key=lambda one: one.rms_h)
-    chosen = best if best.rms_h < (1.0 - WORTH) * tried[0].rms_h else tried[0]
-    return Choice(chosen.settings, tuple(tried))
+    best = min(candidates, key=lambda one: tried[one])
+    return (best if tried[best] < (1.0 - WORTH) * tried[settings] else settings), tried
 
 
-def _train_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
-    try:
-        errors = replay(HybridPredictor(model, settings), recordings, training=True).errors(training=True)[2]
-    except SignalError:  # it diverges
-        return float("inf")
+def trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
+    """Return the RMS of the hybrid's error over the later half of the training samples, m.
+
+    The earlier half shows which learns fastest, but machines run warm.
+    """
+    errors = replay(HybridPredictor(model, settings), recordings, training=True).errors(training=True)[2]
     later = errors[len(errors) // 2 :]
     return rms(later[~np.isnan(later)])
 
@@ -161,7 +120,7 @@ def window_scores(
     judged: Replay,
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
-) -> tuple[WindowScore, ...]:
+) -> dict[int, list[float]]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
 
     Parameters
@@ -170,13 +129,18 @@ def window_scores(
         As for :func:`choose_settings`.
     judged : Replay
         With the controller's window.
+
+    Returns
+    -------
+    dict
+        ``Np`` → RMS of physics model, hold and hybrid over the test samples, m.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
-    scores = []
+    scores = {}
     for i, Np in enumerate(sizes):
         found = judged
         if Np != settings.Np:
             found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
-        scores.append(WindowScore(Np, *replace(found, offset=judged.offset).rms()))
+        scores[Np] = replace(found, offset=judged.offset).rms()
         progress((i + 1) / len(sizes))
-    return tuple(scores)
+    return scores

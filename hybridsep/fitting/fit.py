@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.data_files import COMMANDS
 from ..base.errors import FmuError, IdentificationError, ParameterError
-from ..base.metrics import rms_ratio, shown_figure
+from ..base.metrics import rms_ratio
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
@@ -37,14 +37,11 @@ from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
 from .choice import choose_settings, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, estimated_limits, expected_tracking
-from .period import period_hint
+from .period import period_finding
 from .plant import commands_to_try, identified_plant, plant_words
 from .replay import Recording, Replay, around_the_split, replay, split_log
 
-__all__ = ["REPEATS", "SAMPLES_MAX", "Fit", "FitOptions", "fit", "fit_files", "sha256_of", "step_times"]
-
-REPEATS = "the residual repeats every"
-"""Beginning of the finding that a period would help, which names its option."""
+__all__ = ["SAMPLES_MAX", "Fit", "FitOptions", "fit", "fit_files", "sha256_of", "step_times"]
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -212,19 +209,18 @@ def fit(
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
     progress("look for what repeats with the position", 0.33)
-    found["findings"] = [*found["findings"], *_repeats(model, recordings, default, logs[0])]
+    found["findings"] = [*found["findings"], *period_finding(model, recordings, default, logs[0].shown)]
     tried = around_the_split(recordings, _TRIED_MAX)
-    chosen = choose_settings(model, tried, default, within(0.35, 0.6, "choose p and q"))
-    settings = chosen.settings
+    settings, errors = choose_settings(model, tried, default, within(0.35, 0.6, "choose p and q"))
     choice = [
-        {"p": one.settings.p, "q": one.settings.q, "rms_h": _known(one.rms_h), "chosen": one.settings == settings}
-        for one in chosen.tried
+        {"p": one.p, "q": one.q, "rms_h": _known(rms_h), "chosen": one == settings} for one, rms_h in errors.items()
     ]
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=within(0.6, 0.65, "judge on the second half"))
     judged = replace(replayed, offset=found["offset"]).with_peers(within(0.65, 0.68, "peers on the second half"))
     over_windows = window_scores(model, tried, judged, settings, within(0.68, 0.8, "error over Np"))
-    windows = [{name: _known(value) for name, value in asdict(one).items()} for one in over_windows]
+    names = ("rms_pb", "rms_hold", "rms_h")
+    windows = [{"Np": size, **dict(zip(names, map(_known, rms), strict=True))} for size, rms in over_windows.items()]
     progress("a plant to try with", 0.8)
     plant = identified_plant(model, settings, tried)
     limits: dict[str, Any] = dict(options.drive_limits)
@@ -305,20 +301,6 @@ def _identified(
 def _known(value: Any) -> Any:
     """Return a value for JSON: None for a figure that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, log: Log) -> list[str]:
-    """Return the finding that the residual repeats with the position, where it does and no period is given."""
-    hint = period_hint(model, recordings, settings) if settings.period == 0.0 else None
-    if hint is None:
-        return []
-    factor, position = log.shown.position
-    scale, unit = log.shown.error(hint.rms_without)
-    before, after = shown_figure(scale * hint.rms_without), shown_figure(scale * hint.rms_with)
-    return [
-        f"{REPEATS} {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
-        f"error would go from {before} to {after} {unit}, by replays of the training half"
-    ]
 
 
 def _machine(

@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import numpy as np
-
-from ..base.metrics import rms
+from ..base.metrics import shown_figure
 from ..base.settings import PredictorSettings
 from ..identify.output_error import in_time
 from ..identify.periodic import residual_period
+from ..logs.units import Shown
 from ..model.physics import ModalModel
-from ..predict.predictor import HybridPredictor
-from .replay import Recording, replay
+from .choice import trained_rms
+from .replay import Recording
 
-__all__ = ["PeriodHint", "period_hint"]
+__all__ = ["REPEATS", "period_finding"]
+
+REPEATS = "the residual repeats every"
+"""Beginning of the finding that a period would help, which names its option."""
 
 _GAIN = 0.9
 """Ratio of the errors with and without the period below which it is worth a hint."""
 
 
-@dataclass(frozen=True)
-class PeriodHint:
-    """Period of the residual over the position.
+def period_finding(
+    model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, shown: Shown
+) -> list[str]:
+    """Return that the residual repeats with the position, from the training samples, in words.
 
-    Attributes
-    ----------
-    period : float, m
-    rms_without, rms_with : float
-        RMS of the hybrid over the later half of the training samples, m, by causal replays.
-    """
-
-    period: float
-    rms_without: float
-    rms_with: float
-
-
-def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings) -> PeriodHint | None:
-    """Return the hint, from the training samples; None where nothing repeats, or the predictor gains little.
+    Empty where a period is given, nothing repeats, or the predictor gains little by it.
 
     Parameters
     ----------
@@ -46,16 +36,22 @@ def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: Pr
         ``G_pb``.
     recordings : sequence of Recording
     settings : PredictorSettings
-        Without a period.
+    shown : Shown
+        Units of the words.
     """
     late = settings.n_late
     training = [in_time(*one.training, late) for one in recordings if one.n_train > late + 1]
-    period = residual_period(training, model, settings.T_s, settings.input_hold) if training else 0.0
+    if settings.period or not training:
+        return []
+    period = residual_period(training, model, settings.T_s, settings.input_hold)
     if period == 0.0 or period > PredictorSettings.parameters()["period"].maximum:
-        return None
-    errors = []
-    for tried in (settings, replace(settings, period=period)):
-        found = replay(HybridPredictor(model, tried), recordings, training=True).errors(training=True)[2]
-        later = found[len(found) // 2 :]
-        errors.append(rms(later[~np.isnan(later)]))
-    return PeriodHint(period, *errors) if errors[1] < _GAIN * errors[0] else None
+        return []
+    without, with_it = (trained_rms(model, one, recordings) for one in (settings, replace(settings, period=period)))
+    if not with_it < _GAIN * without:
+        return []
+    factor, position = shown.position
+    scale, unit = shown.error(without)
+    return [
+        f"{REPEATS} {factor * period:.6g} {position}: with --period {period:g} the hybrid's error would go from "
+        f"{shown_figure(scale * without)} to {shown_figure(scale * with_it)} {unit}, by replays of the training half"
+    ]

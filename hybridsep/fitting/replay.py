@@ -225,10 +225,7 @@ class Replay:
 
     def horizon(self) -> Array:
         """Return the RMS of each prediction at each sample of the window, judged, ``(3, Np)``, m; NaN without any."""
-        place = self._parts(
-            [np.arange(len(recording.x), dtype=np.float64) % self.Np for recording in self.recordings], False
-        )
-        errors = self.errors()
+        place, errors = self._place(), self.errors()
         found = np.full((3, self.Np), np.nan)
         for i in range(self.Np):
             at = errors[:, (place == i) & ~np.isnan(errors[0])]
@@ -236,11 +233,13 @@ class Replay:
                 found[:, i] = np.sqrt(np.mean(at**2, axis=1))
         return found
 
+    def _place(self) -> Array:
+        """Return the number of each test sample in its window, ``(n,)``."""
+        return self._parts([np.arange(len(one.x), dtype=np.float64) % self.Np for one in self.recordings], False)
+
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
-        place = self._parts(
-            [np.arange(len(recording.x), dtype=np.float64) % self.Np for recording in self.recordings], False
-        )
+        place = self._place()
         return [_rms(one.errors[place < n]) for one in self.scored()]
 
     def window_errors(self) -> tuple[Indices, Array]:
@@ -366,8 +365,6 @@ class LogReplay:
     Attributes
     ----------
     scores : Backtest
-    first : Batch
-        The first window.
     batches : list of (t, rms_pb, rms_hold, rms_h), s and m
         Of each window.
     judged : Replay
@@ -377,7 +374,6 @@ class LogReplay:
     """
 
     scores: Backtest
-    first: Batch
     batches: list[tuple[float, ...]]
     judged: Replay
     run: Run
@@ -385,8 +381,7 @@ class LogReplay:
     @cached_property
     def verdict(self) -> Verdict:
         """Verdict with all that was compared."""
-        own = self.scores.verdict
-        found = self.judged.verdict()
+        own, found = self.scores.verdict, self.judged.verdict()
         return replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples)
 
     @cached_property
@@ -404,7 +399,7 @@ class LogReplay:
         found: dict[str, float | int | str] = dict(self.scores.summary())
         active = self.scores.active
         for suffix, counted in (("", np.ones(len(active), np.bool_)), ("_after_warm_up", active)):
-            for quantity, figure in (("rms", rms), ("max", largest)):
+            for quantity, figure in (("rms", _rms), ("max", largest)):
                 for name, one in self._of_peers.items():
                     known = one.errors[counted & ~np.isnan(one.errors)]
                     value = 1e6 * figure(known) if known.size else math.nan
@@ -415,39 +410,19 @@ class LogReplay:
         """Return the RMS errors from the second window on by name, m; empty where there is one window."""
         if self.scores.n_batches < 2:
             return {}
-        first = self.first
-        n = int(np.count_nonzero(~np.isnan(first.x)))
-        rest = self.scores.overall.rms_without(n, (first.rms_pb, first.rms_hold, first.rms_h))
-        found = dict(zip(("pb", "hold", "h"), rest, strict=True))
-        errors = {name: one.errors[len(first.x) :] for name, one in self._of_peers.items() if not one.diverged}
-        return found | {name: _rms(one) for name, one in errors.items() if not np.isnan(one).all()}
+        first = min(self.judged.Np, len(self.judged.recordings[0].x))
+        errors = dict(zip(("pb", "hold", "h"), self.judged.errors(), strict=True))
+        errors |= {name: one.errors for name, one in self._of_peers.items() if not one.diverged}
+        found = {name: _rms(one[first:]) for name, one in errors.items()}
+        return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
-def replay_log(
-    predictor: HybridPredictor, log: Log, *, progress: Callable[[str, float], object] = lambda _message, _done: None
-) -> LogReplay:
-    """Replay a log.
-
-    Parameters
-    ----------
-    predictor : HybridPredictor
-        It learns the log on the way.
-    log : Log
-    progress : callable, optional
-        Called with a message and the fraction done.
-
-    Raises
-    ------
-    SignalError
-        If a prediction diverges.
-    """
+def replay_log(predictor: HybridPredictor, log: Log, progress: Callable[[str, float], object]) -> LogReplay:
+    """Replay a log with a predictor, which learns it on the way; SignalError if a prediction diverges."""
     rows: list[tuple[float, ...]] = []
-    first: list[Batch] = []
 
     def on_batch(batch: Batch) -> None:
         rows.append((round(batch.k * log.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
-        if batch.j == 0:
-            first.append(batch)
         progress("replay", 0.8 * batch.k / len(log.t))
 
     found = backtest(predictor, log.x_d, log.x_meas, starts=log.starts, on_batch=on_batch)
@@ -456,4 +431,4 @@ def replay_log(
     judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, delay)
     judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
-    return LogReplay(found, first[0], rows, judged, run)
+    return LogReplay(found, rows, judged, run)

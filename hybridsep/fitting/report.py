@@ -23,7 +23,8 @@ from ..logs.units import Shown
 from .advice import Judged, extent, peers_in_words, recommendation
 from .choice import WORTH
 from .compensation import write_tracking
-from .fit import REPEATS, Fit
+from .fit import Fit
+from .period import REPEATS
 
 __all__ = [
     "COLOURS",
