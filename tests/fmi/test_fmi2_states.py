@@ -107,28 +107,6 @@ def test_an_importer_that_runs_out_of_memory_keeps_what_it_has(fmu: Library) -> 
     fmu.FreeInstance(component)
 
 
-@pytest.mark.slow
-def test_damaged_truncated_and_foreign_states_are_refused(fmu: Library, folders: Callable[[str], Path]) -> None:
-    component = component_in(fmu, "stepping")
-    steps(fmu, component, 0, 230)
-    block = fmu.save(component)
-    before = fmu.reals(component)
-    for place in (*range(130), *range(130, len(block), 487)):
-        damaged = bytearray(block)
-        damaged[place] ^= 0x10
-        assert fmu.restore(component, bytes(damaged)) == ERROR
-    for length in (0, 1, 119, 120, 500, len(block) - 1):
-        assert fmu.restore(component, block[:length]) == ERROR
-    assert fmu.restore(component, block + b"\0") == ERROR
-    other = library_of(folders("HybridPredictor_als25010_x"))
-    theirs = other.instantiate()
-    assert fmu.restore(component, other.save(theirs)) == ERROR
-    other.FreeInstance(theirs)
-    assert fmu.reals(component) == before
-    assert fmu.restore(component, block) == OK
-    fmu.FreeInstance(component)
-
-
 def test_a_changed_state_with_a_right_checksum_is_checked_by_the_model(fmu: Library) -> None:
     component = component_in(fmu, "stepping")
     block = bytearray(fmu.save(component))

@@ -42,32 +42,6 @@ def test_a_refused_call_sets_nothing(fmu: Library) -> None:
     fmu.FreeInstance(component)
 
 
-def test_outputs_follow_the_start_value_before_and_after_the_initialization(fmu: Library) -> None:
-    component = component_in(fmu, "instantiated")
-    assert fmu.set(component, "x_d_ahead", 0.1) == OK
-    for name in ("EnterInitializationMode", "ExitInitializationMode"):
-        assert getattr(fmu, name)(component) == OK
-        assert [fmu.get(component, name) for name in ("x_d", "x_pb", "x_h", "x_h_window[100]")] == [0.1] * 4
-        assert [fmu.get(component, name) for name in ("e_servo", "rms_h", "batch", "hybrid_active")] == [0] * 4
-    fmu.FreeInstance(component)
-
-
-@pytest.mark.parametrize("start", [math.inf, math.nan, 1e308, -1001.0])
-def test_no_output_is_read_before_the_command_starts_at_a_position(fmu: Library, start: float) -> None:
-    component = component_in(fmu, "Initialization Mode")
-    assert fmu.set(component, "x_d_ahead", start) == OK
-    for name in ("x_d", "x_pb", "x_h", "x_h_window[1]", "batch", "hybrid_active"):
-        with pytest.raises(
-            RuntimeError, match=rf"{re.escape(name)} is not known yet: the start value of x_d_ahead must"
-        ):
-            fmu.get(component, name)
-    assert repr(fmu.get(component, "x_d_ahead")) == repr(start)
-    assert fmu.get(component, "Np") == 100
-    assert fmu.set(component, "x_d_ahead", 0.25) == OK
-    assert fmu.get(component, "x_h") == 0.25
-    fmu.FreeInstance(component)
-
-
 def test_bad_parameters_are_named_and_can_be_corrected(fmu: Library) -> None:
     component = component_in(fmu, "Initialization Mode")
     fmu.set(component, "p", 120)

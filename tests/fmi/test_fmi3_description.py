@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import zipfile
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +11,7 @@ from xml.etree import ElementTree as ET
 import fmpy
 import pytest
 from built_once import FMI3, NATIVE, BuiltFmus, each_kind
-from fmi3_rules import RULES, Archive, violations
+from fmi3_rules import Archive, violations
 from fmpy.validation import validate_fmu
 
 from hybridsep.base.data_files import data_folder
@@ -155,127 +154,3 @@ def test_a_rotary_axis_keeps_the_rules(tmp_path: Path) -> None:
 
 
 X_H, TYPE = ".//*[@name='x_h']", "TypeDefinitions/EnumerationType"
-DAMAGES: dict[str, list[tuple[str, str, Any]]] = {
-    "model_types": [
-        ("model", "CoSimulation", {"modelIdentifier": "a-b"}),
-        ("model", "CoSimulation", {"canReturnEarlyAfterIntermediateUpdate": "true"}),
-        ("model", "CoSimulation", {"canGetAndSetFMUState": "false"}),
-        ("model", "ModelVariables", "+Clock"),
-        ("model", ".", {"instantiationToken": " "}),
-        ("model", ".", "-CoSimulation"),
-    ],
-    "shared_with_fmi_2": [
-        ("model", "UnitDefinitions", "+Unit"),
-        ("model", "LogCategories", "+Category"),
-        ("model", "DefaultExperiment", {"stepSize": "0"}),
-        ("model", "DefaultExperiment", {"stopTime": "-1"}),
-    ],
-    "type_definitions": [
-        ("model", "TypeDefinitions", "+EnumerationType"),
-        ("model", TYPE, {"name": "input_hold"}),
-        ("model", f"{TYPE}/Item", {"value": "1"}),
-        ("model", f"{TYPE}/Item", {"name": "foh"}),
-    ],
-    "declared_types": [
-        ("model", ".//*[@name='input_hold']", {"declaredType": "Hold"}),
-        ("model", ".//*[@name='input_hold']", {"declaredType": None}),
-        ("model", X_H, {"declaredType": "InputHold"}),
-    ],
-    "unit_references": [
-        ("model", X_H, {"unit": "mile"}),
-        ("model", X_H, {"displayUnit": "ms"}),
-        ("model", X_H, {"unit": None}),
-    ],
-    "variable_names": [
-        ("model", X_H, {"name": "x_pb"}),
-        ("model", X_H, {"name": "x h"}),
-        ("model", ".//*[@name='batch']", {"name": "der(batch)"}),
-    ],
-    "value_references": [("model", X_H, {"valueReference": "1"})],
-    "combinations": [
-        ("model", ".//*[@name='time']", {"causality": "local"}),
-        ("model", X_H, {"causality": "independent", "variability": "continuous", "initial": None}),
-        ("model", X_H, {"variability": "fixed"}),
-        ("model", X_H, {"initial": "exact"}),
-        ("model", X_H, {"start": "0"}),
-        ("model", ".//*[@name='time']", {"start": "0"}),
-        ("model", ".//*[@name='x_meas']", {"start": None}),
-        ("model", ".//*[@name='x_meas']", {"initial": "exact"}),
-        ("model", ".//*[@name='batch']", {"variability": "continuous"}),
-        ("model", ".//*[@name='Np']", {"variability": "discrete"}),
-    ],
-    "ranges": [
-        ("model", ".//*[@name='Np']", {"start": "0"}),
-        ("model", ".//*[@name='Np']", {"min": "5", "max": "4"}),
-        ("model", ".//*[@name='Np']", {"max": "3000000000"}),
-        ("model", ".//*[@name='lambda']", {"start": "1e13"}),
-        ("model", ".//*[@name='input_hold']", {"start": "2"}),
-        ("model", X_H, {"nominal": "0"}),
-    ],
-    "dimensions": [
-        ("model", ".//*[@name='x_h_window']/Dimension", {"valueReference": "2"}),
-        ("model", ".//*[@name='x_h_window']/Dimension", {"start": None}),
-        ("model", ".//*[@name='x_h_window']/Dimension", {"start": None, "valueReference": "2"}),
-        ("model", ".//*[@name='x_h_window']/Dimension", {"start": "0"}),
-        ("model", ".//*[@name='x_h_window']", {"start": "0 0"}),
-    ],
-    "model_exchange_alone": [
-        ("model", X_H, {"reinit": "true"}),
-        ("model", ".//*[@name='x_meas']", {"canHandleMultipleSetPerTimeInstant": "true"}),
-    ],
-    "structure": [
-        ("model", "ModelStructure", "+Output"),
-        ("model", "ModelStructure", "-InitialUnknown"),
-        ("model", "ModelStructure/Output", {"valueReference": "0"}),
-        ("model", ".//*[@name='x_h_window']", {"causality": "output"}),
-    ],
-    "dependencies": [
-        ("model", "ModelStructure/Output", {"dependencies": "90000"}),
-        ("model", "ModelStructure/Output", {"dependencies": "1 1"}),
-        ("model", "ModelStructure/Output", {"dependencies": "3"}),
-        ("model", "ModelStructure/Output", {"dependencies": "1", "dependenciesKind": "dependent fixed"}),
-        ("model", "ModelStructure/InitialUnknown", {"dependencies": "3"}),
-    ],
-    "build_configuration": [
-        ("build", "BuildConfiguration", {"modelIdentifier": "Other"}),
-        ("build", "BuildConfiguration/SourceFileSet", "+SourceFile"),
-        ("build", "BuildConfiguration/SourceFileSet/SourceFile", {"name": "none.c"}),
-        ("build", "BuildConfiguration/SourceFileSet", {"compilerOptions": "-O1"}),
-    ],
-    "pictures": [
-        ("terminals", "GraphicalRepresentation/CoordinateSystem", {"x1": "100.0"}),
-        ("terminals", "GraphicalRepresentation/Icon", {"y1": "200.0"}),
-    ],
-    "terminals": [
-        ("terminals", "Terminals", "+Terminal"),
-        ("terminals", "Terminals/Terminal/TerminalMemberVariable", {"variableName": "other"}),
-        ("terminals", "Terminals/Terminal/TerminalMemberVariable", {"memberName": None}),
-        ("terminals", "Terminals/Terminal", "+TerminalMemberVariable"),
-    ],
-}
-"""By rule: a file, an element, and attributes to change (None: leave out), a child to double or add (``+``), or to
-remove (``-``)."""
-
-
-@pytest.mark.parametrize(("rule", "n"), [(rule, n) for rule, damages in DAMAGES.items() for n in range(len(damages))])
-def test_what_breaks_a_rule_is_found(fmus: BuiltFmus, rule: str, n: int) -> None:
-    archive = opened(fmus("HybridPredictorFmi3"))
-    file, place, change = DAMAGES[rule][n]
-    element = getattr(archive, file).find(place)
-    assert element is not None
-    if isinstance(change, str):
-        child = element.find(change[1:])
-        if change[0] == "+":
-            element.append(ET.Element(change[1:], name="added") if child is None else copy.deepcopy(child))
-        else:
-            assert child is not None
-            element.remove(child)
-    else:
-        for name, value in change.items():
-            element.attrib.pop(name, None)
-            element.attrib.update({} if value is None else {name: value})
-    assert [found for found in violations(archive) if found.startswith(f"{rule}: ")]
-
-
-def test_every_rule_is_broken_by_one_of_the_damages() -> None:
-    assert list(DAMAGES) == list(RULES)

@@ -199,21 +199,6 @@ def test_a_changed_state_with_a_right_checksum(kind: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("opening", [b"[", b'{"a":'])
-def test_a_header_that_is_nested_too_deeply(opening: bytes) -> None:
-    with pytest.raises(StateError, match="header that cannot be read"):
-        HybridPredictor.from_bytes(sealed(opening * 200_000, b""))
-
-
-@pytest.mark.slow
-def test_a_number_of_thousands_of_digits() -> None:
-    header, body = opened(predictor_state())
-    text = json.dumps(header).replace('"n_disturbances": 0', '"n_disturbances": ' + "9" * 5000).encode()
-    with pytest.raises(StateError):
-        HybridPredictor.from_bytes(sealed(text, body))
-
-
-@pytest.mark.slow
 def test_what_is_allocated_follows_from_the_size_of_the_state() -> None:
     header, body = opened(predictor_state())
     tracemalloc.start()

@@ -23,7 +23,7 @@ from hybridsep.fmi.spec import fmu_names
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.machines.paper import PAPER_SETTINGS
 from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.trajectory import spiral, staircase
+from hybridsep.plants.trajectory import staircase
 
 TOLERANCE = 1e-11  # m
 
@@ -70,109 +70,6 @@ def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus,
     run = cosimulate(*pair, command, controller_values=PAPER_SETTINGS[machine.name])
     assert_equal(run, reference(machine, command))
     assert run.summary()["reduction_percent"] > 50 or len(command) == 1500
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("predictor", "plant"),
-    [
-        ("native", "native"),
-        ("python", "python"),
-        pytest.param("native", "python", marks=pytest.mark.nightly),
-        pytest.param("python", "native", marks=pytest.mark.nightly),
-    ],
-)
-@pytest.mark.parametrize("axis", [0, pytest.param(1, marks=pytest.mark.nightly)])
-def test_every_pairing_agrees_with_the_library_on_the_spiral(
-    fmus: BuiltFmus, predictor: str, plant: str, axis: int
-) -> None:
-    machine = load_machine(f"als25010_{'xy'[axis]}")
-    names = [
-        next(n for n, m in fmu_names(machine, b).items() if m == model)
-        for b, model in ((predictor, "HybridPredictor"), (plant, "FeedDrive"))
-    ]
-    command = spiral()[axis][: None if predictor == plant == "native" else 1000]
-    values = PAPER_SETTINGS[machine.name]
-    run = cosimulate(fmus(names[0]), fmus(names[1]), command, controller_values=values)
-    assert_equal(run, reference(machine, command))
-
-
-PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
-
-TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
-
-"""Limits of the trajectory itself: most plans are bounded by them."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("machine", "values"),
-    [
-        pytest.param("", TIGHT, id="staircase, tight"),
-        pytest.param("_als25010_x", {}, id="spiral X"),
-        # suite/test_agreement.py compares each with the library
-        pytest.param("", {}, id="staircase", marks=pytest.mark.nightly),
-        pytest.param("", PAPER, id="staircase, paper", marks=pytest.mark.nightly),
-        pytest.param("_als25010_x", TIGHT, id="spiral X, tight", marks=pytest.mark.nightly),
-        pytest.param("_als25010_y", {}, id="spiral Y", marks=pytest.mark.nightly),
-    ],
-)
-def test_both_flavours_of_the_compensator_command_the_same(
-    fmus: BuiltFmus, machine: str, values: dict[str, float]
-) -> None:
-    command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:1250]
-    native, python = (
-        cosimulate(
-            fmus(f"SepCompensator{suffix}{machine}"), fmus(f"FeedDrive{machine}"), command, controller_values=values
-        )
-        for suffix in ("", "Py")
-    )
-    np.testing.assert_allclose(native.x_dm, python.x_dm, rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(native.state, python.state)
-    assert set(native.state) == {1, 2}
-    assert np.max(np.abs(native.change)) > 1e-5
-
-
-@pytest.mark.slow
-def test_another_start_and_start_time(fmus: BuiltFmus) -> None:
-    command = 0.1 + staircase()[:2001]
-    machine = load_machine("spring_mass_damper")
-    values = PAPER_SETTINGS[machine.name]
-    run = cosimulate(fmus("HybridPredictor"), fmus("FeedDrive"), command, controller_values=values, start_time=1234.5)
-    assert_equal(run, reference(machine, command))
-    assert run.t[0] == pytest.approx(1234.6)
-
-
-@pytest.mark.slow
-def test_the_whole_system_without_a_script(fmus: BuiltFmus) -> None:
-    """ReferenceTrajectory → HybridPredictor → FeedDrive give what the same system gives with commands from outside."""
-    expected = reference(load_machine("spring_mass_damper"), staircase())
-    rows = []
-    with (
-        FmuInstance(fmus("ReferenceTrajectory")) as source,
-        FmuInstance(fmus("HybridPredictor")) as predictor,
-        FmuInstance(fmus("FeedDrive")) as plant,
-    ):
-        for instance in (source, plant):
-            instance.initialise()
-        predictor.initialise(PAPER_SETTINGS["spring_mass_damper"])
-        for k in range(1300):
-            x_d, x_h, x_meas = predictor.get("x_d"), predictor.get("x_h"), plant.get("x_meas")
-            rows.append((x_d, x_h, x_meas))
-            predictor.set("x_d_ahead", source.get("r"))
-            predictor.set("x_meas", x_meas)
-            plant.set("x_d", x_d)
-            for instance in (source, predictor, plant):
-                instance.step(k * 1e-3, 1e-3)
-    for samples, name in zip(np.array(rows)[100:].T, ("x_d", "x_h", "x_meas"), strict=True):
-        np.testing.assert_allclose(samples, expected[name][:1200], rtol=0, atol=TOLERANCE, err_msg=name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [0, 1, 2])
-def test_the_trajectories(fmus: BuiltFmus, n: int) -> None:
-    command = (staircase(), *spiral())[n]
-    assert_played(fmus("ReferenceTrajectory"), n, command if n == 0 else command.round(11))
 
 
 @pytest.mark.slow
@@ -230,16 +127,3 @@ def test_the_default_step_of_an_importer_does_no_harm(fmus: BuiltFmus) -> None:
     )
     assert 9.9e-3 < default < 10.2e-3
     assert paper > 15e-3
-
-
-@pytest.mark.slow
-def test_the_description_names_the_papers_settings(fmus: BuiltFmus) -> None:
-    for name, settings in (
-        ("HybridPredictor", "; the paper's settings are trust = false, t_init = 0.3"),
-        ("HybridPredictorPy_emps", "; the paper's settings are trust = false, t_init = 1.242"),
-        ("SepCompensator", ""),
-    ):
-        description = fmpy.read_model_description(str(fmus(name)))
-        assert description.description.endswith(settings or "so that the drive follows it")
-        starts = {v.name: v.start for v in description.modelVariables}
-        assert (starts["trust"], float(starts["t_init"])) == ("true", -1.0)

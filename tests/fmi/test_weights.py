@@ -23,7 +23,7 @@ from spoiled_weights import sealed, spoiled
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.records import leaves, numbers_of
+from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
@@ -204,48 +204,6 @@ def trained_with_trust() -> HybridPredictor:
         predictor.predict(command)
         predictor.update(0.99 * command)
     return predictor
-
-
-@pytest.mark.slow
-def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
-    # Neither what fails the checksum nor, with another checksum, what has wrong numbers.
-    content = weights_file(trained_with_trust())
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
-    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
-    model, file = CModel("predictor", TRUST, tmp_path), tmp_path / WEIGHTS_FILE
-    first = 32 + 32 * len(learned_settings(predictor.settings, predictor.model))
-    body = content[:-8]
-    record = (predictor.residual.learned, predictor.state.uncertainty)
-    sizes = [np.size(leaf.value) for leaf in leaves(record)]
-    starts = first + 8 * (np.cumsum(sizes) - sizes)
-    places = {leaf.path: int(start) for leaf, start in zip(leaves(record), starts, strict=True)}
-    n_numbers = sum(sizes)
-    assert struct.unpack_from("<Q", body, 24) == (n_numbers,)
-    rows = first + 8 * n_numbers
-    noise, fastest, sound = places["0.errors.1.noise_variance"], places["0.fastest"], places["1.factor"]
-    correlations = [places[f"0.errors.{i}.correlation"] for i in range(4)]
-    nonsense = [
-        *(
-            body[:i] + struct.pack("<d", wrong) + body[i + 8 :]
-            for i in (rows, noise, fastest)
-            for wrong in (-1.0, np.nan)
-        ),
-        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in correlations),
-        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (places["1.theta"], sound)),
-        *(body[:24] + struct.pack("<Q", n) + body[32:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
-        body[:first] + body[first + 8 :],
-        body[:first] + bytes(8) + body[first:],
-    ]
-    for changed in (*mutations(content, share(2000)), *map(sealed, nonsense)):
-        with pytest.raises(StateError):
-            restore_weights(predictor, changed)
-        file.write_bytes(changed)
-        assert refusal(model.initialise)
-    assert predictor.regression.n_rows == 0.0
-    file.write_bytes(content)
-    model.initialise()
-    restore_weights(predictor, content)
-    assert weights_file(predictor) == content
 
 
 def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
