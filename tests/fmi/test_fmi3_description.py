@@ -151,6 +151,3 @@ def test_a_rotary_axis_keeps_the_rules(tmp_path: Path) -> None:
         assert xml.find("ModelVariables/Float64[@unit='rad']") is not None
         build, icons = ET.fromstring(build_description(name, "3")), ET.fromstring(terminals_and_icons(model))
         assert violations(Archive(xml, icons, build, [ICON_FILE, "sources/all.c"])) == []
-
-
-X_H, TYPE = ".//*[@name='x_h']", "TypeDefinitions/EnumerationType"
