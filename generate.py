@@ -22,7 +22,7 @@ from hybridsep.base.parameters import Parameter
 from hybridsep.base.records import leaves
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
 from hybridsep.compensate import newton, planning, qp, splines
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict import uncertainty
 from hybridsep.predict.averaging import experts, features, model, stacking, start
@@ -56,14 +56,14 @@ PLANS: Declared = {
 
 PLACES = (
     "HOLD",
-    "LAGGED",
+    "ARX_RESIDUAL",
     "STATIC",
-    "COMMAND",
-    "DOUBTING",
+    "ARX_COMMAND",
+    "FRESH_START",
     "N_EXPERTS",
     "N_JUDGED",
-    "OF_PHYSICS",
-    "OF_COMMAND",
+    "MODEL_RESIDUAL",
+    "COMMAND_RESIDUAL",
     "N_RESIDUALS",
     "N_DECIDED",
 )
@@ -86,9 +86,13 @@ def generated() -> dict[Path, str]:
 
 def settings_header() -> str:
     """Return the C header of the settings of predictor and compensator."""
-    lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("TRUST", TRUST_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
+    lists = (
+        ("PREDICTOR", PREDICTOR_SETTINGS),
+        ("AVERAGING", AVERAGING_SETTINGS),
+        ("COMPENSATOR", COMPENSATOR_SETTINGS),
+    )
     return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are hsep_word, those that may be negative hsep_signed. */
+ * Whole numbers, truth values and choices are hsep_int, those that may be negative hsep_signed. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
@@ -104,17 +108,17 @@ typedef struct {{
 }} hsep_predictor_settings;
 
 typedef struct {{
-    HSEP_TRUST_SETTINGS(HSEP_SETTING)
-}} hsep_trust_settings;
+    HSEP_AVERAGING_SETTINGS(HSEP_SETTING)
+}} hsep_averaging_settings;
 
 typedef struct {{
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 }} hsep_compensator_settings;
 
 /* Samples by which the measurement is late; 0 where it comes a sample early. */
-static inline hsep_word hsep_late(const hsep_predictor_settings *settings)
+static inline hsep_int hsep_late(const hsep_predictor_settings *settings)
 {{
-    return settings->measurement_delay > 0 ? (hsep_word)settings->measurement_delay : 0;
+    return settings->measurement_delay > 0 ? (hsep_int)settings->measurement_delay : 0;
 }}
 
 #endif
@@ -126,7 +130,7 @@ def ranges_header() -> str:
     modes = {name: PARAMETERS[name] for name in ("f_n", "zeta", "alpha", "beta")}
     lists = (
         ("PREDICTOR", PREDICTOR_SETTINGS),
-        ("TRUST", TRUST_SETTINGS),
+        ("AVERAGING", AVERAGING_SETTINGS),
         ("COMPENSATOR", COMPENSATOR_SETTINGS),
         ("MODE", modes),
     )
@@ -148,11 +152,11 @@ def ranges_header() -> str:
 def constants_header() -> str:
     """Return the C header of the constants of predictions, which the library declares with their reasons."""
     defines = _defines(PREDICTIONS)
-    trust = [f"#define HSEP_TRUST_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
-    defines.append("\n".join(["/* hybridsep/predict/averaging/constants.py */", *trust]))
+    averaging = [f"#define HSEP_AVERAGING_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
+    defines.append("\n".join(["/* hybridsep/predict/averaging/constants.py */", *averaging]))
     settings = PredictorSettings(period=1.0)
-    trusted = model.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
-    records = {"LEARNED": trusted.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
+    averaged = model.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
+    records = {"LEARNED": averaged.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
     ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
     defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
     return _constants("HSEP_PREDICT_CONSTANTS_H", "predictions and their errors", defines)
@@ -231,7 +235,7 @@ def _number(value: Any) -> str:
 
 
 def _c_type(parameter: Parameter) -> str:
-    return "hsep_real" if parameter.kind is float else "hsep_signed" if parameter.minimum < 0 else "hsep_word"
+    return "hsep_real" if parameter.kind is float else "hsep_signed" if parameter.minimum < 0 else "hsep_int"
 
 
 def _list(name: str, settings: Mapping[str, Parameter]) -> str:

@@ -1,4 +1,4 @@
-"""Predictor with trust in conditions that differ from a run at rest at 1 kHz with a sensor that does not lag.
+"""Predictor with averaging in conditions that differ from a run at rest at 1 kHz with a sensor that does not lag.
 
     python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 40]      (some minutes)
 
@@ -24,7 +24,7 @@ import numpy as np
 from random_drives.generator import SEED, random_drives
 from random_drives.simulation import simulate as simulate_many
 
-from benchmarks.trust import SEEDS, Case, cases, simulated
+from benchmarks.averaging import SEEDS, Case, cases, simulated
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
@@ -96,9 +96,9 @@ def print_ratios(title: str, ratios: Iterator[tuple[str, float, float]]) -> None
 
 
 def starts_in_motion(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
-    """Yield names, RMS errors with trust and of the physics model on runs cut in mid-motion."""
+    """Yield names, RMS errors with averaging and of the physics model on runs cut in mid-motion."""
     for case, cut in motions(emps, recordings, n):
-        settings = replace(case.settings, trust=True, t_init=-1.0)
+        settings = replace(case.settings, averaging=True, t_init=-1.0)
         found = backtest(HybridPredictor(case.model, settings), case.x_d[cut:], case.x_meas[0][cut:]).overall
         yield f"{case.name}, from sample {cut} on", found.rms_h, found.rms_pb
 
@@ -123,7 +123,7 @@ def random_cases(n: int) -> Iterator[Case]:
 def delays(emps: Path | None, n: int, *, at_one_horizon: bool) -> Iterator[tuple[str, float, float]]:
     """Yield names and RMS errors with a late measurement and without delay, over the same samples."""
     for case in (*cases(emps), *random_cases(n)):
-        settings = replace(case.settings, trust=True, t_init=-1.0)
+        settings = replace(case.settings, averaging=True, t_init=-1.0)
         late = _in_turn(case, replace(settings, measurement_delay=DELAY))
         peer = _in_turn(case, settings, earlier=DELAY if at_one_horizon else 0)
         samples = slice(settings.Np - DELAY if at_one_horizon else settings.Np)
@@ -198,7 +198,7 @@ def _changed(name: str, machine: Machine, changed: Plant, x_d: Array) -> Case:
 
 def _warm_and_cold(case: Case) -> tuple[float, float]:
     """Return RMS errors from 2 s on over the second run of a case, after the first one and without it."""
-    settings = replace(case.settings, trust=True, t_init=-1.0)
+    settings = replace(case.settings, averaging=True, t_init=-1.0)
     settled, predictor = round(SETTLED / settings.T_s), HybridPredictor(case.model, settings)
     backtest(predictor, case.x_d, case.x_meas[0])
     predictor.restart()

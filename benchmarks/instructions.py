@@ -21,7 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.step_time.compensator import COMPENSATOR, TIGHT, TRUST
+from benchmarks.step_time.compensator import AVERAGING, COMPENSATOR, TIGHT
 from benchmarks.step_time.compensator import trained as trained_in_loop
 from benchmarks.step_time.host import PREDICTOR, Host, build, instructions, warm
 from benchmarks.step_time.run import trained
@@ -49,7 +49,7 @@ def count(folder: Path) -> dict[str, list[float]]:
     predictor = build(folder / "predictor", "HybridPredictor", PREDICTOR)
     compensator = build(folder / "compensator", "SepCompensator", COMPENSATOR)
     earlier, in_loop = warm(trained(), folder / "warm"), warm(trained_in_loop(), folder / "warm_in_loop")
-    alone, tight = {"trust": 1, "t_init": -1.0}, {**TRUST, **TIGHT}
+    alone, tight = {"averaging": 1, "t_init": -1.0}, {**AVERAGING, **TIGHT}
     cases: dict[str, tuple[Host, dict[str, Any], int, int]] = {
         "predictor, cold": (predictor, alone, 100, 100),
         "predictor, warm": (predictor, alone | earlier, 100, 100),

@@ -1,9 +1,9 @@
-"""Coverage of the intervals ``x_h ± z·x_h_std`` of the predictor with trust.
+"""Coverage of the intervals ``x_h ± z·x_h_std`` of the predictor with averaging.
 
     python -m benchmarks.intervals [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1] [--cache FILE]
 
 Percent of the measured positions within the intervals of 50, 90 and 95 %, over the whole window and over each third of
-it: of the warm runs of ``benchmarks/trust.py``, and pooled over cold runs of random drives.
+it: of the warm runs of ``benchmarks/averaging.py``, and pooled over cold runs of random drives.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.averaging import cases
 from benchmarks.random_drives import GENERATORS, read_positions
-from benchmarks.trust import cases
 from hybridsep.base.metrics import coverage
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def warm_runs(emps: Path | None) -> Iterator[tuple[str, Array, Array]]:
     """Yield name, errors and standard deviations, m, of the warm runs."""
     for case in cases(emps):
-        predictor = HybridPredictor(case.model, replace(case.settings, trust=True, t_init=-1.0))
+        predictor = HybridPredictor(case.model, replace(case.settings, averaging=True, t_init=-1.0))
         backtest(predictor, case.x_d, case.x_meas[0])
         predictor.restart()
         yield (case.name, *run(predictor, case.x_d, case.x_meas[1]))

@@ -1,4 +1,4 @@
-"""Benchmark of trust: the predictor replayed on random nonlinear drives whose physics model is 20 or 40 % wrong.
+"""The predictor replayed on random nonlinear drives whose physics model is 20 or 40 % wrong.
 
     python -m benchmarks.random_drives [--n 1000] [--faults] [--predictor default] [--core] [--cache FILE]
     python -m benchmarks.random_drives --generator two_mass [--peers] …

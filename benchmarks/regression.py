@@ -56,7 +56,7 @@ def staircase_log(n: int) -> tuple[Array, Array]:
 def staircase_predictor(p: int, q: int) -> HybridPredictor:
     """Return a predictor for the staircase with the linear part of its drive as the physics model."""
     return HybridPredictor(
-        ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0), PredictorSettings(trust=False, p=p, q=q)
+        ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0), PredictorSettings(averaging=False, p=p, q=q)
     )
 
 

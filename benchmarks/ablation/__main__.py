@@ -1,4 +1,4 @@
-"""Ablation of the model with trust: each of its rules switched off, or its constant changed, one at a time.
+"""Ablation of the model with averaging: each of its rules switched off, or its constant changed, one at a time.
 
     python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--so101 FOLDER] [--n 12]
                                   [--only TEXT] [--lines] [--jobs 2]
@@ -25,16 +25,19 @@ from benchmarks.ablation.core import Changes, CoreVariant
 from hybridsep.base.errors import SignalError
 from hybridsep.predict.averaging.constants import CONSTANTS
 
-TRUST = "predict/averaging/"
-STACK, START = TRUST + "hsep_stacking.c", TRUST + "hsep_start.c"
-STATE, FORECAST = (TRUST + f"hsep_averaged_{part}.c" for part in ("model", "forecast"))
+AVERAGING = "predict/averaging/"
+STACK, START = AVERAGING + "hsep_stacking.c", AVERAGING + "hsep_start.c"
+STATE, FORECAST = (AVERAGING + f"hsep_averaged_{part}.c" for part in ("model", "forecast"))
 
 
 def constants(**values: float) -> Changes:
     """Return the change of constants, by their names in the dataclass."""
     return {
         "predict/hsep_predict_constants.h": [
-            (f"HSEP_TRUST_{name.upper()} {getattr(CONSTANTS, name)!r}\n", f"HSEP_TRUST_{name.upper()} {value!r}\n")
+            (
+                f"HSEP_AVERAGING_{name.upper()} {getattr(CONSTANTS, name)!r}\n",
+                f"HSEP_AVERAGING_{name.upper()} {value!r}\n",
+            )
             for name, value in values.items()
         ]
     }
@@ -57,9 +60,9 @@ def without_component(i: int) -> Changes:
 
 NO_DOUBTING: Changes = {
     FORECAST: [
-        ("predicted[HSEP_DOUBTING] = predicted[self->leading]", "predicted[HSEP_DOUBTING] = 0"),
+        ("predicted[HSEP_FRESH_START] = predicted[self->leading]", "predicted[HSEP_FRESH_START] = 0"),
     ],
-    STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_DOUBTING);\n", "")],
+    STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);\n", "")],
     **constants(doubt=2.0),
 }
 
@@ -68,11 +71,11 @@ NO_STATIC = together(
     {
         FORECAST: [
             (
-                "predicted[HSEP_LAGGED] = predicted[HSEP_STATIC] = known[HSEP_OF_PHYSICS] && !outgrown;",
-                "predicted[HSEP_LAGGED] = known[HSEP_OF_PHYSICS] && !outgrown;",
+                "predicted[HSEP_ARX_RESIDUAL] = predicted[HSEP_STATIC] = known[HSEP_MODEL_RESIDUAL] && !outgrown;",
+                "predicted[HSEP_ARX_RESIDUAL] = known[HSEP_MODEL_RESIDUAL] && !outgrown;",
             ),
-            ("    if (self->predicted[HSEP_STATIC]) {", "    if (self->predicted[HSEP_LAGGED]) {"),
-            ("hsep_trusted_expert(self, HSEP_STATIC);", "hsep_trusted_expert(self, HSEP_LAGGED);"),
+            ("    if (self->predicted[HSEP_STATIC]) {", "    if (self->predicted[HSEP_ARX_RESIDUAL]) {"),
+            ("hsep_averaged_expert(self, HSEP_STATIC);", "hsep_averaged_expert(self, HSEP_ARX_RESIDUAL);"),
         ]
     },
 )
@@ -93,7 +96,7 @@ VARIANTS: Mapping[str, Changes] = {
     "predictions hardly bounded": constants(bound=100.0, bound_of_command=100.0),
     "A bounded as all others": constants(bound_of_command=1.2),
     "no shrinking": {
-        TRUST + "hsep_experts.c": [
+        AVERAGING + "hsep_experts.c": [
             (
                 "    return self->largest_square / (self->largest_square + variance);",
                 "    (void)self, (void)variance;\n    return 1.0;",

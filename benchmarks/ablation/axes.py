@@ -1,4 +1,4 @@
-"""Axes that a change to the model with trust is judged on, in groups: those to choose on, and those that judge.
+"""Axes that a change to the model with averaging is judged on, in groups: those to choose on, and those that judge.
 
 Of a recorded axis the physics model is identified from the first half of the log; the second half judges, relative to
 the best of seven baselines in hindsight: physics, hold, lag + hold and four ARX models. Simulated cases, random drives
@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.ablation.core import Run
+from benchmarks.averaging import Case, cases, even
 from benchmarks.conditions import CUTS, SETTLED, changed_plants
 from benchmarks.random_drives import GENERATORS
-from benchmarks.trust import Case, cases, even
 from hybridsep.base.errors import IdentificationError
 from hybridsep.base.metrics import coverage, rms
 from hybridsep.base.settings import PredictorSettings
@@ -66,7 +66,7 @@ class Axis:
     ----------
     group, name : str
     model, settings
-        ``G_pb`` and the settings with trust.
+        ``G_pb`` and the settings with averaging.
     x_d : (n,) array, m
         Commanded positions.
     x : tuple of two (n,) arrays, m
@@ -211,7 +211,7 @@ def _cut(case: Case) -> Case:
 
 def _of_case(group: str, case: Case) -> Axis:
     """Return an axis whose errors are relative to the physics model's."""
-    settings = replace(case.settings, trust=True, t_init=-1.0)
+    settings = replace(case.settings, averaging=True, t_init=-1.0)
     x_pb = physics(case.model, settings, case.x_d)
     cold, warm = (rms(x - x_pb) for x in case.x_meas)  # of the whole runs
     return Axis(group, case.name, case.model, settings, case.x_d, case.x_meas, 0, False, cold, warm)

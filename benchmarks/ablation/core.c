@@ -37,9 +37,9 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 {
     hsep_residual_model *to = hsep_predictor_model(predictor), *from = hsep_predictor_model(trained);
     memcpy(hsep_residual_learned(to), hsep_residual_learned(from), hsep_residual_n_learned(to) * sizeof(double));
-    for (uint64_t i = 0; hsep_residual_trusted(from) != NULL && i < HSEP_N_RESIDUALS; i++) {
-        hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(from), i));
-        hsep_gram *learned = hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(to), i));
+    for (uint64_t i = 0; hsep_residual_averaged(from) != NULL && i < HSEP_N_RESIDUALS; i++) {
+        hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(from), i));
+        hsep_gram *learned = hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(to), i));
         memcpy(learned, gram, (size_t)hsep_gram_size(gram->n));
     }
     if (hsep_residual_paper(from) != NULL) {

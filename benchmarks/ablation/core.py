@@ -53,9 +53,9 @@ class _Settings(ctypes.Structure):
     )
 
 
-class _Trust(ctypes.Structure):
+class _Averaging(ctypes.Structure):
     _fields_ = (
-        ("trust", ctypes.c_uint64),
+        ("averaging", ctypes.c_uint64),
         *((name, ctypes.c_double) for name in ("effect", "noise_std", "forgetting", "period")),
     )
 
@@ -63,7 +63,7 @@ class _Trust(ctypes.Structure):
 class _Parameters(ctypes.Structure):
     _fields_ = (
         ("settings", _Settings),
-        ("trust", _Trust),
+        ("averaging", _Averaging),
         ("preview", ctypes.c_uint64),
         ("n_init", ctypes.c_double),
         ("planned", ctypes.c_int),
@@ -76,7 +76,7 @@ class _Run(ctypes.Structure):
     _fields_ = (("n", ctypes.c_uint64), *((name, _DOUBLES) for name in ("x_d", "x", "x_h", "std")))
 
 
-_Filled = TypeVar("_Filled", _Settings, _Trust)
+_Filled = TypeVar("_Filled", _Settings, _Averaging)
 
 
 class CoreVariant:
@@ -129,10 +129,10 @@ class CoreVariant:
         SignalError
             If a prediction diverges.
         """
-        fmi = {**settings.to_fmi(), "dead_time": model.dead_time, "trust": 1}
+        fmi = {**settings.to_fmi(), "dead_time": model.dead_time, "averaging": 1}
         modes = (_Mode * len(model.modes))(*(_Mode(one.f_n, one.zeta, one.alpha, one.beta) for one in model.modes))
         parameters = _Parameters(
-            _filled(_Settings, fmi), _filled(_Trust, fmi), settings.Np, float(settings.Np), 0, len(modes), modes
+            _filled(_Settings, fmi), _filled(_Averaging, fmi), settings.Np, float(settings.Np), 0, len(modes), modes
         )
         signals = [
             [np.ascontiguousarray(one, dtype=np.float64) for one in (x_d, x, np.zeros(len(x_d)), np.zeros(len(x_d)))]

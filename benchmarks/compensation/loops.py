@@ -24,7 +24,7 @@ from hybridsep.plants.plant import Plant
 
 __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed", "paper_machine"]
 
-_PAPER = {"trust": False, "Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
+_PAPER = {"averaging": False, "Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
 
 
 def paper_machine(name: str) -> Machine:

@@ -238,7 +238,7 @@ def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
             report.line(f"{name}, physics", physics, note=note)
             for i, run in enumerate(("cold", "warm")):
                 figure, limit = mean_rms([pair[i] for pair in pairs]), LESS_THAN_5_PERCENT_WORSE * physics
-                if case.held is not None:  # nothing detects it without trust
+                if case.held is not None:  # nothing detects it without averaging
                     report.line(f"{name}, {run}", figure, note=note)
                 else:
                     report.line(f"{name}, {run}", figure, f"at most {limit:.2f}", figure <= limit and sound, note)

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
 
-_PAPER = PredictorSettings(trust=False, Np=100, p=50, q=3, lam=1e-12, T_s=1e-3, t_init=0.3, input_hold="zoh")
+_PAPER = PredictorSettings(averaging=False, Np=100, p=50, q=3, lam=1e-12, T_s=1e-3, t_init=0.3, input_hold="zoh")
 PREDICTOR = {**_PAPER.to_fmi(), "dead_time": 0}
 """The paper's settings."""
 

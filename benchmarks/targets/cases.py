@@ -12,7 +12,7 @@ from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
@@ -105,7 +105,7 @@ def parameters(case: Case) -> tuple[dict[str, float], dict[str, float]]:
 
 def _declared(case: Case) -> dict[str, Mapping[str, Parameter]]:
     """Return the declarations of the settings that the kind has, by part of hsep_parameters."""
-    parts: dict[str, Mapping[str, Parameter]] = {"predictor": PREDICTOR_SETTINGS, "trust": TRUST_SETTINGS}
+    parts: dict[str, Mapping[str, Parameter]] = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS}
     return parts | ({"compensator": COMPENSATOR_SETTINGS} if case.kind == "compensator" else {})
 
 

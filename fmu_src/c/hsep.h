@@ -16,7 +16,7 @@
  *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
  *   hsep_*_valid             | constant; the predictor's, its windows                | returns 0: invalid
  *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
- *                            | window's end Np (p + q) + n^2 / 2 on top; with trust, |
+ *                            | window's end Np (p + q) + n^2 / 2 on top; with averaging, |
  *                            | for each of three experts, four in a warm run,        |
  *                            | (4 + Np / 50 + late / 2) n^2, at a window's end       |
  *                            | 4 n^2 + s^3 / 6 and 6 Np tanh on top                  |
@@ -26,10 +26,10 @@
  *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
- * Costs are multiply-adds; n: features, p + q, with trust p and a few more, 74 at least; s: 38 of them at most, without
- * lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples 4 n^2
- * become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the 10^9th
- * sample, but for a first window that begins in motion: its last sample has Np n^2 + n^3 / 6 for each expert.
+ * Costs are multiply-adds; n: features, p + q, with averaging p and a few more, 74 at least; s: 38 of them at most,
+ * without lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples 4
+ * n^2 become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the
+ * 10^9th sample, but for a first window that begins in motion: its last sample has Np n^2 + n^3 / 6 for each expert.
  */
 #ifndef HSEP_H
 #define HSEP_H
@@ -59,9 +59,9 @@ typedef enum { HSEP_ZERO_ORDER_HOLD = 0, HSEP_FIRST_ORDER_HOLD = 1 } hsep_hold;
 /* Settings, each with unit and meaning in hsep_settings.h, its range in hsep_ranges.h. */
 typedef struct {
     hsep_predictor_settings predictor;
-    hsep_trust_settings trust;
+    hsep_averaging_settings averaging;
     hsep_compensator_settings compensator; /* of no meaning for a predictor */
-    hsep_word n_modes;                     /* >= 1 */
+    hsep_int n_modes;                      /* >= 1 */
     const hsep_mode *modes;                /* (n_modes,), read while a function runs, not kept */
 } hsep_parameters;
 
@@ -91,8 +91,8 @@ typedef struct {
     hsep_real x_d, x_pb, x_h; /* m, now: command, predictions by the physics model and by the hybrid one */
     hsep_real x_h_std;        /* m, standard deviation of the error of x_h; 0 where it is not known */
     hsep_real rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init: of the servo error and of predictions' errors */
-    hsep_word batch;                          /* floor(k / Np) */
-    hsep_word n_rejected;                     /* measurements that were missing or not plausible, with trust */
+    hsep_int batch;                           /* floor(k / Np) */
+    hsep_int n_rejected;                      /* measurements that were missing or not plausible, with averaging */
     int hybrid_active;                        /* whether x_h is the hybrid prediction now */
     hsep_divergence divergence;               /* HSEP_CONVERGES, or the outputs are invalid until hsep_*_init */
 } hsep_predictor_outputs;
@@ -112,16 +112,16 @@ HSEP_API hsep_began hsep_predictor_init(
 
 /* Whether bytes in any alignment are a block for these parameters that has processed k samples: size is its, and every
  * index lies within it. Bytes that were changed on purpose may be valid and mean nothing. */
-HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
+HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
 
-/* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
+/* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
 /* Read the outputs of the next sample. */
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
 
 /* Standard deviation of the error of x_h at sample i of the window, i < Np, m; 0 where it is not known. */
-HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i);
+HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i);
 
 /* ---------------------------------------------------------------------------------------------- The compensator --
  *
@@ -134,14 +134,15 @@ typedef struct hsep_compensator hsep_compensator;
 typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
 
 typedef struct {
-    hsep_predictor_outputs predicted; /* x_h by the model that planned the window; with trust by the trusted model */
-    hsep_real x_dm;                   /* m, now */
-    hsep_sep_state state;             /* of the plan that x_dm follows now */
-    int no_measurement;               /* whether the change fades, as none came for measurement_timeout */
+    hsep_predictor_outputs
+        predicted;        /* x_h by the model that planned the window; with averaging by the averaged model */
+    hsep_real x_dm;       /* m, now */
+    hsep_sep_state state; /* of the plan that x_dm follows now */
+    int no_measurement;   /* whether the change fades, as none came for measurement_timeout */
 } hsep_compensator_outputs;
 
 /* Bytes of the block; 0 as the predictor's, and if spacing does not divide Np, preview < Np + 4 spacing + 3, or a
- * measurement is late without trust. */
+ * measurement is late without averaging. */
 HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters);
 
 /* As hsep_predictor_refused. */
@@ -153,7 +154,7 @@ HSEP_API hsep_began hsep_compensator_init(
     size_t weights_size);
 
 /* As hsep_predictor_valid. */
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k);
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
  * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
@@ -161,7 +162,7 @@ HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_p
  * whether they were taken: not, with nothing changed, where one is out of its range. */
 HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
 
-/* Process sample k, m; return whether a new window has begun. With trust x_meas may be NaN: it is missing. */
+/* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas);
 
 /* Read the outputs of the next sample. */

@@ -84,7 +84,7 @@ def backtest(
     ]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
     check_outputs(outputs, inputs, force=force)
-    read, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.trust)
+    read, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.averaging)
     shown = shown_of(read.file_unit, axis_machine.unit)
     title = f"{axis_machine.title}, {log.name}"
     states = [path for path in saved if path.suffix.lower() == ".state"]

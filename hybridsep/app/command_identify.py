@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ..identify.model import IdentifiedModel
-    from ..logs.units import Shown
+    from ..logs.units import DisplayUnits
 
 __all__ = ["identify"]
 
@@ -110,7 +110,7 @@ def _write_machine(found: IdentifiedModel, name: str, recording: str, entries: M
         file.write(machine_text(machine, comments))
 
 
-def _print_identified(found: IdentifiedModel, title: str, shown: Shown) -> None:
+def _print_identified(found: IdentifiedModel, title: str, shown: DisplayUnits) -> None:
     """Print an identified model as tables in the units of its log."""
     from rich import box
     from rich.table import Table
@@ -129,7 +129,7 @@ def _print_identified(found: IdentifiedModel, title: str, shown: Shown) -> None:
         console.print(f"- {finding}")
 
 
-def _structures(found: IdentifiedModel, shown: Shown) -> Table:
+def _structures(found: IdentifiedModel, shown: DisplayUnits) -> Table:
     from rich import box
     from rich.table import Table
 

@@ -63,7 +63,7 @@ def report(
     changed = axis_machine.changed("predictor", parameters)
     predictor = warm_predictor(changed, weights)
     how = reading_of(axis_machine, reading)
-    whole, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.trust)
+    whole, findings = read_checked(log, how, axis_machine, may_miss=predictor.settings.averaging)
     with progress_bar(False) as advance:
         recordings = [Recording(one.x_d, one.x_meas, 0) for one in whole.segments()]
         replayed = replay(predictor, recordings, progress=lambda done: advance("replay", 0.8 * done))

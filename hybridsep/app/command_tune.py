@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..base.parameters import Parameter
     from ..base.signals import Array
     from ..logs.checks import Finding
-    from ..logs.units import Shown
+    from ..logs.units import DisplayUnits
     from ..machines.machine import Machine
 
 __all__ = ["tune"]
@@ -69,7 +69,7 @@ def tune(
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     changed, values, tried = _tried(given, parameters, writes=out is not None)
-    read = _read(logs, given, reading, may_miss=changed.predictor_settings.trust)
+    read = _read(logs, given, reading, may_miss=changed.predictor_settings.averaging)
     with progress_bar(as_json) as advance:
         jobs = jobs or os.cpu_count() or 1
         tuning = tune_on(
@@ -108,7 +108,7 @@ class _Read:
     pieces: dict[str, list[tuple[Array, Array]]]
     findings: dict[str, tuple[Finding, ...]]
     partly: list[str]
-    shown: Shown
+    shown: DisplayUnits
 
     def findings_table(self) -> dict[str, Any]:
         from ..logs.checks import findings_table
@@ -128,7 +128,7 @@ def _tried(
         for field, parameter in TUNED.items()
         if parameter.name in parameters
     }
-    fixed = {name: value for name, value in parameters.items() if name in ("Np", "t_init", "trust")}
+    fixed = {name: value for name, value in parameters.items() if name in ("Np", "t_init", "averaging")}
     fitting = with_window(given.predictor_settings, fixed.get("Np", given.predictor_settings.Np))
     changed = given.changed("predictor", {"p": fitting.p, "q": fitting.q, **fixed})
     values = {**default_values(changed.predictor_settings), **ranges}

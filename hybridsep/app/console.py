@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..cosim.run import Run
     from ..evaluate.verdict import Verdict
     from ..logs.columns import Channel
-    from ..logs.units import Shown
+    from ..logs.units import DisplayUnits
     from ..machines.machine import Machine
 
 __all__ = [
@@ -76,7 +76,7 @@ def print_scores(
     title: str,
     *,
     unit: str = "m",
-    shown: Shown | None = None,
+    shown: DisplayUnits | None = None,
     more: Mapping[str, Any] | None = None,
 ) -> None:
     """Print prediction errors, of a run or of a backtest, and what they mean.
@@ -91,7 +91,7 @@ def print_scores(
     title : str
     unit : {"m", "rad"}
         Unit of the axis's positions.
-    shown : Shown, optional
+    shown : DisplayUnits, optional
         Units of the table; ``unit``'s if left out.
     more : mapping, optional
     """
@@ -131,7 +131,7 @@ def print_scores(
     console.print(str(verdict))
 
 
-def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
+def print_without_first(rms: Mapping[str, float], shown: DisplayUnits) -> None:
     """Print RMS errors, m or rad, without the first window of a log in motion, by their names in summaries."""
     factor, name = shown.error(rms["pb"])
     figures = ", ".join(f"{peer} {shown_figure(factor * rms[key])}" for key, peer in PREDICTIONS.items() if key in rms)

@@ -64,7 +64,7 @@ def read_checked(path: Path, reading: Reading, machine: Machine, *, may_miss: bo
     if not may_miss and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))
         raise LogError(
-            f"{path}: measured position {first + 1} is missing; it is replayed with trust alone (--trust true)"
+            f"{path}: measured position {first + 1} is missing; it is replayed with averaging alone (--averaging true)"
         )
     findings = checked(log)
     show(log.remarks, findings)

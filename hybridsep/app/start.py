@@ -180,7 +180,7 @@ def init(
     model, said = _model(tau, f_n, zeta, from_tf)
     machine = machine_of(
         *(model, "zoh", 1e-3, machine_name(out), f"{out.stem}, by hybridsep init"),
-        predictor={"Np": 100, "p": 50, "q": 3, "trust": True},
+        predictor={"Np": 100, "p": 50, "q": 3, "averaging": True},
     )
     comments = [
         f"Physics model: {said}. hybridsep identify finds it from a log of the axis.",

@@ -15,7 +15,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..fitting.choice import WORTH
 from ..fitting.tuning import TUNED, Tuning, joint_ratio
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from .console import console
 
 __all__ = ["entries", "print_tuning", "tuning_summary"]
@@ -41,7 +41,7 @@ def tuning_summary(tuning: Tuning, windows: Mapping[int, Tuning], values: Values
     chosen = tuning.candidates[tuning.chosen]
     return {
         "Np": chosen.Np,
-        "trust": chosen.trust,
+        "averaging": chosen.averaging,
         "logs": {
             name: {"rms_pb": float(tuning.rms_pb[i]), "rms_hold": float(tuning.rms_hold[i])}
             for i, name in enumerate(tuning.logs)
@@ -74,7 +74,9 @@ def tuning_summary(tuning: Tuning, windows: Mapping[int, Tuning], values: Values
     }
 
 
-def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, shown: Shown) -> None:
+def print_tuning(
+    tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, shown: DisplayUnits
+) -> None:
     """Print a tuning in the units of its logs."""
     chosen = tuning.candidates[tuning.chosen]
     factor, unit = shown.error(float(np.max(tuning.rms_pb)))
@@ -89,7 +91,7 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
     )
     console.print(_over_windows(windows, factor))
     console.print("For the machine file:\n")
-    lines = {"Np": chosen.Np, **entries(chosen, values), "trust": str(chosen.trust).lower()}
+    lines = {"Np": chosen.Np, **entries(chosen, values), "averaging": str(chosen.averaging).lower()}
     console.print("[predictor]")
     for name, value in lines.items():
         console.print(f"{name} = {value}")

@@ -38,7 +38,7 @@ ERRORS: Mapping[str, Explanation] = {
     ),
     "SignalError": Explanation(
         "Samples cannot be used: NaN or infinite values, a wrong shape or length.",
-        "Give finite arrays of equal length. A missing measured position may be NaN with `trust = true` alone.",
+        "Give finite arrays of equal length. A missing measured position may be NaN with `averaging = true` alone.",
         ("must be finite",),
     ),
     "LogError": Explanation(
@@ -122,7 +122,7 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "missing samples": Explanation(
         "The measured position is empty or `nan` in some rows.",
-        "None is needed with `trust = true`: they are left out. Without trust such a log is refused.",
+        "None is needed with `averaging = true`: they are left out. Without averaging such a log is refused.",
     ),
     "rate": Explanation(
         "Sampling intervals differ; the rows are taken as if they were even.",
@@ -138,7 +138,7 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "outliers": Explanation(
         "Single samples leave the signal: glitches of the encoder or of the transmission.",
-        "None is needed with `trust = true`, which rejects what is out of reach.",
+        "None is needed with `averaging = true`, which rejects what is out of reach.",
     ),
     "repeated samples": Explanation(
         "The position was sampled more slowly than the log was written, and unevenly.",

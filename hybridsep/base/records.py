@@ -11,7 +11,7 @@ import numpy as np
 from .saved import COUNT_MAX, Saved
 from .signals import PREDICTION_MAX, Array
 
-__all__ = ["FIXED", "Leaf", "arrays_of", "leaves", "numbers_of", "restored", "unsound", "with_numbers", "within"]
+__all__ = ["FIXED", "Leaf", "arrays_of", "bounded", "leaves", "numbers_of", "restored", "unsound", "with_numbers"]
 
 Record = TypeVar("Record")
 
@@ -29,7 +29,7 @@ FIXED: Mapping[str, Any] = {"fixed": True}
 """Metadata of a field that follows from parameters: it is no part of what is saved."""
 
 
-def within(least: float | Array = 0.0, most: float | Array = PREDICTION_MAX) -> dict[str, Any]:
+def bounded(least: float | Array = 0.0, most: float | Array = PREDICTION_MAX) -> dict[str, Any]:
     """Return the metadata of a field whose numbers are in a range, its bounds included; all others are finite."""
     return {"range": (least, most)}
 

@@ -162,24 +162,24 @@ class PredictorSettings(Settings):
         Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published. −1: automatic, :attr:`warm_up`.
     input_hold : {"zoh", "foh"}
         Zero-order or first-order hold of ``x_d`` in the physics model.
-    trust : bool
-        Whether the residual model is :class:`~hybridsep.predict.averaging.model.TrustedModel`; else it is the paper's.
+    averaging : bool
+        Whether the residual model is :class:`~hybridsep.predict.averaging.model.AveragedModel`; else it is the paper's.
     effect, noise_std : float
-        With trust: prior standard deviation of the effect of a feature, and standard deviation of the measurement
+        With averaging: prior standard deviation of the effect of a feature, and standard deviation of the measurement
         noise, m; 0: from the residuals.
     forgetting : float
-        With trust: time constant with which samples lose their weight, s; 0: never.
+        With averaging: time constant with which samples lose their weight, s; 0: never.
     period : float
-        With trust: period of a disturbance that repeats with the position, m, as of cogging or a screw's pitch; 0:
+        With averaging: period of a disturbance that repeats with the position, m, as of cogging or a screw's pitch; 0:
         none.
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
-        A compensator's predictor needs trust for it. −1: it comes a sample early, as under a sequential co-simulation
-        master, and is held for one sample.
+        A compensator's predictor needs averaging for it. −1: it comes a sample early, as under a sequential
+        co-simulation master, and is held for one sample.
     """
 
-    TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "period")
-    """Fields of the residual model with trust."""
+    AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period")
+    """Fields of the residual model with averaging."""
 
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
@@ -217,28 +217,28 @@ class PredictorSettings(Settings):
         "how the command x_d runs between samples, zero-order or first-order hold",
         learned=True,
     )
-    trust: bool = flag(
+    averaging: bool = flag(
         True,
         "whether the residual is predicted by online model averaging; false: by the paper's model",
         learned=True,
     )
     effect: float = real(
-        *(0.0, 0.0, 10.0, "m", "prior standard deviation of a feature's effect, with trust; 0: from the residuals"),
+        *(0.0, 0.0, 10.0, "m", "prior standard deviation of a feature's effect, with averaging; 0: from the residuals"),
         display_unit="um",
         nonzero=1e-15,
     )
     noise_std: float = real(
-        *(0.0, 0.0, 1.0, "m", "standard deviation of the measurement noise, with trust; 0: estimated"),
+        *(0.0, 0.0, 1.0, "m", "standard deviation of the measurement noise, with averaging; 0: estimated"),
         display_unit="um",
         nonzero=1e-15,
     )
     forgetting: float = real(
-        *(0.0, 0.0, 1e9, "s", "time after which samples have lost 63 % of their weight, with trust; 0: never"),
+        *(0.0, 0.0, 1e9, "s", "time after which samples have lost 63 % of their weight, with averaging; 0: never"),
         nonzero=1e-3,
     )
     period: float = real(
         *(0.0, 0.0, 100.0, "m"),
-        "period of a disturbance that repeats with the position (cogging, screw pitch), with trust; 0: none",
+        "period of a disturbance that repeats with the position (cogging, screw pitch), with averaging; 0: none",
         display_unit="mm",
         nonzero=1e-9,
         learned=True,
@@ -249,8 +249,8 @@ class PredictorSettings(Settings):
 
     @property
     def warm_up(self) -> float:
-        """Warm-up, s: ``t_init``, or where that is automatic none with trust and 0.3 s without."""
-        automatic = 0.0 if self.trust else 0.3
+        """Warm-up, s: ``t_init``, or where that is automatic none with averaging and 0.3 s without."""
+        automatic = 0.0 if self.averaging else 0.3
         return automatic if self.t_init < 0.0 else self.t_init
 
     @property
@@ -259,11 +259,11 @@ class PredictorSettings(Settings):
         return max(0, self.measurement_delay)
 
     def check_planning(self) -> None:
-        """Raise ParameterError if no compensator can plan with these settings: a late measurement needs trust."""
-        if self.n_late and not self.trust:
+        """Raise ParameterError if no compensator can plan with these settings: a late measurement needs averaging."""
+        if self.n_late and not self.averaging:
             raise ParameterError(
-                f"measurement_delay of a compensator must be 0 with trust = false, got {self.measurement_delay}: only "
-                "the model with trust plans from a late measurement"
+                f"measurement_delay of a compensator must be 0 with averaging = false, got {self.measurement_delay}: "
+                "only the model with averaging plans from a late measurement"
             )
 
     def check_replay(self) -> None:
@@ -331,7 +331,7 @@ class CompensatorSettings(Settings):
         plans that ask for far more end for the run (:func:`~hybridsep.compensate.newton.runs_away`).
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of the velocity of ``x_d``: where it turns, friction changes its
-        sign. It has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
+        sign. It has no effect without ``limits``. Plans of a model with ``averaging`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
     measurement_timeout : float

@@ -29,16 +29,16 @@ from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead
 from ..online.planner import PublishedWindow
 from ..predict.averaging.features import Disturbance
-from ..predict.averaging.model import TrustedModel
+from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .planning import PaperPlanning, PendingPlan, Planning, Preview, SepState, TrustedPlanning
+from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview, SepState
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis, direct_samples
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
-RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
+RECOMMENDED = PredictorSettings(averaging=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
 """Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
 compensator's defaults."""
 
@@ -55,8 +55,8 @@ class SepCompensator:
     Parameters
     ----------
     predictor : HybridPredictor
-        At the beginning of a run; it learns from the modified commands. With ``trust`` plans follow the slope of its
-        model (:mod:`~hybridsep.compensate.newton`); else they use the paper's.
+        At the beginning of a run; it learns from the modified commands. With ``averaging`` plans follow the slope of
+        its model (:mod:`~hybridsep.compensate.newton`); else they use the paper's.
     settings : CompensatorSettings, optional
         The defaults if left out.
 
@@ -64,7 +64,7 @@ class SepCompensator:
     ------
     ParameterError
         If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``
-        without trust.
+        without averaging.
     """
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
@@ -79,8 +79,8 @@ class SepCompensator:
         self._basis = SplineBasis(self.preview, self.spacing)
         bounds = self._bounds(settings)
         self._planning: Planning
-        if isinstance(predictor.residual, TrustedModel):
-            self._planning = TrustedPlanning(self._basis, bounds, settings, Np)
+        if isinstance(predictor.residual, AveragedModel):
+            self._planning = AveragedPlanning(self._basis, bounds, settings, Np)
         else:
             self._planning = PaperPlanning(self._basis, bounds, settings, Np)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
@@ -105,7 +105,7 @@ class SepCompensator:
         self._hybrid_ended = False
         self._missing = 0  # measurements one after another
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
-        self._rest = np.zeros(N_DECIDED + self._basis.n_free)
+        self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
         self._x_d_before = np.full(3, np.nan)
         self._pending: PendingPlan | None = None
@@ -202,7 +202,7 @@ class SepCompensator:
             predictor.rest_at(float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        preview = Preview(command, self._x_d_before, self._delta_before, self._rest)
+        preview = Preview(command, self._x_d_before, self._delta_before, self._previous_plan)
         compensate = SepState.OFF if self.is_lost(np.empty(0)) else self.compensate
         most = min(compensate, SepState.PHYSICS) if self._hybrid_ended else compensate
         chosen = self._planning.choose(predictor, preview, most)
@@ -226,7 +226,7 @@ class SepCompensator:
         Parameters
         ----------
         x : (Np,) array_like, m
-            Measured positions; with ``trust`` NaN where missing.
+            Measured positions; with ``averaging`` NaN where missing.
 
         Raises
         ------
@@ -241,7 +241,7 @@ class SepCompensator:
         predictor.update(measured, learn=predictor.k >= self.lead_in)
         self._missing = self._missing_after(measured)
         kept = Np // self.spacing
-        self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
+        self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._delta_before, self._x_d_before = (
             _last_three(self._delta_before, pending.delta),
             _last_three(self._x_d_before, pending.x_d),
@@ -287,7 +287,7 @@ class SepCompensator:
             "pending": pending and [int(pending.state), int(pending.ends_hybrid), pending.prediction.n_warm_up],
         }
         arrays = {
-            "rest": self._rest,
+            "previous_plan": self._previous_plan,
             "delta_before": self._delta_before,
             "x_d_before": self._x_d_before,
         }
@@ -315,8 +315,11 @@ class SepCompensator:
         compensator._state_before = SepState(saved.whole("state_before", max(SepState)))
         compensator._hybrid_ended = saved.flag("hybrid_ended")
         compensator._missing = saved.whole("missing")
-        n, Np = len(compensator._rest), predictor.Np
-        compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
+        n, Np = len(compensator._previous_plan), predictor.Np
+        compensator._previous_plan, compensator._delta_before = (
+            saved.array("previous_plan", n),
+            saved.array("delta_before", 3),
+        )
         compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
         if saved.field("pending") is not None:
             state, ends_hybrid, n_warm_up = saved.numbers("pending", 3)

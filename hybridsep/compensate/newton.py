@@ -27,13 +27,13 @@ from scipy.signal import lfilter
 from ..base.signals import Array
 from ..predict.averaging.experts import ExpertPrediction, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, StaticFeatures, StaticState
-from ..predict.averaging.model import OF_COMMAND, TrustedForecast, TrustedModel, forecast_by, scales_of, solved
+from ..predict.averaging.model import COMMAND_RESIDUAL, AveragedForecast, AveragedModel, forecast_by, scales_of, solved
 from ..predict.averaging.stacking import STATIC
 from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve, solve_again
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "PlanModel", "TrustedPlanner", "is_better", "runs_away"]
+__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "is_better", "runs_away"]
 
 _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
@@ -88,11 +88,11 @@ class DisturbanceSlopes(NamedTuple):
 
 
 class PlanModel:
-    """Trusted model with the weights of this instant, as a function of the commands of a preview.
+    """Averaged model with the weights of this instant, as a function of the commands of a preview.
 
     Parameters
     ----------
-    model : TrustedModel
+    model : AveragedModel
         Where the measurements end, which is the beginning of the preview unless they are late.
     state : (n_state,) array
         State of ``G_pb`` there.
@@ -107,11 +107,11 @@ class PlanModel:
     Attributes
     ----------
     scales : FeatureScales
-    of_rest : TrustedForecast
+    of_previous_plan : AveragedForecast
         Prediction under ``x_d``, whose variances all others have.
     """
 
-    def __init__(self, model: TrustedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
+    def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
         self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
         self._state, self._late, self._start = state, late, start
         window = self._window(x_d)
@@ -120,7 +120,7 @@ class PlanModel:
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.fixed.settings.Np :]
         behind -= np.arange(len(behind)) % _APART
-        self.of_rest = forecast_by(model, self._solved, window, self.scales, counts=counts)
+        self.of_previous_plan = forecast_by(model, self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the preview under commands ``x_d``, and what is late before it."""
@@ -133,20 +133,20 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
-    def predict(self, x_d: Array) -> TrustedForecast:
+    def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
-        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self.of_rest.predictions)
+        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self.of_previous_plan.predictions)
 
-    def position(self, at: TrustedForecast) -> Array:
+    def position(self, at: AveragedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
         return (at.window.x_pb + at.e_h)[len(self._late) :]
 
-    def slope(self, at: TrustedForecast, changes: Array, passed: Array, reach: float) -> Array:
+    def slope(self, at: AveragedForecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
 
         Parameters
         ----------
-        at : TrustedForecast
+        at : AveragedForecast
             Of :meth:`predict`, where the model is linearised.
         changes : (n, m) array
             Changes of the commands, each a column.
@@ -162,12 +162,12 @@ class PlanModel:
         for expert, one in self._solved.items():
             if weights[expert] == 0.0:
                 continue
-            kept = weights[expert] * _left(at.predictions[expert])[n_late:, None]
-            if self._model.kind_of(expert) == OF_COMMAND:
+            shrinkage = weights[expert] * _left(at.predictions[expert])[n_late:, None]
+            if self._model.kind_of(expert) == COMMAND_RESIDUAL:
                 acted = self._late_changes(changes)
-                total += kept * self._of_command(one, acted) + weights[expert] * (acted - passed)
+                total += shrinkage * self._of_command(one, acted) + weights[expert] * (acted - passed)
             else:
-                total += kept * self._of_disturbances(one, slopes, changes, passed)
+                total += shrinkage * self._of_disturbances(one, slopes, changes, passed)
         return total
 
     def _late_changes(self, changes: Array) -> Array:
@@ -243,7 +243,7 @@ def slopes_of(
 def _left(prediction: ExpertPrediction) -> Array:
     """Return what shrinking and bounds leave of a prediction, ``(n,)``."""
     unshrunk = prediction.unshrunk
-    return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.kept.copy(), where=unshrunk != 0.0))
+    return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.shrinkage.copy(), where=unshrunk != 0.0))
 
 
 _SOLVED = (5, 5, 3, 3)
@@ -301,14 +301,14 @@ class _Point:
     """Coefficients ``(3 + n_free,)``; prediction, position and third differences, ``(preview,)``, and cost, m²."""
 
     coefficients: Array
-    prediction: TrustedForecast
+    prediction: AveragedForecast
     x_h: Array
     third: Array
     cost: float
 
 
-class TrustedPlanner:
-    """Cost of the plans of one window on the trusted model.
+class AveragedPlanner:
+    """Cost of the plans of one window on the averaged model.
 
     Parameters
     ----------
@@ -332,12 +332,12 @@ class TrustedPlanner:
         """Return the cost of a plan, m²; not finite if its prediction overflows."""
         return self._at(coefficients).cost
 
-    def plan(self, rest: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
+    def plan(self, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
         """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
 
         Parameters
         ----------
-        rest : (3 + n_free,) array, m
+        previous_plan : (3 + n_free,) array, m
             Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
         bounds : Bounds
         n_pinned : int
@@ -346,7 +346,7 @@ class TrustedPlanner:
             Free splines filtered by ``G_pb``.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
-        here, last = self._point(rest, self._model.of_rest), None
+        here, last = self._point(previous_plan, self._model.of_previous_plan), None
         for reach, steps in zip(_REACHES, _SOLVED[1:], strict=True):
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
@@ -355,14 +355,14 @@ class TrustedPlanner:
             v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
             cost, tolerance = PlanCost.regular(P, v), TOLERANCE._replace(steps=steps)
             found = (
-                solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
+                solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
                 if last is None
-                else solve_again(cost, bounds, rest[N_DECIDED:], n_pinned, at, last, tolerance)
+                else solve_again(cost, bounds, previous_plan[N_DECIDED:], n_pinned, at, last, tolerance)
             )
             if found is None:
                 break
             last = found.ending
-            ends = (np.concatenate((rest[:N_DECIDED], at + length * (found.x - at))) for length in _LENGTHS)
+            ends = (np.concatenate((previous_plan[:N_DECIDED], at + length * (found.x - at))) for length in _LENGTHS)
             best = next((end for end in map(self._at, ends) if is_better(end.cost, here.cost)), None)
             if best is None:
                 break
@@ -374,7 +374,7 @@ class TrustedPlanner:
     def _at(self, coefficients: Array) -> _Point:
         return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
 
-    def _point(self, coefficients: Array, prediction: TrustedForecast) -> _Point:
+    def _point(self, coefficients: Array, prediction: AveragedForecast) -> _Point:
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(prediction)
         error = self._x_d - x_h

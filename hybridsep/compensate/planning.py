@@ -17,14 +17,15 @@ import numpy as np
 
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
-from ..predict.averaging.model import TrustedModel
+from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
-from .newton import TOLERANCE, PlanModel, TrustedPlanner, is_better, runs_away
+from .newton import TOLERANCE, AveragedPlanner, PlanModel, is_better, runs_away
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
 __all__ = [
+    "AveragedPlanning",
     "ChosenPlan",
     "PaperPlanning",
     "PendingPlan",
@@ -32,7 +33,6 @@ __all__ = [
     "Preview",
     "PublishedPosition",
     "SepState",
-    "TrustedPlanning",
     "has_stable_poles",
 ]
 
@@ -81,14 +81,14 @@ class Preview:
         Commanded positions.
     x_d_before, delta_before : (3,) array, m
         Last commanded positions before, and last changes of them.
-    rest : (3 + n_free,) array, m
+    previous_plan : (3 + n_free,) array, m
         Coefficients of the remainder of the last plan, the decided ones first.
     """
 
     command: Array
     x_d_before: Array
     delta_before: Array
-    rest: Array
+    previous_plan: Array
 
 
 class ChosenPlan(NamedTuple):
@@ -172,19 +172,19 @@ class Planning(ABC):
         self, g: Array, free: Array, preview: Preview, bounds: Bounds, tolerance: Tolerance = EXACT
     ) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""
-        rest = preview.rest
+        previous_plan = preview.previous_plan
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         cost = self.basis.cost(
-            g, free, preview.command, rest[:N_DECIDED], preview.delta_before, self.settings.jerk_weight
+            g, free, preview.command, previous_plan[:N_DECIDED], preview.delta_before, self.settings.jerk_weight
         )
-        found = solve(cost, bounds, rest[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
-        return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))
+        found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
+        return None if found is None else np.concatenate((previous_plan[:N_DECIDED], found.x))
 
     def limits(self, preview: Preview, *, may_turn: bool = False) -> Bounds:
         """Return the drive's limits on the coefficients of a plan."""
         return self.bounds.bounds(
-            preview.command, preview.x_d_before, preview.delta_before, preview.rest, may_turn=may_turn
+            preview.command, preview.x_d_before, preview.delta_before, preview.previous_plan, may_turn=may_turn
         )
 
 
@@ -202,7 +202,7 @@ class PaperPlanning(Planning):
         """Return the plan of the best model that has one, else the remainder of the last plan."""
         candidates = self._candidates(predictor, most)
         if not candidates:
-            return ChosenPlan(SepState.OFF, preview.rest, None)
+            return ChosenPlan(SepState.OFF, preview.previous_plan, None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.preview)  # Eq. (3)
@@ -212,7 +212,7 @@ class PaperPlanning(Planning):
             found = self.affine_plan(g, free, preview, bounds)
             if found is not None:
                 return ChosenPlan(state, found, None)
-        return ChosenPlan(SepState.OFF, preview.rest, None)
+        return ChosenPlan(SepState.OFF, preview.previous_plan, None)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position where it planned, else the physics model's."""
@@ -263,31 +263,31 @@ _PINNED_AVERAGED = 24
 model."""
 
 
-class TrustedPlanning(Planning):
-    """Plans with the trusted model, which watches itself."""
+class AveragedPlanning(Planning):
+    """Plans with the averaged model, which watches itself."""
 
     PINNED: ClassVar[int] = _PINNED_AVERAGED
     ALWAYS: ClassVar[bool] = True
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the physics model's plan, or a better one by Newton steps on the trusted model."""
+        """Return the physics model's plan, or a better one by Newton steps on the averaged model."""
         assert predictor.start is not None
         path = preview.command - predictor.start
         model = self._model(predictor, path, preview)
-        rest, scales = preview.rest, model.scales
+        previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, rest, scales)
+            return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.preview)
         follows = most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned
         physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE)
         if physics is None:
-            return ChosenPlan(SepState.OFF, rest, scales)
+            return ChosenPlan(SepState.OFF, previous_plan, scales)
         if not follows:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
-            planner = TrustedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
+            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             bounds = self.limits(preview, may_turn=True)
-            hybrid, cost = planner.plan(rest, bounds, self.n_pinned, self.basis.filtered(g))
+            hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
             better = is_better(cost, planner.cost(physics))
         if not better:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
@@ -313,10 +313,10 @@ class TrustedPlanning(Planning):
         return runs_away(values @ hybrid, values @ physics, math.sqrt(cost / self.preview), change_max)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
-        """Return the trusted model over the preview, with the scales of the remainder of the last plan."""
-        trusted = predictor.residual
-        assert isinstance(trusted, TrustedModel)
+        """Return the averaged model over the preview, with the scales of the remainder of the last plan."""
+        averaged = predictor.residual
+        assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.values @ preview.rest
-            return PlanModel(trusted, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)
+            x_d = path + self.basis.values @ preview.previous_plan
+            return PlanModel(averaged, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)

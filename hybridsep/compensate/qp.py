@@ -305,7 +305,7 @@ class DriveBounds:
         self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
 
     def bounds(
-        self, x_d: Array, x_d_before: Array, delta_before: Array, rest: Array, *, may_turn: bool = False
+        self, x_d: Array, x_d_before: Array, delta_before: Array, previous_plan: Array, *, may_turn: bool = False
     ) -> Bounds:
         """Return the bounds on the free coefficients of a plan.
 
@@ -315,7 +315,7 @@ class DriveBounds:
             Commanded positions.
         x_d_before, delta_before : (3,) arrays, m
             Last three commanded positions before the plan, and last three changes of them.
-        rest : (3 + n_free,) array, m
+        previous_plan : (3 + n_free,) array, m
             Coefficients of the remainder of the last plan, the decided ones first.
         may_turn : bool
             Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
@@ -326,8 +326,8 @@ class DriveBounds:
             np.diff(past if order == 0 else command, order)[3 - order :] / bound for order, bound in self._scales
         ]
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
-        offset = offset + self._all[:, :N_DECIDED] @ rest[:N_DECIDED]
-        at_rest = self._free @ rest[N_DECIDED:]
+        offset = offset + self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
+        at_rest = self._free @ previous_plan[N_DECIDED:]
         most = np.full(len(offset), 1.0 - _ROUNDING)
         least = -most
         if self._no_reversal and not may_turn:
@@ -343,7 +343,7 @@ class DriveBounds:
 def solve(
     cost: PlanCost,
     bounds: Bounds,
-    rest: Array,
+    previous_plan: Array,
     n_pinned: int,
     *,
     always: bool = False,
@@ -352,13 +352,13 @@ def solve(
     """Return the minimiser of the cost within the bounds.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
-    ``rest``: a real-time implementation solves for the others while the pinned ones act.
+    ``previous_plan``: a real-time implementation solves for the others while the pinned ones act.
 
     Parameters
     ----------
     cost : PlanCost
     bounds : Bounds
-    rest : (n,) array, m
+    previous_plan : (n,) array, m
         Feasible coefficients.
     n_pinned : int
         Coefficients that a bounded plan does not change, < n.
@@ -373,18 +373,20 @@ def solve(
         ``(n,)``, m; None if there is no finite minimiser.
     """
     n_kept = n_pinned if always else 0
-    c = _unbounded(cost, rest, n_kept)
+    c = _unbounded(cost, previous_plan, n_kept)
     if c is None:
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    return _bounded(cost, bounds, rest, n_pinned, rest, _cost_scale(cost, c, rest, n_kept), tolerance)
+    return _bounded(
+        cost, bounds, previous_plan, n_pinned, previous_plan, _cost_scale(cost, c, previous_plan, n_kept), tolerance
+    )
 
 
 def solve_again(
     cost: PlanCost,
     bounds: Bounds,
-    rest: Array,
+    previous_plan: Array,
     n_pinned: int,
     start: Array,
     last: Ending,
@@ -394,53 +396,53 @@ def solve_again(
 
     Parameters
     ----------
-    cost, bounds, rest, n_pinned, tolerance
+    cost, bounds, previous_plan, n_pinned, tolerance
         As in :func:`solve`, with ``always``.
     start : (n,) array, m
         Where the last plan ended.
     last : Ending
         Of the last plan.
     """
-    return _bounded(cost, bounds, rest, n_pinned, start, last, tolerance)
+    return _bounded(cost, bounds, previous_plan, n_pinned, start, last, tolerance)
 
 
-def _unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
-    """Return the minimiser of the cost, ``(n,)``, m, with the first ``n_pinned`` coefficients as in ``rest``."""
-    left = cost.without(rest[:n_pinned])
+def _unbounded(cost: PlanCost, previous_plan: Array, n_pinned: int) -> Array | None:
+    """Return the minimiser of the cost, ``(n,)``, m, the first ``n_pinned`` coefficients those of ``previous_plan``."""
+    left = cost.without(previous_plan[:n_pinned])
     try:
         c = np.asarray(cho_solve(cho_factor(left.P), left.v))
     except (LinAlgError, ValueError):
         return None
-    return np.concatenate((rest[:n_pinned], c)) if np.isfinite(c).all() else None
+    return np.concatenate((previous_plan[:n_pinned], c)) if np.isfinite(c).all() else None
 
 
-def _cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
-    """Return the scale of the cost, m², between ``rest`` and its minimiser of :func:`_unbounded`."""
-    left, at_rest = cost.without(rest[:n_pinned]), rest[n_pinned:]
+def _cost_scale(cost: PlanCost, c: Array, previous_plan: Array, n_pinned: int) -> float:
+    """Return the scale of the cost, m², between ``previous_plan`` and its minimiser of :func:`_unbounded`."""
+    left, at_rest = cost.without(previous_plan[:n_pinned]), previous_plan[n_pinned:]
     return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
 
 
 def _bounded(
     cost: PlanCost,
     bounds: Bounds,
-    rest: Array,
+    previous_plan: Array,
     n_pinned: int,
     start: Array,
     scale: float | Ending,
     tolerance: Tolerance,
 ) -> Minimum:
-    """Return the minimiser of the cost within the bounds, as far as it is feasible from ``rest``, and solver steps.
+    """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
 
     Parameters
     ----------
-    cost, bounds, rest, n_pinned, tolerance
+    cost, bounds, previous_plan, n_pinned, tolerance
         As in :func:`solve`.
     start : (n,) array, m
         Initial iterate.
     scale : float or Ending
         :func:`_cost_scale`, m², or the end of a programme that is nearly the same.
     """
-    pinned, problem = rest[:n_pinned], cost.without(rest[:n_pinned])
+    pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
     touched = rows.any(axis=1)
     found = minimise(
@@ -455,9 +457,9 @@ def _bounded(
     )
     assert found.ending is not None
     inner = found.ending.inner
-    start = rest if inner is None else np.concatenate((pinned, inner))
+    start = previous_plan if inner is None else np.concatenate((pinned, inner))
     best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():
-        return found._replace(x=rest)
+        return found._replace(x=previous_plan)
     # Bounds that are exceeded, as steps are limited, are so by little
     return found._replace(x=start + bounds.step(start, best) * (best - start))

@@ -151,7 +151,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     path : str or Path
         The archive.
     instance_name : str, optional
-        Shown in log messages; the archive's stem if left out.
+        DisplayUnits in log messages; the archive's stem if left out.
 
     Attributes
     ----------

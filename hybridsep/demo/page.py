@@ -75,7 +75,7 @@ def prediction_table(summary: Summary) -> Table:
             if part in case
         ]
     return Table(
-        "The paper's model (trust = false): prediction error, RMS in µm",
+        "The paper's model (averaging = false): prediction error, RMS in µm",
         "against the measured position; × hold: relative to holding the last residual; paper: physics → hybrid, "
         f"reduction, as printed there; {_seeds(summary)}",
         ("physics", "hold", "hybrid", "reduction", "× hold", "paper"),

@@ -223,7 +223,7 @@ def backtest(
     predictor : HybridPredictor
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
-        Commanded and measured positions, ``n ≥ 1``; with trust ``x_meas`` is NaN where it is missing.
+        Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing.
     starts : sequence of int
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     on_batch : callable, optional
@@ -344,12 +344,12 @@ def _windows(segments: Iterable[Array], Np: int) -> Iterator[tuple[bool, Array, 
 
 
 def _measured(predictor: HybridPredictor, x: ArrayLike, name: str, length: int) -> Array:
-    """Return measured positions, NaN where missing; SignalError if one is missing without trust."""
+    """Return measured positions, NaN where missing; SignalError if one is missing without averaging."""
     predictor.settings.check_replay()
     measured = as_measured(x, name, length)
-    if not predictor.settings.trust and np.isnan(measured).any():
+    if not predictor.settings.averaging and np.isnan(measured).any():
         i = int(np.argmax(np.isnan(measured)))
-        raise SignalError(f"{name} must be finite, got nan at sample {i}: missing measurements need trust = true")
+        raise SignalError(f"{name} must be finite, got nan at sample {i}: missing measurements need averaging = true")
     return measured
 
 

@@ -26,7 +26,7 @@ from ..base.output import written_whole
 from ..base.signals import Array
 from ..compensate.planning import SepState
 from ..cosim.run import Run
-from ..logs.units import Shown, shown_in
+from ..logs.units import DisplayUnits, shown_in
 from .report import HOLD, HYBRID, PHYSICS, drawn_places
 
 __all__ = [
@@ -110,7 +110,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
         figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
 
 
-def prediction_figure(run: Run, title: str, path: str | Path, shown: Shown | None = None) -> None:
+def prediction_figure(run: Run, title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:
     """Draw the command, the two models' prediction errors and the RMS of each window to a PNG, PDF or SVG.
 
     Parameters
@@ -121,7 +121,7 @@ def prediction_figure(run: Run, title: str, path: str | Path, shown: Shown | Non
         Heading.
     path : str or Path
         The file.
-    shown : Shown, optional
+    shown : DisplayUnits, optional
         Units in which positions are shown; mm and µm if left out.
     """
     shown = shown or shown_in("m")

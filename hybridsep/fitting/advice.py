@@ -13,7 +13,7 @@ from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
 from ..logs.log import Log
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from .replay import Replay
 
 __all__ = ["Judged", "extent", "partly_used", "peers_in_words", "recommendation", "whole_log_words"]
@@ -43,7 +43,7 @@ class Judged:
     replay : Replay
     T_s : float
         Sampling interval, s.
-    shown : Shown
+    shown : DisplayUnits
         Units in which positions are shown.
     part : str
         What the test is on, such as "the log's second half".
@@ -59,7 +59,7 @@ class Judged:
 
     replay: Replay
     T_s: float
-    shown: Shown
+    shown: DisplayUnits
     part: str
     share: float = 1.0
     period: str = ""

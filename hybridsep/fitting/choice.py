@@ -1,4 +1,4 @@
-"""Choice of the settings that trust leaves open: the numbers of lags.
+"""Choice of the settings that online model averaging leaves open: the numbers of lags.
 
 Windows of all that is tried are equally long: a shorter one is always predicted better, by holding the last residual
 best of all, so ``Np`` is the controller's look-ahead and is never chosen.

@@ -13,7 +13,7 @@ from ..base.metrics import peak_derivatives, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..evaluate.report import Report
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from .replay import Recording
 
@@ -129,7 +129,7 @@ def expected_tracking(
     return {**found, "limits": bound, "change_max": machine.compensator_settings.change_max}
 
 
-def tracking_lines(tracking: Mapping[str, Any], shown: Shown) -> list[str]:
+def tracking_lines(tracking: Mapping[str, Any], shown: DisplayUnits) -> list[str]:
     """Return the expected tracking errors in words, what binds them and how they came about."""
 
     def figure(name: str) -> str:
@@ -155,7 +155,7 @@ def binding_words(shares: Mapping[str, float]) -> str:
     return f"Limits bind the compensated command: {each} of the samples; within larger ones less error would be left."
 
 
-def write_tracking(report: Report, tracking: Mapping[str, Any], shown: Shown) -> None:
+def write_tracking(report: Report, tracking: Mapping[str, Any], shown: DisplayUnits) -> None:
     """Write the section on compensation, where there are limits."""
     if tracking:
         report.heading("Compensation")

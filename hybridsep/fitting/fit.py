@@ -30,7 +30,7 @@ from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
 from ..logs.log import Log
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
@@ -334,7 +334,7 @@ def _machine(
         return made({})
 
 
-def _comments(found: Mapping[str, Any], machine: Machine, plant: Mapping[str, Any], shown: Shown) -> list[str]:
+def _comments(found: Mapping[str, Any], machine: Machine, plant: Mapping[str, Any], shown: DisplayUnits) -> list[str]:
     """Return the lines at the head of the machine file: the structure, and what is no measurement in it."""
     lines = [found["structure"]]
     if machine.plant is not None:

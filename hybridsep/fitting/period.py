@@ -9,7 +9,7 @@ from ..base.metrics import shown_figure
 from ..base.settings import PredictorSettings
 from ..identify.output_error import in_time
 from ..identify.periodic import residual_period
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from ..model.physics import ModalModel
 from .choice import trained_rms
 from .replay import Recording
@@ -24,7 +24,7 @@ _GAIN = 0.9
 
 
 def period_finding(
-    model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, shown: Shown
+    model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, shown: DisplayUnits
 ) -> list[str]:
     """Return that the residual repeats with the position, from the training samples, in words.
 
@@ -36,7 +36,7 @@ def period_finding(
         ``G_pb``.
     recordings : sequence of Recording
     settings : PredictorSettings
-    shown : Shown
+    shown : DisplayUnits
         Units of the words.
     """
     late = settings.n_late

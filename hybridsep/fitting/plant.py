@@ -21,7 +21,7 @@ from ..base.settings import PARAMETERS, PredictorSettings
 from ..base.signals import Array
 from ..identify.output_error import in_time
 from ..logs.checks import noise_std, resolution
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel, Mode
 from ..plants.stage_drive import StageDrive
@@ -142,7 +142,7 @@ def identified_plant(model: ModalModel, settings: PredictorSettings, recordings:
     return {"entries": entries, "rms": rms_plant, "rms_pb": rms_pb, "reason": ""}
 
 
-def plant_words(plant: Mapping[str, Any], shown: Shown) -> str:
+def plant_words(plant: Mapping[str, Any], shown: DisplayUnits) -> str:
     """Return what the plant is, and how far it follows the log, in words."""
     disturbed = "mode" in plant["entries"]
     words = "the identified model " + ("refitted with the friction and stiffness of the log" if disturbed else "alone")

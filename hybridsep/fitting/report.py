@@ -19,7 +19,7 @@ from ..identify.model import deviation_words, shown_estimates
 from ..identify.operation import TOO_LITTLE
 from ..logs.checks import Finding
 from ..logs.log import Log
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from .advice import Judged, extent, peers_in_words, recommendation
 from .choice import WORTH
 from .compensation import write_tracking
@@ -42,7 +42,7 @@ _SETTLING = (
 )
 
 
-def judged_by(fit: Fit, shown: Shown) -> Judged:
+def judged_by(fit: Fit, shown: DisplayUnits) -> Judged:
     """Return the replay that judges a fit as it is reported, in the units of its logs."""
     period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
     return Judged(

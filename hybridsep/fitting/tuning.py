@@ -64,10 +64,10 @@ _CANDIDATES_MAX = 100_000
 """Candidates beyond which a list is a slip of the pen."""
 
 _LAMBDA_FACTORS = (1.0, 1e2, 1e4)
-"""Values without trust, relative to the machine's own."""
+"""Values without averaging, relative to the machine's own."""
 
 _FORGETTING = 30
-"""Windows after which samples are forgotten in half of the candidates with trust."""
+"""Windows after which samples are forgotten in half of the candidates with averaging."""
 
 
 @dataclass(frozen=True)
@@ -275,8 +275,8 @@ def replayed_losses(
     model : ModalModel
         ``G_pb``.
     pieces : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
-        Each begins at rest; what was learned before is kept, and only the first has a warm-up. With trust measurements
-        may be NaN, and are not scored there.
+        Each begins at rest; what was learned before is kept, and only the first has a warm-up. With averaging
+        measurements may be NaN, and are not scored there.
     candidate : PredictorSettings
     progress : callable, optional
         Called with the fraction done.
@@ -289,7 +289,7 @@ def replayed_losses(
     for x_d, x in pieces:
         if len(x_d) != len(x) or not len(x_d):
             raise SignalError(f"x_d and x must have as many samples, at least one, got {len(x_d)}, {len(x)}")
-        (as_measured if candidate.trust else as_samples)(x, "x", len(as_samples(x_d, "x_d")))
+        (as_measured if candidate.averaging else as_samples)(x, "x", len(as_samples(x_d, "x_d")))
     try:
         recordings = [Recording(x_d, x, 0) for x_d, x in pieces]
         found = replay(HybridPredictor(model, candidate), recordings, progress=progress)
@@ -304,7 +304,7 @@ def replayed_losses(
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
     """Return the values to try, by the fields of settings.
 
-    Some sixteen combinations with trust, and two dozen without.
+    Some sixteen combinations with averaging, and two dozen without.
 
     Parameters
     ----------
@@ -313,7 +313,7 @@ def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
     """
     tried = settings_to_try(settings)
     lags = {name: tuple(sorted({getattr(one, name) for one in tried})) for name in ("p", "q")}
-    if settings.trust:
+    if settings.averaging:
         forgetting = {settings.forgetting, float(f"{_FORGETTING * settings.Np * settings.T_s:.3g}")}
         return {**lags, "forgetting": tuple(sorted(forgetting))}
     lam = {settings.lam, *(float(f"{settings.lam * factor:.6g}") for factor in _LAMBDA_FACTORS)}
@@ -336,8 +336,8 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
         If a value does not fit the window or has no effect, or there are too many candidates; options are named.
     """
     for name, given in values.items():
-        if name in PredictorSettings.TRUST and not settings.trust:
-            raise ParameterError(f"--{TUNED[name].name} has an effect with trust only: give --trust true, too")
+        if name in PredictorSettings.AVERAGING and not settings.averaging:
+            raise ParameterError(f"--{TUNED[name].name} has an effect with averaging only: give --averaging true, too")
         for value in given:
             try:
                 replace(settings, **{name: value})

@@ -28,7 +28,7 @@ from ..machines.agree import check_drive_limits
 from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
 from .spec import content_guid, table_of
-from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
@@ -107,7 +107,7 @@ def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = N
     return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
 
 
-_PARTS = {"predictor": PREDICTOR_SETTINGS, "trust": TRUST_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
+_PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
 
 
 def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = None) -> str:

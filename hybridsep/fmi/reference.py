@@ -38,7 +38,7 @@ _SAMPLES = 600
 """Length of a run; a look-ahead's is longer if its fill and warm-up are."""
 
 _COMPENSATED_SAMPLES = 1500
-"""Length of a compensator's run: into the second move, when the hybrid model is trusted on all machines."""
+"""Length of a compensator's run: into the second move, when the hybrid model plans on all machines."""
 
 _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000

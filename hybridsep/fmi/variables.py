@@ -16,11 +16,11 @@ from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
 __all__ = [
+    "AVERAGING_SETTINGS",
     "COMPENSATOR_SETTINGS",
     "INTERPOLATED",
     "PREDICTOR_SETTINGS",
     "SAMPLES_TRAJECTORY",
-    "TRUST_SETTINGS",
     "FmuTable",
     "Value",
     "Variable",
@@ -34,19 +34,19 @@ Value = float | int | bool
 _PREDICTOR = PredictorSettings.fmi_parameters()
 
 PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
-    **{name: parameter for name, parameter in _PREDICTOR.items() if name not in PredictorSettings.TRUST},
+    **{name: parameter for name, parameter in _PREDICTOR.items() if name not in PredictorSettings.AVERAGING},
     "dead_time": PARAMETERS["dead_time"],
 }
 """Further parameters of a HybridPredictor and of the predictor that a SepCompensator holds."""
 
-TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.TRUST}
-"""Parameters of the residual model with trust, of both."""
+AVERAGING_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.AVERAGING}
+"""Parameters of the residual model with averaging, of both."""
 
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_parameters()
 """Parameters of a SepCompensator besides its predictor's."""
 
 _HOLD = "running RMS of hold since t_init: x_pb plus the last residual measured before the window"
-_REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
+_REJECTED = "measurements that were missing or not plausible, with averaging; counted window by window"
 _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
@@ -161,7 +161,7 @@ def _look_ahead_parameters(starts: Mapping[str, Value]) -> list[Variable]:
     """Return the parameters of a predictor, alone or within a compensator."""
     return [
         *_parameters("Look-ahead and residual model", PREDICTOR_SETTINGS, starts),
-        *_parameters("Residual model with trust", TRUST_SETTINGS, starts),
+        *_parameters("Residual model with averaging", AVERAGING_SETTINGS, starts),
     ]
 
 
@@ -246,7 +246,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     """
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
-    model = ("t_init", "compensate", "trust")
+    model = ("t_init", "compensate", "averaging")
     state = "model that planned what x_dm follows now"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
@@ -257,7 +257,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         _position(
             "x_h",
             "output",
-            "prediction for now under x_dm, with trust by its model, else by the model that planned the window",
+            "prediction for now under x_dm, with averaging by its model, else by the model that planned the window",
             initially_from=(*ahead, *model),
         ),
         _position(

@@ -2,9 +2,9 @@
 
 Layout, little-endian: ``HSEPWG14``; the numbers of settings, of modes and of what has been learned besides the factors,
 as u64; each setting that shapes the features and the factors (with others the weights mean something else), its name in
-24 bytes and its value as float64; as float64 the numbers of a residual model with trust, in the order of
+24 bytes and its value as float64; as float64 the numbers of a residual model with averaging, in the order of
 :class:`~hybridsep.predict.averaging.model.Learned`, and of :class:`~hybridsep.predict.uncertainty.Uncertainty`; for
-each factor ``[R z; 0 ρ]`` its weighted number of rows and its upper triangle by rows, with trust one of the physics
+each factor ``[R z; 0 ρ]`` its weighted number of rows and its upper triangle by rows, with averaging one of the physics
 model's residual and one of the command's; the CRC-32 of all before as u64.
 This module is packed into the pythonfmu FMUs; the C model reads the same file.
 """

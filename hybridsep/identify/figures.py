@@ -13,7 +13,7 @@ from matplotlib.ticker import LogFormatter
 from ..base.signals import Array
 from ..evaluate.figures import draw_line, finish_panels, legend_above, save_figure
 from ..evaluate.report import HOLD, HYBRID, PHYSICS
-from ..logs.units import Shown, shown_in
+from ..logs.units import DisplayUnits, shown_in
 from .model import IdentifiedModel
 
 __all__ = ["operation_figure"]
@@ -24,7 +24,7 @@ def operation_figure(
     recordings: Sequence[tuple[Array, Array]],
     title: str,
     path: str | Path,
-    shown: Shown | None = None,
+    shown: DisplayUnits | None = None,
 ) -> None:
     """Draw servo error, residual and the structures' errors to a PNG.
 
@@ -37,7 +37,7 @@ def operation_figure(
         Heading.
     path : str or Path
         The PNG.
-    shown : Shown, optional
+    shown : DisplayUnits, optional
         Units in which errors are drawn; the model's if left out.
     """
     scale, unit = (shown or shown_in(found.unit)).error(found.rms)

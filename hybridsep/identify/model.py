@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..logs.units import Shown
+from ..logs.units import DisplayUnits
 from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
@@ -147,7 +147,9 @@ def deviation_words(std: float, sign: str = "") -> str:
     return f"{sign}{std:.2g}" if std > 0 else "fixed"
 
 
-def shown_estimates(parameters: Iterable[Mapping[str, Any]], shown: Shown) -> Iterator[tuple[str, float, float, str]]:
+def shown_estimates(
+    parameters: Iterable[Mapping[str, Any]], shown: DisplayUnits
+) -> Iterator[tuple[str, float, float, str]]:
     """Yield name, value, standard deviation and unit of parameters; positions in the units of their log."""
     for one in parameters:
         factor, unit = shown.error(abs(one["value"])) if one["unit"] in ("m", "rad") else (1.0, str(one["unit"]))

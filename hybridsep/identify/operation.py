@@ -13,7 +13,7 @@ from ..base.settings import check
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..logs.checks import runs_against, starts_in_motion
-from ..logs.units import Shown, shown_in
+from ..logs.units import DisplayUnits, shown_in
 from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
@@ -53,7 +53,7 @@ def identify_operation(
     unit_gain: bool | None = None,
     order_max: int = 6,
     unit: str = "m",
-    shown: Shown | None = None,
+    shown: DisplayUnits | None = None,
     part: str = "this log",
     progress: Progress = lambda _message, _done: None,
 ) -> IdentifiedModel:
@@ -77,7 +77,7 @@ def identify_operation(
         Largest number of poles, at least 1.
     unit : {"m", "rad"}
         Unit of the positions, for estimates.
-    shown : Shown, optional
+    shown : DisplayUnits, optional
         Units in which findings say errors; ``unit``'s if left out.
     part : str
         What the recordings are, for findings and errors.
@@ -228,7 +228,7 @@ def _findings(
     segments: Sequence[Segment],
     gain_std: float,
     n_effective: float,
-    shown: Shown,
+    shown: DisplayUnits,
     part: str,
     commands: Sequence[Array],
 ) -> list[str]:

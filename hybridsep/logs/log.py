@@ -17,7 +17,7 @@ from .formats import open_source
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
 from .source import Block, Source
 from .times import given_times, recorded_times
-from .units import POSITION_UNITS, UNIT_OPTIONS, Shown, position_unit, shown_of, stated_unit
+from .units import POSITION_UNITS, UNIT_OPTIONS, DisplayUnits, position_unit, shown_of, stated_unit
 
 __all__ = ["Log", "check_reading", "read_log"]
 
@@ -84,7 +84,7 @@ class Log:
     columns: tuple[str, str] = ("x_d", "x")
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> DisplayUnits:
         """Units in which its positions are shown."""
         return shown_of(self.file_unit, self.unit)
 

@@ -11,7 +11,7 @@ __all__ = [
     "POSITION_UNITS",
     "TIME_UNITS",
     "UNIT_OPTIONS",
-    "Shown",
+    "DisplayUnits",
     "Unit",
     "plain_name",
     "position_unit",
@@ -59,7 +59,7 @@ TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, 
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayUnits:
     """Units in which a log's positions and their errors are printed and drawn, each a factor from SI and a name.
 
     Attributes
@@ -87,17 +87,17 @@ class Shown:
         return f"{factor * size:{form}} {name}"
 
 
-_METRIC = Shown((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))
-_ANGULAR = Shown((1e3, "mrad"), (1e6, "µrad"), (1e3, "mrad"))
+_METRIC = DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))
+_ANGULAR = DisplayUnits((1e3, "mrad"), (1e6, "µrad"), (1e3, "mrad"))
 _INCH, _DEGREE, _TURN = (1.0 / POSITION_UNITS[name].factor for name in ("in", "deg", "rev"))
 _SHOWN = {
-    "in": Shown((_INCH, "in"), (1e6 * _INCH, "µin"), (_INCH, "in")),
-    "deg": Shown((_DEGREE, "deg"), (1e3 * _DEGREE, "mdeg"), (_DEGREE, "deg"), 1e3),
-    "rev": Shown((_TURN, "rev"), (1e3 * _TURN, "mrev"), (_TURN, "rev"), 1e3),
+    "in": DisplayUnits((_INCH, "in"), (1e6 * _INCH, "µin"), (_INCH, "in")),
+    "deg": DisplayUnits((_DEGREE, "deg"), (1e3 * _DEGREE, "mdeg"), (_DEGREE, "deg"), 1e3),
+    "rev": DisplayUnits((_TURN, "rev"), (1e3 * _TURN, "mrev"), (_TURN, "rev"), 1e3),
 }
 
 
-def shown_of(file_unit: str, si: str) -> Shown:
+def shown_of(file_unit: str, si: str) -> DisplayUnits:
     """Return the units in which positions in ``si``, m or rad, of a file in ``file_unit`` are shown.
 
     They are the file's, or SI where the file's unit is empty or of the other kind.
@@ -106,7 +106,7 @@ def shown_of(file_unit: str, si: str) -> Shown:
     return shown_in(unit.name if unit is not None and unit.si == si else si)
 
 
-def shown_in(unit: str) -> Shown:
+def shown_in(unit: str) -> DisplayUnits:
     """Return the units in which the positions of a log in ``unit``, as of :func:`position_unit`, are shown."""
     name = unit.split()[-1]  # of a multiple, "0.1 um"
     return _SHOWN.get(name, _METRIC if POSITION_UNITS[name].si == "m" else _ANGULAR)

@@ -217,7 +217,7 @@ class Machine(Section):
         Raises
         ------
         MachineError
-            If the file has no ``[drive_limits]``, or the measurement is late without trust.
+            If the file has no ``[drive_limits]``, or the measurement is late without averaging.
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
@@ -226,7 +226,7 @@ class Machine(Section):
             predictor.check_planning()
         except ParameterError as error:
             raise MachineError(
-                f"machine {self.name}: {error}; set trust = true or measurement_delay = 0 in [compensator]"
+                f"machine {self.name}: {error}; set averaging = true or measurement_delay = 0 in [compensator]"
             ) from error
         return {
             **predictor.to_fmi(),

@@ -1,6 +1,6 @@
 """The paper's own settings of the predictor, with which its figures are made.
 
-By default the bundled machines, as every machine, have ``trust = true`` instead: online model averaging.
+By default the bundled machines, as every machine, have ``averaging = true`` instead: online model averaging.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from .machine import Machine, load_machine
 __all__ = ["PAPER_SETTINGS", "paper_machine"]
 
 PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {
-    "spring_mass_damper": {"trust": False, "t_init": 0.3},
-    "als25010_x": {"trust": False, "t_init": 0.297},
-    "als25010_y": {"trust": False, "t_init": 0.297},
-    "emps": {"trust": False, "t_init": 1.242},
+    "spring_mass_damper": {"averaging": False, "t_init": 0.3},
+    "als25010_x": {"averaging": False, "t_init": 0.297},
+    "als25010_y": {"averaging": False, "t_init": 0.297},
+    "emps": {"averaging": False, "t_init": 1.242},
 }
 """By machine: the residual model of eqs. (5) and (6) as printed, and a warm-up, s, of 5 % of the trajectory."""
 

@@ -142,7 +142,7 @@ class LookAhead:
 
     @property
     def n_rejected(self) -> int:
-        """Measurements of this run that were missing or not plausible, with trust; counted window by window."""
+        """Measurements of this run that were missing or not plausible, with averaging; counted window by window."""
         return self.predictor.n_rejected
 
     @property

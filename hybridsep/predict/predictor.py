@@ -26,7 +26,7 @@ from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
 from . import paper, residual_model
 from .averaging.features import Disturbance
-from .averaging.model import TrustedForecast, TrustedModel, begin_in_motion
+from .averaging.model import AveragedForecast, AveragedModel, begin_in_motion
 from .averaging.start import motion_before
 from .paper import PaperModel
 from .regression import RidgeRegression
@@ -55,7 +55,7 @@ class PredictorState:
         State of ``G_pb`` behind the measured samples.
     late : (n_late,) array, m
         Commands that are predicted and not measured yet.
-    residual : PaperModel or TrustedModel
+    residual : PaperModel or AveragedModel
     uncertainty : Uncertainty
     """
 
@@ -85,9 +85,9 @@ class HybridPredictor:
         Initial position, m, at rest; the first command if left out. Positions are relative to it internally, because
         ridge regression is not invariant to an offset.
     disturbances : sequence of Disturbance, optional
-        With trust: more candidate disturbances, functions ``d(x, v)`` of positions, m, and commanded velocities, m/s,
-        ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over the
-        motion of a sample. They are not part of a saved state, or of an FMU.
+        With averaging: more candidate disturbances, functions ``d(x, v)`` of positions, m, and commanded velocities,
+        m/s, ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over
+        the motion of a sample. They are not part of a saved state, or of an FMU.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class HybridPredictor:
     Raises
     ------
     ParameterError
-        If disturbances are given without trust, or are not functions.
+        If disturbances are given without averaging, or are not functions.
     """
 
     def __init__(
@@ -115,8 +115,8 @@ class HybridPredictor:
         self.Np, self.T_s = settings.Np, settings.T_s
         self.model, self.disturbances, self.planned = model, tuple(disturbances), False
         self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
-        if self.disturbances and not settings.trust:
-            raise ParameterError("disturbances are learned with trust = true only")
+        if self.disturbances and not settings.averaging:
+            raise ParameterError("disturbances are learned with averaging = true only")
         for i, one in enumerate(self.disturbances):
             if not callable(one):
                 raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
@@ -127,7 +127,7 @@ class HybridPredictor:
 
     def __repr__(self) -> str:
         """Return the main settings, and how much was learned, in one line."""
-        names = ("Np", "p", "q", "T_s", "trust")
+        names = ("Np", "p", "q", "T_s", "averaging")
         shown = {name: getattr(self.settings, name) for name in names} | {"n_learned": int(self.regression.n_rows)}
         return f"HybridPredictor({', '.join(f'{name} = {value!r}' for name, value in shown.items())})"
 
@@ -187,7 +187,7 @@ class HybridPredictor:
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
         scales : FeatureScales, optional
-            With trust: scales of the features, in a compensator; from ``x_d`` if left out.
+            With averaging: scales of the features, in a compensator; from ``x_d`` if left out.
 
         Returns
         -------
@@ -245,7 +245,7 @@ class HybridPredictor:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m, start, late = len(measured), forecast.window.start, len(state.late)
         e_pb = measured - start - forecast.window.x_pb[:m]
-        if state.k == 0 and isinstance(residual, TrustedModel) and not self.planned:
+        if state.k == 0 and isinstance(residual, AveragedModel) and not self.planned:
             # The run may have begun in motion.
             x_d, x_pb, _ = forecast.window
             before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)
@@ -270,13 +270,13 @@ class HybridPredictor:
         Raises
         ------
         ParameterError
-            With trust: its model is not affine in the commands.
+            With averaging: its model is not affine in the commands.
         SignalError
             If ``n < 1``, or the initial position is neither given nor known from a predicted window.
         """
         residual = self.state.residual
         if not isinstance(residual, PaperModel):
-            raise ParameterError("the operator needs the paper's model, trust = false")
+            raise ParameterError("the operator needs the paper's model, averaging = false")
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
@@ -346,7 +346,7 @@ class HybridPredictor:
 
     @property
     def n_rejected(self) -> int:
-        """Measurements of this run that were missing or not plausible; 0 without trust."""
+        """Measurements of this run that were missing or not plausible; 0 without averaging."""
         return self.residual.n_rejected
 
     def _warm_up(self, n: int, *, late: int = 0) -> int:
@@ -368,7 +368,7 @@ class HybridPredictor:
             forecast = self.pending.forecast
             arrays |= {"pending_x_d": forecast.window.x_d, "pending_x_pb": forecast.window.x_pb}
             meta["pending_start"] = forecast.window.start
-            if isinstance(forecast, TrustedForecast):  # a compensator has its scales from its preview
+            if isinstance(forecast, AveragedForecast):  # a compensator has its scales from its preview
                 scales = forecast.scales
                 arrays["pending_scales"] = np.array(
                     [scales.velocity, scales.step, scales.command_step, scales.command_square]
@@ -393,7 +393,7 @@ class HybridPredictor:
             )
         with saved.consistent():
             settings = PredictorSettings.from_table(saved.table("settings"))
-            n_features = settings.p + (0 if settings.trust else settings.q)
+            n_features = settings.p + (0 if settings.averaging else settings.q)
             if n_features**2 > sum(array.size for array in saved.arrays.values()):  # before that much is allocated
                 raise saved.error(f"p = {settings.p} and q = {settings.q} must be those of its factors")
             model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
@@ -414,7 +414,7 @@ class HybridPredictor:
         x_d, scales, residual = saved.array("pending_x_d", None), None, self.residual
         if not len(self.state.late) < len(x_d):
             raise saved.error("the pending window must have samples")
-        if isinstance(residual, TrustedModel):
+        if isinstance(residual, AveragedModel):
             velocity, *others = saved.array("pending_scales", 4).tolist()
             scales = FeatureScales(velocity, saved.array("pending_largest", residual.fixed.static.n), *others)
             if min(velocity, *others, *scales.largest) < 0.0:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ..base.errors import ParameterError, SignalError
-from ..base.records import within
+from ..base.records import bounded
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
@@ -90,7 +90,7 @@ class RidgeRegression:
     """
 
     factor: Array
-    n_rows: float = field(metadata=within())
+    n_rows: float = field(metadata=bounded())
 
     @classmethod
     def init(cls, n_features: int, lam: float) -> RidgeRegression:

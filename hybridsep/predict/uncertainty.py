@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..base.records import within
+from ..base.records import bounded
 from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
 
@@ -111,11 +111,11 @@ class Uncertainty:
         Recent mean square of the residual; 0 before the first window.
     """
 
-    theta: Array = field(metadata=within(_THETA_LEAST, _THETA_MOST))
-    evidence: Array = field(metadata=within())
-    factor: float = field(metadata=within(1.0 / _FACTOR_MAX, _FACTOR_MAX))
-    ratio: float = field(metadata=within(1.0 / _RATIO_MAX, _RATIO_MAX))
-    recent: float = field(metadata=within())
+    theta: Array = field(metadata=bounded(_THETA_LEAST, _THETA_MOST))
+    evidence: Array = field(metadata=bounded())
+    factor: float = field(metadata=bounded(1.0 / _FACTOR_MAX, _FACTOR_MAX))
+    ratio: float = field(metadata=bounded(1.0 / _RATIO_MAX, _RATIO_MAX))
+    recent: float = field(metadata=bounded())
 
     @classmethod
     def init(cls, variance: float) -> Uncertainty:

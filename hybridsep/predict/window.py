@@ -40,7 +40,7 @@ class ResidualWindow(NamedTuple):
 
 
 class FeatureScales(NamedTuple):
-    """Scales that the features with trust and their priors are relative to, from the commands ahead.
+    """Scales that the features with averaging and their priors are relative to, from the commands ahead.
 
     Attributes
     ----------

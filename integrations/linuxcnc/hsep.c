@@ -105,7 +105,7 @@ typedef struct {
     int was_reset;
 } axis_data;
 
-static const hsep_words axis_words = {
+static const hsep_fmi_names axis_words = {
     .instantiate = "loadrt " HSEP_COMPONENT, .location = "axes", .location_form = "a folder written by hybridsep hal"};
 
 static axis_data axis_all[HSEP_AXES];
@@ -255,7 +255,7 @@ static void axis_begin(axis_data *self)
 static void axis_process(axis_data *self)
 {
     const double T_s = *axis_value(self, HSEP_VR_T_s), t = (double)self->k++ * T_s;
-    const int predicted = isnan(self->feedback[0]) && !(*axis_value(self, HSEP_VR_trust) > 0.0);
+    const int predicted = isnan(self->feedback[0]) && !(*axis_value(self, HSEP_VR_averaging) > 0.0);
     *axis_value(self, HSEP_VR_x_d_ahead) = self->command;
     *axis_value(self, HSEP_VR_x_meas) = predicted ? *axis_value(self, HSEP_VR_x_h) : self->feedback[0];
     axis_choose(self);
@@ -304,7 +304,7 @@ static double axis_take_in(axis_data *self)
         command = self->command;
     }
     const double step = command - self->command, jump = step - self->step;
-    /* Another origin: both step alike (fb maybe in the period before, as LinuxCNC answers to it), the drive does not. */
+    /* Another origin: both step alike (fb maybe a period earlier, as LinuxCNC answers to it), the drive does not. */
     const double alike = HSEP_ALIKE * fabs(jump);
     if (fabs(jump) > HSEP_ORIGIN * self->limit[0] && fabs(feedback - self->feedback[1] - jump) <= alike &&
         fabs(self->out[0] - self->out[3]) <= alike) {
@@ -467,7 +467,7 @@ static int axis_open(axis_data *self, const char *folder)
     hsep_instance *instance = &self->instance;
     const char *slash = strrchr(folder, '/');
     const char *name = slash == NULL ? folder : slash + 1;
-    instance->words = &axis_words;
+    instance->names = &axis_words;
     instance->allocate = calloc;
     instance->release = free;
     axis_message[0] = '\0';

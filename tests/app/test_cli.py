@@ -24,7 +24,7 @@ from hybridsep.evaluate.backtest import backtest
 @pytest.mark.slow
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=6001)
-    paper = ("-m", "spring_mass_damper", "--trust", "false")
+    paper = ("-m", "spring_mass_damper", "--averaging", "false")
     status, out, _ = hybridsep("backtest", log, *paper, "--json", "--out", tmp_path / "batches.csv")
     summary = json.loads(out)
     assert status == 0
@@ -40,7 +40,7 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert "after warm-up" in out
     assert " ".join(summary["verdict"].split()) in " ".join(out.split())
     assert summary["verdict"].startswith("Better than the physics model: 0.4")
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--t_init", 0)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "true", "--t_init", 0)
     assert status == 0
     assert "RMS" in out
     assert "after warm-up" not in out
@@ -51,13 +51,13 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     rows[1500] = rows[1500].rpartition(",")[0] + ","
     log = tmp_path / "log.csv"
     log.write_text("\n".join(rows))
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "true", "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 1999
     assert "1 of 2000 measurements was missing, and not learned" in json.loads(out)["verdict"]
-    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "false")
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "false")
     assert status == 2
-    assert "measured position 1500 is missing; it is replayed with trust alone (--trust true)" in said
+    assert "measured position 1500 is missing; it is replayed with averaging alone (--averaging true)" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: s
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
 def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
     """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
-    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--trust", "false", "--t_init", 1.242, "--json")
+    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--averaging", "false", "--t_init", 1.242, "--json")
     summary = json.loads(out)
     assert status == 0
     assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
@@ -104,7 +104,7 @@ def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
 
 def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "short.csv", n=150)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "false", "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "false", "--json")
     assert status == 0
     assert json.loads(out)["rms_h_um_after_warm_up"] is None
 

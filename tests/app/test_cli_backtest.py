@@ -41,11 +41,11 @@ def test_gaps_and_jitter_are_noted(hybridsep: Run, tmp_path: Path) -> None:
 def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
     keep = np.setdiff1d(np.arange(3000), np.random.default_rng(5).integers(1, 2999, 30))
     log = rows_of(tmp_path / "log.csv", keep)
-    status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--resample", "--json")
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--averaging", "true", "--resample", "--json")
     assert status == 0, err
     assert json.loads(out)["n_samples"] == len(keep)
     whole = rows_of(tmp_path / "whole.csv", np.arange(3000))
-    of_whole = json.loads(hybridsep("backtest", whole, *MACHINE, "--trust", "true", "--json")[1])
+    of_whole = json.loads(hybridsep("backtest", whole, *MACHINE, "--averaging", "true", "--json")[1])
     assert json.loads(out)["rms_h_um"] == pytest.approx(of_whole["rms_h_um"], rel=0.1)
     assert json.loads(hybridsep("backtest", log, *MACHINE, "--json")[1])["n_samples"] == len(keep)
 
@@ -69,7 +69,7 @@ def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path:
     for t_init in (0.0, 0.3):
         figure = tmp_path / "figure.svg"
         status, _, err = hybridsep(
-            "backtest", log, *MACHINE, "--trust", "true", "--t_init", t_init, "--figure", figure, "--force"
+            "backtest", log, *MACHINE, "--averaging", "true", "--t_init", t_init, "--figure", figure, "--force"
         )
         assert status == 0, err
         drawn.append(figure.read_text(encoding="utf-8"))

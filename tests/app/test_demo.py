@@ -100,7 +100,7 @@ def test_the_index_page_leads_to_all_that_was_written(shown: Demonstration) -> N
     assert linked == written - {"index.html"}
     titles = re.findall(r"<h2>(.*?)</h2>", page)
     assert titles[0].startswith("Compensation: ")
-    assert titles[1].startswith("The paper&#x27;s model (trust = false): ")
+    assert titles[1].startswith("The paper&#x27;s model (averaging = false): ")
     figures = [f"<td>{shown_figure(figure)}</td>" for figure in shown.compensation("staircase", "tracking_rms_um")]
     assert "".join(figures) in page
     assert "<script" not in page

@@ -10,7 +10,7 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 MACHINE = ("--machine", "spring_mass_damper")
-TRUST = ("--trust", "true")
+AVERAGING = ("--averaging", "true")
 
 
 @pytest.fixture
@@ -23,9 +23,9 @@ def without_measurement(tmp_path: Path) -> Path:
     [
         ("fit", "--out", "deep/new"),
         ("identify", "--out", "new/machine.toml"),
-        ("backtest", *MACHINE, *TRUST, "--out", "new/batches.csv"),
-        ("tune", *MACHINE, *TRUST, "--p", "10", "--Np", "50", "--out", "new/tuned.toml"),
-        ("report", *MACHINE, *TRUST, "--out", "new/page.html"),
+        ("backtest", *MACHINE, *AVERAGING, "--out", "new/batches.csv"),
+        ("tune", *MACHINE, *AVERAGING, "--p", "10", "--Np", "50", "--out", "new/tuned.toml"),
+        ("report", *MACHINE, *AVERAGING, "--out", "new/page.html"),
     ],
     ids=lambda command: command[0],
 )

@@ -17,7 +17,7 @@ from hybridsep.fitting.tuning import Tuning, tuning_figure
 from hybridsep.logs.units import shown_in
 
 MACHINE = ("-m", "spring_mass_damper", "--jobs", "1")
-PAPER = (*MACHINE, "--trust", "false")
+PAPER = (*MACHINE, "--averaging", "false")
 FEW = ("--Np", "50", "--p", "5,40", "--q", "0,1", "--lambda", "1e-12,1e-10,1e-8", "--t_init", "0.1")
 
 
@@ -45,7 +45,7 @@ def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hy
     found = json.loads(hybridsep("tune", log, *PAPER, *FEW, "--json")[1])
     tuned, own = load_machine(out).predictor_settings, load_machine("spring_mass_damper").predictor_settings
     assert {"p": tuned.p, "q": tuned.q, "lambda": tuned.lam} == found["chosen"]
-    assert (tuned.Np, tuned.t_init, tuned.trust) == (50, 0.1, False)
+    assert (tuned.Np, tuned.t_init, tuned.averaging) == (50, 0.1, False)
     assert own.Np == 100
     assert [one["own"] for one in found["candidates"]].count(True) == 1
     ratios = [one["ratio_to_hold"] for one in found["candidates"]]
@@ -61,16 +61,16 @@ def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hy
 
 
 @pytest.mark.slow
-def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
+def test_several_logs_and_averaging(hybridsep: Run, tmp_path: Path) -> None:
     logs = [write_log(tmp_path / name, n=n) for name, n in (("a.csv", 400), ("b.csv", 600))]
     (tmp_path / "sub").mkdir()
     logs.append(write_log(tmp_path / "sub" / "a.csv", n=300))
-    few = ("--trust", "true", "--p", "10", "--q", "1", "--effect", "0,1e-5", "--forgetting", "0", "--Np", "50")
+    few = ("--averaging", "true", "--p", "10", "--q", "1", "--effect", "0,1e-5", "--forgetting", "0", "--Np", "50")
     status, text, err = hybridsep("tune", *logs, *MACHINE, *few, "--json")
     assert status == 0, err
     found = json.loads(text)
     assert list(found["logs"]) == [str(logs[0]), "b.csv", str(logs[2])]
-    assert found["trust"] is True
+    assert found["averaging"] is True
     for one in found["candidates"]:
         rms = [one["rms_h"][name] / figures["rms_hold"] for name, figures in found["logs"].items()]
         assert one["ratio_to_hold"] == pytest.approx(np.prod(rms) ** (1 / 3))
@@ -93,7 +93,7 @@ def test_a_log_with_a_gap_is_tuned_on_in_pieces(hybridsep: Run, tmp_path: Path) 
         (("--p", "5,105"), "--p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
         (("--lambda", "1e-12:1e-6"), "--lambda must be a number, got '1e-12:1e-6'"),
         (("--p", "5,50.5"), "--p must be a whole number, got 50.5"),
-        (("--effect", "1e-5"), "--effect has an effect with trust only: give --trust true, too"),
+        (("--effect", "1e-5"), "--effect has an effect with averaging only: give --averaging true, too"),
         (("--out", "x.csv"), "--out must end in .toml, got 'x.csv'"),
         (("--figure", "x.jpg"), "--figure must end in .png or .pdf or .svg, got 'x.jpg'"),
     ],
@@ -132,7 +132,7 @@ def test_a_compensator_that_the_lags_do_not_fit_is_told_before_the_replays(hybri
 
 @pytest.mark.slow
 def test_what_diverges_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    own = PredictorSettings(trust=False)
+    own = PredictorSettings(averaging=False)
     settings = (own, replace(own, p=20), replace(own, p=30))
     hold = np.array([1e-6])
     for losses, words in (

@@ -126,7 +126,7 @@ def test_lower_q_or_raise_np() -> None:
 
 def test_all_problems_at_once() -> None:
     with pytest.raises(ParameterError) as caught:
-        PredictorSettings(trust=False, Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)
+        PredictorSettings(averaging=False, Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)
     assert [part.split()[0] for part in str(caught.value).split("; ")] == ["Np", "p", "q", "lambda", "T_s", "t_init"]
 
 
@@ -143,7 +143,7 @@ def test_a_preview_that_does_not_fit_the_window_is_refused(
 ) -> None:
     settings = CompensatorSettings(preview=preview, spacing=spacing)
     predictor = HybridPredictor(
-        ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False, Np=Np, p=1, q=0)
+        ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False, Np=Np, p=1, q=0)
     )
     if not n_problems:
         assert SepCompensator(predictor, settings).settings == settings
@@ -217,7 +217,7 @@ def test_choices_and_truth_values(name: str, value: object, message: str) -> Non
 
 
 def test_settings_and_an_fmus_values_are_the_same() -> None:
-    predictor = PredictorSettings(trust=False, Np=60, p=7, q=2, lam=1e-9, T_s=2e-3, t_init=0.0, input_hold="foh")
+    predictor = PredictorSettings(averaging=False, Np=60, p=7, q=2, lam=1e-9, T_s=2e-3, t_init=0.0, input_hold="foh")
     limits = Limits(0.2, 3.0, 40.0)
     compensator = CompensatorSettings(preview=90, spacing=3, limits=limits, no_reversal=False, compensate="physics")
     values = {**predictor.to_fmi(), **compensator.to_fmi()}
@@ -234,7 +234,7 @@ def test_settings_and_an_fmus_values_are_the_same() -> None:
 
 
 def test_a_table_of_settings_has_all_of_them_and_nothing_else() -> None:
-    table = PredictorSettings(trust=False).as_table()
+    table = PredictorSettings(averaging=False).as_table()
     for wrong in ({**table, "more": 1}, {name: value for name, value in table.items() if name != "q"}):
         with pytest.raises(ParameterError, match=f"settings must be {', '.join(table)}, got"):
             PredictorSettings.from_table(wrong)

@@ -27,7 +27,7 @@ BLOB = pack("test", META, {"a": np.arange(6.0).reshape(2, 3), "empty": np.empty(
 
 def predictor_blob() -> bytes:
     predictor = HybridPredictor(
-        ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False, Np=5, p=2, q=1)
+        ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False, Np=5, p=2, q=1)
     )
     predictor.predict(np.linspace(0.1, 0.2, 5))
     predictor.update(np.linspace(0.1, 0.21, 5))

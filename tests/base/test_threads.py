@@ -56,7 +56,7 @@ def results() -> dict[str, str]:
     x_d = staircase()[:N]
     noise = Encoder(5e-6, 0)
     x = simulate(machine.new_plant(), x_d, machine.T_s) + noise.measure_all(np.zeros(N))
-    replay = backtest(HybridPredictor(machine.model, PredictorSettings(trust=False, Np=500, p=400, q=3)), x_d, x)
+    replay = backtest(HybridPredictor(machine.model, PredictorSettings(averaging=False, Np=500, p=400, q=3)), x_d, x)
     loop = cosimulate(machine.new_compensator(), machine.new_plant(), x_d, encoder=noise)
     signals = {"replay": replay.x_h, "closed loop": loop.x_dm}
     return {name: hashlib.sha256(signal.tobytes()).hexdigest() for name, signal in signals.items()}

@@ -23,19 +23,19 @@ from hybridsep.plants.trajectory import staircase
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 MACHINE = load_machine("spring_mass_damper").changed("predictor", {"Np": 20, "p": 20})
-COMMAND = staircase()[:400]
+ARX_COMMAND = staircase()[:400]
 BARE = ("-DHSEP_NO_FILES", "-DHSEP_NO_STDIO", "-DHSEP_NO_MALLOC")
 OF_A_SYSTEM = {"fopen", "fread", "strtod", "vsnprintf", "snprintf", "malloc", "calloc", "realloc", "free"}
 
 
 def measured() -> Array:
-    return Encoder(5e-6, 7).measure_all(simulate(MACHINE.new_plant(), COMMAND, MACHINE.T_s))
+    return Encoder(5e-6, 7).measure_all(simulate(MACHINE.new_plant(), ARX_COMMAND, MACHINE.T_s))
 
 
 @pytest.fixture(scope="module")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     predictor = MACHINE.new_predictor()
-    backtest(predictor, COMMAND, measured())
+    backtest(predictor, ARX_COMMAND, measured())
     path = tmp_path_factory.mktemp("trained") / "trained.state"
     predictor.save(path)
     return path
@@ -51,11 +51,11 @@ def fmu_program(target: Target, folder: Path, *options: str, weights: Path | Non
     description = fmpy.read_model_description(str(fmu))
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
     location = "NULL" if embedded or weights is None else f'"{(folder / "fmu" / "resources").as_uri()}"'
-    x_meas = np.concatenate((np.full(20, COMMAND[0]), measured()))
-    rows = ", ".join(f"{{{x_d!r}, {x!r}}}" for x_d, x in zip(COMMAND.tolist(), x_meas.tolist(), strict=False))
+    x_meas = np.concatenate((np.full(20, ARX_COMMAND[0]), measured()))
+    rows = ", ".join(f"{{{x_d!r}, {x!r}}}" for x_d, x in zip(ARX_COMMAND.tolist(), x_meas.tolist(), strict=False))
     lines = [f'#define GUID "{description.guid}"', f"#define RESOURCES {location}"]
     lines += [f"#define VR_{name} {references[name]}" for name in ("x_d_ahead", "x_meas", "x_h")]
-    lines += [f"static const double samples[{len(COMMAND)}][2] = {{{rows}}};"]
+    lines += [f"static const double samples[{len(ARX_COMMAND)}][2] = {{{rows}}};"]
     (folder / "wiring.h").write_text("\n".join(lines) + "\n")
     sources = folder / "fmu" / "sources"
     given = [ROOT / "tests" / "c" / "bare_fmu.c", sources / "all.c"]
@@ -80,7 +80,7 @@ def test_a_source_fmu_starts_warm_without_a_system(weights: Path, tmp_path: Path
     bare = fmu_program(m7, tmp_path / "bare", *BARE, weights=weights, embedded=True)
     assert names(m7, bare).isdisjoint(OF_A_SYSTEM)
     found = outputs(m7, bare)
-    assert len(found) == len(COMMAND)
+    assert len(found) == len(ARX_COMMAND)
     hosted = fmu_program(here, tmp_path / "hosted", "-D_GNU_SOURCE", weights=weights, embedded=False)
     assert found == outputs(here, hosted)
     cold = fmu_program(m7, tmp_path / "cold", *BARE, embedded=False)

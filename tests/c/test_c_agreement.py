@@ -14,17 +14,17 @@ LOOPS = [
     (202, "spring_mass_damper", {"change_max": 1e-4}),
     # and others, with the trajectory's limits for the drive, or anything between
     (38, "spring_mass_damper", {}),
-    # with trust
-    (6, "als25010_x", {"trust": 1}),
-    (202, "spring_mass_damper", {"trust": 1, "change_max": 1e-4}),
+    # with averaging
+    (6, "als25010_x", {"averaging": 1}),
+    (202, "spring_mass_damper", {"averaging": 1, "change_max": 1e-4}),
 ]
 AT_NIGHT = [
     *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (213, 225, 231, 233)),
     *((seed, "als25010_x", {"change_max": 1e-4}) for seed in (261, 264)),
     *((seed, "spring_mass_damper", {}) for seed in (241, 250, 256)),
     (267, "als25010_x", {}),
-    *((seed, "als25010_y", {"trust": 1}) for seed in (4, 7)),
-    (9, "als25010_x", {"trust": 1}),
+    *((seed, "als25010_y", {"averaging": 1}) for seed in (4, 7)),
+    (9, "als25010_x", {"averaging": 1}),
 ]
 
 

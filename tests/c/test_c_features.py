@@ -53,7 +53,7 @@ def weights_of_the_core(settings: PredictorSettings, x_pb: Array, e_pb: Array) -
 def test_a_row_of_the_library_has_the_places_of_the_core(p: int, q: int) -> None:
     # 1e-9 relative to the largest weight: λ is large, so that each weight is determined.
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    settings = PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0)
+    settings = PredictorSettings(averaging=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0)
     predictor, chance = HybridPredictor(model, settings, start=0.0), np.random.default_rng(0)
     x_pb, e_pb = np.zeros(0), np.zeros(0)
     for window in range(5):

@@ -22,14 +22,14 @@ from spoiled_weights import spoiled
 
 from hybridsep import backtest
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.fmi.weights import weights_file
 from hybridsep.logs.formats import write_example
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 CONSUMER = ROOT / "tests" / "c" / "consumer"
-KINDS = {"predictor": {**PREDICTOR_SETTINGS, **TRUST_SETTINGS}}
+KINDS = {"predictor": {**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS}}
 KINDS["compensator"] = {**KINDS["predictor"], **COMPENSATOR_SETTINGS}
 
 
@@ -93,8 +93,8 @@ def test_a_loop_in_real_time_prints_its_histogram() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_parameters_out_of_their_ranges_are_refused(kind: str) -> None:
     """One by one, at either end and as no number, and only then."""
-    for trust in (0, 1):
-        assert not library(kind, trust=trust).refused()
+    for averaging in (0, 1):
+        assert not library(kind, averaging=averaging).refused()
     least = {"p": 1, "q": 0}
     for name, parameter in KINDS[kind].items():
         most, whole = parameter.maximum, parameter.kind is not float
@@ -118,7 +118,7 @@ def test_parameters_that_do_not_fit_together_are_refused() -> None:
     wrong: dict[str, dict[str, float]] = {
         "spacing": {"spacing": 3, "preview": 200},
         "preview": {"preview": 30},
-        "measurement_delay": {"trust": 0, "measurement_delay": 1},
+        "measurement_delay": {"averaging": 0, "measurement_delay": 1},
     }
     for name, one in wrong.items():
         assert library("compensator", **{**fits, **one}).refused() == name
@@ -133,7 +133,7 @@ def test_defaults_are_the_declared_ones() -> None:
     given = library("compensator").parameters
     parts = (
         (given.predictor, PREDICTOR_SETTINGS),
-        (given.trust, TRUST_SETTINGS),
+        (given.averaging, AVERAGING_SETTINGS),
         (given.compensator, COMPENSATOR_SETTINGS),
     )
     for part, settings in parts:
@@ -142,11 +142,11 @@ def test_defaults_are_the_declared_ones() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("trust", [0, 1])
-def test_outputs_are_the_models(trust: int) -> None:
+@pytest.mark.parametrize("averaging", [0, 1])
+def test_outputs_are_the_models(averaging: int) -> None:
     """The interface without FMI computes what an FMU does, to the last bit."""
     x_d = staircase.commanded()[:700]
-    settings = {"Np": 50, "p": 10, "preview": 100, "trust": trust}
+    settings = {"Np": 50, "p": 10, "preview": 100, "averaging": averaging}
     compensator = Library("compensator", settings, STAGE_MODES)
     assert compensator.begin(float(x_d[0])) == 0
     model = CModel("compensator_2", {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()

@@ -111,14 +111,14 @@ def sanitised_program(driver: str, folder: Path) -> Path:
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("predictor_2", [["input_hold=1", "t_init=0"], ["trust=1", "Np=7", "p=7", "q=6"]]),
+        ("predictor_2", [["input_hold=1", "t_init=0"], ["averaging=1", "Np=7", "p=7", "q=6"]]),
         (
             "compensator",
             [
                 ["Np=12", "p=7", "q=5", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
                 ["spacing=50", "preview=303", "compensate=1"],
-                ["trust=1", "Np=50", "p=20", "t_init=-1", "v_max=0.08", "a_max=8", "j_max=1000"],
-                ["trust=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "measurement_delay=7", "t_init=0"],
+                ["averaging=1", "Np=50", "p=20", "t_init=-1", "v_max=0.08", "a_max=8", "j_max=1000"],
+                ["averaging=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "measurement_delay=7", "t_init=0"],
             ],
         ),
         ("feed_drive", [[]]),
@@ -129,16 +129,18 @@ def sanitised_program(driver: str, folder: Path) -> Path:
             "predictor",
             [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]],
         ),
-        at_night("predictor_2", [["p=100", "q=99", "lambda=1e-20"], ["trust=1"], ["trust=1", "Np=1", "p=1", "q=0"]]),
-        at_night("predictor", [["trust=1", "Np=150", "p=2", "q=0", "dead_time=13", "forgetting=0.001"]]),
+        at_night(
+            "predictor_2", [["p=100", "q=99", "lambda=1e-20"], ["averaging=1"], ["averaging=1", "Np=1", "p=1", "q=0"]]
+        ),
+        at_night("predictor", [["averaging=1", "Np=150", "p=2", "q=0", "dead_time=13", "forgetting=0.001"]]),
         at_night(
             "compensator",
             [
                 ["v_max=0.08", "a_max=8", "j_max=1000"],
                 ["Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
-                ["trust=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
-                ["trust=1", "Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
-                ["trust=1", "Np=50", "p=20", "measurement_delay=300", "t_init=0"],
+                ["averaging=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
+                ["averaging=1", "Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
+                ["averaging=1", "Np=50", "p=20", "measurement_delay=300", "t_init=0"],
             ],
         ),
     ],

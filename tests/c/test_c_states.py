@@ -62,8 +62,8 @@ def test_a_state_of_other_parameters_is_refused() -> None:
 
 
 @pytest.mark.slow
-def test_damaged_states_with_trust_are_refused_or_can_be_used() -> None:
-    values = {"trust": 1.0, "Np": 5, "p": 2, "q": 1, "dead_time": 2}
+def test_damaged_states_with_averaging_are_refused_or_can_be_used() -> None:
+    values = {"averaging": 1.0, "Np": 5, "p": 2, "q": 1, "dead_time": 2}
     model = CModel("predictor", values).initialise()
     for k in range(23):
         model["x_d_ahead"], model["x_meas"] = 1e-3 * np.sin(0.1 * k), 1e-3 * np.sin(0.1 * k - 0.7)

@@ -1,7 +1,7 @@
 """Abstract interpretation of the functions with indices (Frama-C, Eva), for all values of their inputs at small sizes.
 
-What is proved, and what Eva is told, stands in proof/proof.c. The residual model with trust is left out of the rings:
-Frama-C 25 ends there with an assertion of its own; the fuzzer and the sanitisers go through it.
+What is proved, and what Eva is told, stands in proof/proof.c. The residual model with averaging is left out of the
+rings: Frama-C 25 ends there with an assertion of its own; the fuzzer and the sanitisers go through it.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ PROVED = ("recursion", "stack", "rings", "constraints", "refusals", "sizes")
 
 def alarms(part: str, *, wrong: bool = False) -> int:
     """Return how many alarms Eva raises about a part of the proof, with calls of memcpy and its like not proved."""
-    rings = Library("predictor", {"Np": 3, "p": 2, "q": 1, "trust": 0}, [SPRING_MASS_DAMPER])
+    rings = Library("predictor", {"Np": 3, "p": 2, "q": 1, "averaging": 0}, [SPRING_MASS_DAMPER])
     # without the processor's vectors: the same operations
     options = [
         *include_flags(),
         "-DHSEP_NO_VECTORS",
-        "-DTRUST=0",
+        "-DAVERAGING=0",
         f"-DBLOCK={rings.size()}",
         *(["-DWRONG"] if wrong else []),
     ]

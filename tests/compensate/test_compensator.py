@@ -114,7 +114,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, no_reversal: bool) -> 
 )
 def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False)), CompensatorSettings(**values))
+        SepCompensator(HybridPredictor(MODEL, PredictorSettings(averaging=False)), CompensatorSettings(**values))
 
 
 def test_only_what_is_tunable_changes_in_a_run() -> None:

@@ -1,4 +1,4 @@
-"""Compensation with the trusted model: its slope, what a plan gains, and what it must survive."""
+"""Compensation with the averaged model: its slope, what a plan gains, and what it must survive."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from averaged_cases import averaged_model
 from compensator_cases import DRIVE_LIMITS, TS, beyond
-from trusted_cases import trusted_model
 
 from hybridsep import load_machine
 from hybridsep.base.errors import StateError
@@ -27,12 +27,12 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 
-TRUSTED = PredictorSettings(Np=50, p=20)
+AVERAGED = PredictorSettings(Np=50, p=20)
 STAGE = load_machine("als25010_x")
 
 
 def compensator(
-    machine: Machine = STAGE, compensate: str = "hybrid", predictor: PredictorSettings = TRUSTED, **changes: object
+    machine: Machine = STAGE, compensate: str = "hybrid", predictor: PredictorSettings = AVERAGED, **changes: object
 ) -> SepCompensator:
     settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate, **changes)  # type: ignore[arg-type]
     return machine.new_compensator(settings, predictor=predictor)
@@ -56,7 +56,7 @@ def by_physics() -> Run:
 @cache
 def cold(period: float = 0.0) -> tuple[Run, bytes]:
     """Return the run of a compensator that learns the moves, and the compensator after it."""
-    sep = compensator(predictor=replace(TRUSTED, period=period))
+    sep = compensator(predictor=replace(AVERAGED, period=period))
     found = run(sep)
     sep.restart(0.0)
     return found, sep.to_bytes()
@@ -70,7 +70,7 @@ def learned(period: float = 0.0) -> bytes:
 def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
     """Return the model over commands of which the first ones are late."""
     physics = sep.predictor.state.physics
-    return PlanModel(trusted_model(sep.predictor), physics, x_d[:late], 0.0, x_d[late:], x_d[late:])
+    return PlanModel(averaged_model(sep.predictor), physics, x_d[:late], 0.0, x_d[late:], x_d[late:])
 
 
 @pytest.mark.slow
@@ -136,7 +136,7 @@ def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
     def cosine(x: Array, v: Array) -> Array:
         return np.asarray(np.cos(turns * x))
 
-    predictor = HybridPredictor(STAGE.model, TRUSTED, disturbances=(sine, cosine))
+    predictor = HybridPredictor(STAGE.model, AVERAGED, disturbances=(sine, cosine))
     own = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS))
     run(own)
     own.restart(0.0)
@@ -177,7 +177,7 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
     assert sep.plan(x_d).state is SepState.HYBRID
     worse = np.full(3 + sep._basis.n_free, 1e-3)
     for cost in (math.inf, math.nan):
-        monkeypatch.setattr("hybridsep.compensate.newton.TrustedPlanner.plan", lambda *_, cost=cost: (worse, cost))
+        monkeypatch.setattr("hybridsep.compensate.newton.AveragedPlanner.plan", lambda *_, cost=cost: (worse, cost))
         plan = sep.plan(x_d)
         assert plan.state is SepState.PHYSICS
         np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)

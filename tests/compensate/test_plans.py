@@ -35,7 +35,7 @@ def tracking_cost(g: Array, x_d: Array, delta: Array, weight: float) -> float:
 
 def test_splines_approach_the_direct_samples() -> None:
     x_d, weight, rest = move(), 1.0, np.zeros(3)
-    predictor = HybridPredictor(MODEL, PredictorSettings(trust=False), start=0.0)
+    predictor = HybridPredictor(MODEL, PredictorSettings(averaging=False), start=0.0)
     g, free = predictor.operator(200).g_pb, np.zeros(200)
     direct = direct_samples(g, free, x_d, rest, weight)
     least = tracking_cost(g, x_d, direct, weight)
@@ -54,7 +54,7 @@ def test_splines_approach_the_direct_samples() -> None:
 
 def test_one_filtered_spline_and_its_shifts_are_all_of_them() -> None:
     basis = SplineBasis(120, 5)
-    g = HybridPredictor(MODEL, PredictorSettings(trust=False), start=0.0).operator(120).g_pb
+    g = HybridPredictor(MODEL, PredictorSettings(averaging=False), start=0.0).operator(120).g_pb
     expected = toeplitz(g, np.zeros(120)) @ basis.values[:, N_DECIDED:]
     np.testing.assert_allclose(basis.filtered(g), expected, rtol=0, atol=1e-13)
 
@@ -73,7 +73,7 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     """Karush-Kuhn-Tucker: the gradient is a non-negative combination of the active bounds' normals."""
     rng = np.random.default_rng(seed)
     basis = SplineBasis(80, 4)
-    g = HybridPredictor(MODEL, PredictorSettings(trust=False), start=0.0).operator(80).g_pb
+    g = HybridPredictor(MODEL, PredictorSettings(averaging=False), start=0.0).operator(80).g_pb
     x_d = move(80, 0.01 * float(rng.uniform(-1, 1)))
     cost = basis.cost(g, 1e-5 * rng.normal(size=80), x_d, np.zeros(3), np.zeros(3), 1.0)
     free = np.linalg.solve(cost.P, cost.v)
@@ -96,7 +96,7 @@ def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
     """Return the cost, bounds and remainder of a plan whose command is at the drive's limits."""
     rng = np.random.default_rng(seed)
     preview, basis = 120, SplineBasis(120, 2)
-    g = HybridPredictor(MODEL, PredictorSettings(trust=False), start=0.0).operator(preview).g_pb
+    g = HybridPredictor(MODEL, PredictorSettings(averaging=False), start=0.0).operator(preview).g_pb
     path = rest_to_rest([0.0, 0.004 + 0.004 * rng.random()], PAPER_LIMITS, TS)
     x_d = np.concatenate((np.zeros(30), path, np.full(preview, path[-1])))[:preview]
     rest, before = np.zeros(basis.values.shape[1]), np.zeros(3)

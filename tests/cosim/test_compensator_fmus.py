@@ -25,7 +25,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")
-PAPER = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+PAPER = {"averaging": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 COMPENSATE = PARAMETERS["compensate"]
 TOLERANCE = 1e-9  # m, between library and FMU
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -256,7 +256,7 @@ def test_the_direction_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
     pair = fmus(name_of("SepCompensator", machine, flavour)), fmus(name_of("FeedDrive", machine, flavour))
     commands = []
     for change in ({}, {"no_reversal": False}):
-        values: dict[str, Any] = {"trust": False, "q": 40, "lambda": 1e-8, "t_init": 0.1, **change}
+        values: dict[str, Any] = {"averaging": False, "q": 40, "lambda": 1e-8, "t_init": 0.1, **change}
         run = cosimulate(*pair, r, controller_values=values)
         fmi = {**machine.fmi_compensator_parameters(), **values}
         compensator = machine.new_compensator(

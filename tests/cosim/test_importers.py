@@ -163,7 +163,7 @@ def test_importers_come_to_the_same_figures(system: ClosedSystem, expected: Arra
     rows = apart(importer)[system.key]
     difference = f"at most {abs(rows - expected).max():.1e} m apart from fmpy"
     print(importer, system.look_ahead, *figures(system, rows), "µm;", difference)
-    # The first measurement, from which a compensator with trust judges the sensor, is another.
+    # The first measurement, from which a compensator with averaging judges the sensor, is another.
     judged = importer in UNCARRIED and system.look_ahead == "compensator"
     if not judged:  # else nanometres may change the last digit
         assert figures(system, rows) == figures(system, expected)
@@ -190,7 +190,7 @@ def test_fmpy_reads_arrays_and_sets_enumerations(folder: Path) -> None:
     result = fmpy.simulate_fmu(
         str(folder / "HybridPredictorFmi3.fmu"),
         output=["x_d", "x_d_window", "hybrid_active"],
-        start_values={"input_hold": "1", "trust": "true", "mode[1].zeta": "0.06"},
+        start_values={"input_hold": "1", "averaging": "true", "mode[1].zeta": "0.06"},
         **how,
     )
     assert result["x_d_window"].shape == (501, 100)

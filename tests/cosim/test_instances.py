@@ -75,7 +75,7 @@ def started(fmu: Library, name: bytes, start: float, *, bare: bool = False) -> i
     """Return a new component that rests at ``start`` and predicts as soon as it has learned."""
     component = fmu.instantiate_bare() if bare else fmu.instantiate(name)
     assert component is not None
-    assert fmu.set(component, "trust", 0) == OK
+    assert fmu.set(component, "averaging", 0) == OK
     assert fmu.set(component, "t_init", 0.0) == OK
     assert fmu.EnterInitializationMode(component) == OK
     assert fmu.set(component, "x_d_ahead", start) == OK

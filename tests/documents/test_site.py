@@ -132,7 +132,7 @@ def test_every_page_is_reached_and_searched(site: Path, pages: dict[str, Page]) 
 
 def test_pictures_have_words_and_mathematics_is_mathml(pages: dict[str, Page]) -> None:
     assert [(name, page.without_alt) for name, page in pages.items() if page.without_alt] == []
-    for name in ("explanation/model", "explanation/trust", "explanation/compensation"):
+    for name in ("explanation/model", "explanation/averaging", "explanation/compensation"):
         assert {"math", "msub", "mo"} <= pages[name].tags
 
 

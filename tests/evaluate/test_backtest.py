@@ -25,7 +25,8 @@ EMPS_COLUMNS = {"t": "t", "x_d": "qg", "x": "qm"}
 
 def predictor(Np: int = 20, p: int = 5, q: int = 2, t_init: float = 0.05) -> HybridPredictor:
     return HybridPredictor(
-        ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), PredictorSettings(trust=False, Np=Np, p=p, q=q, t_init=t_init)
+        ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]),
+        PredictorSettings(averaging=False, Np=Np, p=p, q=q, t_init=t_init),
     )
 
 
@@ -43,7 +44,8 @@ def emps_predictor() -> HybridPredictor:
     omega = math.sqrt(gtau * kv * kp / M)
     mode = Mode(f_n=omega / (2 * np.pi), zeta=(Fv + gtau * kv) / M / (2 * omega), alpha=omega**2)
     return HybridPredictor(
-        ModalModel([mode]), PredictorSettings(trust=False, Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
+        ModalModel([mode]),
+        PredictorSettings(averaging=False, Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242),
     )
 
 
@@ -198,13 +200,13 @@ def test_bad_arrays(x_d: list[float], x: list[float], message: str) -> None:
     assert replaying.to_bytes() == before
 
 
-def test_missing_measurements_are_bridged_with_trust_and_refused_without() -> None:
+def test_missing_measurements_are_bridged_with_averaging_and_refused_without() -> None:
     x_d, x = log()
     holes = x.copy()
     holes[300:320:2] = np.nan
     holes[500:520] = np.nan  # a whole window
     with pytest.raises(
-        SignalError, match="x_meas must be finite, got nan at sample 300: missing measurements need trust"
+        SignalError, match="x_meas must be finite, got nan at sample 300: missing measurements need averaging"
     ):
         backtest(predictor(), x_d, holes)
     settings = PredictorSettings(Np=20, p=5, q=2, t_init=-1.0)

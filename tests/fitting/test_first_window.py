@@ -24,7 +24,7 @@ FIRST = 40
 
 def test_losses_are_those_of_a_replay_without_its_first_window() -> None:
     machine = load_machine("spring_mass_damper")
-    settings = replace(with_window(machine.predictor_settings, NP), trust=False, measurement_delay=0)
+    settings = replace(with_window(machine.predictor_settings, NP), averaging=False, measurement_delay=0)
     x_d, x = commanded()[FIRST:2000], measured(0)[FIRST:2000]
     assert n_unjudged(x_d, NP) == NP
     assert n_unjudged(commanded()[:2000], NP) == 0

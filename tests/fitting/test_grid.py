@@ -11,25 +11,25 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.fitting.choice import with_window
 from hybridsep.fitting.tuning import TUNED, candidates, default_values
 
-PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, trust=False)
-TRUST = replace(PAPER, trust=True)
+PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, averaging=False)
+AVERAGING = replace(PAPER, averaging=True)
 
 
 def test_the_defaults_are_a_few_replays() -> None:
     assert 20 <= len(candidates(PAPER, default_values(PAPER))) <= 30
-    assert 10 <= len(candidates(TRUST, default_values(TRUST))) <= 20
+    assert 10 <= len(candidates(AVERAGING, default_values(AVERAGING))) <= 20
 
 
-@pytest.mark.parametrize("trust", [False, True])
+@pytest.mark.parametrize("averaging", [False, True])
 @pytest.mark.parametrize("Np", [1, 2, 19, 5000])
-def test_all_fit_the_window_and_the_machines_own_come_first(Np: int, trust: bool) -> None:
-    own = replace(with_window(PAPER, Np), trust=trust, forgetting=7.0)
+def test_all_fit_the_window_and_the_machines_own_come_first(Np: int, averaging: bool) -> None:
+    own = replace(with_window(PAPER, Np), averaging=averaging, forgetting=7.0)
     assert (own.p, own.q) == (min(50, Np), min(3, Np - 1))
     tried = candidates(own, default_values(own))
     assert tried[0] == own
     assert len(set(tried)) == len(tried)
     differing = {field for field in TUNED if len({getattr(one, field) for one in tried}) > 1}
-    assert differing <= ({"p", "q", "forgetting"} if trust else {"p", "q", "lam"})
+    assert differing <= ({"p", "q", "forgetting"} if averaging else {"p", "q", "lam"})
     assert {replace(one, **{field: getattr(own, field) for field in TUNED}) for one in tried} == {own}
 
 
@@ -43,7 +43,7 @@ def test_the_least_penalty_that_is_allowed_bounds_the_defaults() -> None:
     [
         (PAPER, {"p": (5, 101)}, "--p: p must be 1 … Np = 100, got 101; lower p or raise Np"),
         (PAPER, {"q": (100,)}, "--q: q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
-        (PAPER, {"effect": (1e-5,)}, "--effect has an effect with trust only: give --trust true, too"),
+        (PAPER, {"effect": (1e-5,)}, "--effect has an effect with averaging only: give --averaging true, too"),
         (
             replace(PAPER, Np=1000),
             {"p": range(1, 1001), "lam": [10.0**-i for i in range(30)], "q": range(4)},

@@ -13,7 +13,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fitting.tuning import Logs, Tuning, over_windows, replayed_losses, tune
 
-PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, trust=False, t_init=0.0)
+PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, averaging=False, t_init=0.0)
 CANDIDATES = [PAPER, *(replace(PAPER, p=p, lam=lam) for p in (1, 20) for lam in (1e-10, 1e-6))]
 LOGS: Logs = {"one": [small_signals(300)], "two": [small_signals(130, seed=1), small_signals(90, seed=2)]}
 
@@ -73,9 +73,9 @@ def test_the_error_over_windows_is_that_of_as_many_lags_as_fit() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("trust", [False, True])
-def test_the_result_is_the_same_for_any_number_of_processes(trust: bool) -> None:
-    candidates = [replace(one, trust=trust) for one in CANDIDATES]
+@pytest.mark.parametrize("averaging", [False, True])
+def test_the_result_is_the_same_for_any_number_of_processes(averaging: bool) -> None:
+    candidates = [replace(one, averaging=averaging) for one in CANDIDATES]
     one, two = (tune(MODEL, LOGS, candidates, jobs=jobs) for jobs in (1, 2))
     np.testing.assert_array_equal(one.rms_h, two.rms_h)
     np.testing.assert_array_equal(one.rms_pb, two.rms_pb)

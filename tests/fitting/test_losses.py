@@ -18,7 +18,7 @@ from hybridsep.evaluate.backtest import backtest
 from hybridsep.fitting.tuning import Piece, n_unjudged, replayed_losses
 from hybridsep.predict.predictor import HybridPredictor
 
-PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, trust=False, t_init=0.0)
+PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, averaging=False, t_init=0.0)
 
 
 def cut(n: int, *, start: float = 0.0, ends: Sequence[int] = ()) -> list[Piece]:
@@ -47,7 +47,7 @@ def one_by_one(pieces: Sequence[Piece], candidate: PredictorSettings) -> Array:
     [cut(613), cut(600, start=0.3), cut(613, start=-2.0, ends=(101, 340)), cut(45, ends=(20,)), cut(7)],
     ids=["a short last window", "start offset", "gaps", "few windows", "less than a window"],
 )
-@pytest.mark.parametrize("change", [{}, {"t_init": 0.05}, {"trust": True}, {"p": 20, "q": 19}])
+@pytest.mark.parametrize("change", [{}, {"t_init": 0.05}, {"averaging": True}, {"p": 20, "q": 19}])
 def test_losses_are_those_of_backtests(pieces: list[Piece], change: dict[str, Any]) -> None:
     candidate, done = replace(PAPER, **change), list[float]()
     found = replayed_losses(MODEL, pieces, candidate, done.append)
@@ -66,13 +66,13 @@ def test_a_candidate_that_diverges_has_an_infinite_loss() -> None:
     assert np.isnan([one.rms_pb for one in found]).tolist() == [True, False]
 
 
-def test_missing_measurements_are_not_scored_with_trust_and_refused_without() -> None:
+def test_missing_measurements_are_not_scored_with_averaging_and_refused_without() -> None:
     ((x_d, x),) = cut(200)
     x = x.copy()
     x[50:55] = np.nan
-    trusting = replace(PAPER, trust=True)
-    found = replayed_losses(MODEL, [(x_d, x)], trusting)
-    np.testing.assert_allclose([found.rms_pb, found.rms_h], one_by_one([(x_d, x)], trusting)[[0, 2]], rtol=1e-12)
+    averages = replace(PAPER, averaging=True)
+    found = replayed_losses(MODEL, [(x_d, x)], averages)
+    np.testing.assert_allclose([found.rms_pb, found.rms_h], one_by_one([(x_d, x)], averages)[[0, 2]], rtol=1e-12)
     with pytest.raises(SignalError, match="x must be finite, got nan at sample 50"):
         replayed_losses(MODEL, [(x_d, x)], PAPER)
     with pytest.raises(SignalError, match="x_d and x must have as many samples, at least one, got 200, 199"):

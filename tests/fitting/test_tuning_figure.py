@@ -19,7 +19,7 @@ from hybridsep.fitting.tuning import Tuning, tuning_figure
 @pytest.mark.parametrize("Np", [50, 100, 400])
 @pytest.mark.parametrize("names", [("p",), ("p", "q"), ("p", "q", "lam")])
 def test_no_label_is_cut_off(Np: int, names: tuple[str, ...], tmp_path: Path) -> None:
-    own = PredictorSettings(trust=False, Np=Np)
+    own = PredictorSettings(averaging=False, Np=Np)
     values: dict[str, tuple[Any, ...]] = {
         "p": tuple(range(5, 55, 5)),
         "q": (1, 3, 10),

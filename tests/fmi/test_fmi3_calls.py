@@ -201,12 +201,12 @@ def test_variables_of_several_sizes_in_one_call(fmu: Library3) -> None:
 
 def test_enumerations_and_booleans_are_read_and_written(fmu: Library3) -> None:
     instance = instance_in(fmu, "Initialization Mode")
-    assert (fmu.kinds["input_hold"], fmu.kinds["trust"]) == ("Int64", "Boolean")
+    assert (fmu.kinds["input_hold"], fmu.kinds["averaging"]) == ("Int64", "Boolean")
     for value in (1, 0):
         assert fmu.set(instance, "input_hold", value) == OK
         assert fmu.get(instance, "input_hold") == value
-        assert fmu.set(instance, "trust", bool(value)) == OK
-        assert fmu.get(instance, "trust") is bool(value)
+        assert fmu.set(instance, "averaging", bool(value)) == OK
+        assert fmu.get(instance, "averaging") is bool(value)
     assert fmu.set(instance, "input_hold", 2**62) == OK
     assert fmu.ExitInitializationMode(instance) == ERROR
     assert "input_hold must be" in fmu.messages[-1][2]

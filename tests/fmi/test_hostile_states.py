@@ -42,7 +42,7 @@ def sampled(look_ahead: LookAhead, count: int) -> None:
 
 def small_predictor(**more: Any) -> HybridPredictor:
     return HybridPredictor(
-        MODEL, PredictorSettings(**{"trust": False, "Np": 8, "p": 3, "q": 2, "lam": 1e-8, "t_init": 0.0} | more)
+        MODEL, PredictorSettings(**{"averaging": False, "Np": 8, "p": 3, "q": 2, "lam": 1e-8, "t_init": 0.0} | more)
     )
 
 
@@ -82,8 +82,8 @@ def predictor_state() -> bytes:
     return predictor.to_bytes()
 
 
-def trusted_state() -> bytes:
-    predictor = small_predictor(trust=True)
+def averaged_state() -> bytes:
+    predictor = small_predictor(averaging=True)
     use_predictor(predictor)
     predictor.predict(np.linspace(0, 1e-3, 8))
     return predictor.to_bytes()
@@ -108,8 +108,8 @@ def compensator_state() -> bytes:
     return compensator.to_bytes()
 
 
-def trusted_compensator_state() -> bytes:
-    compensator = small_compensator(trust=True)
+def averaged_compensator_state() -> bytes:
+    compensator = small_compensator(averaging=True)
     use_compensator(compensator)
     compensator.plan(np.linspace(0, 1e-3, compensator.preview))
     return compensator.to_bytes()
@@ -117,10 +117,10 @@ def trusted_compensator_state() -> bytes:
 
 STATES: dict[str, tuple[Callable[[], bytes], Callable[[bytes], Any], Callable[[Any], None]]] = {
     "predictor": (predictor_state, HybridPredictor.from_bytes, use_predictor),
-    "predictor with trust": (trusted_state, HybridPredictor.from_bytes, use_predictor),
+    "predictor with averaging": (averaged_state, HybridPredictor.from_bytes, use_predictor),
     "look-ahead": (look_ahead_state, partial(LookAhead.from_bytes, model_type=HybridPredictor), use_look_ahead),
     "compensator": (compensator_state, SepCompensator.from_bytes, use_compensator),
-    "compensator with trust": (trusted_compensator_state, SepCompensator.from_bytes, use_compensator),
+    "compensator with averaging": (averaged_compensator_state, SepCompensator.from_bytes, use_compensator),
     "look-ahead of a compensator": (
         sep_look_ahead_state,
         partial(LookAhead.from_bytes, model_type=SepCompensator),

@@ -40,8 +40,8 @@ def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> 
 
 
 GROUPS = {
-    "Predictor": ["Look-ahead and residual model", "Residual model with trust", "Physics model"],
-    "Compensator": ["Look-ahead and residual model", "Residual model with trust", "Compensation", "Physics model"],
+    "Predictor": ["Look-ahead and residual model", "Residual model with averaging", "Physics model"],
+    "Compensator": ["Look-ahead and residual model", "Residual model with averaging", "Compensation", "Physics model"],
     "Drive": ["Drive", "Encoder"],
     "Drive_als25010_x": ["Disturbance", "Command", "Encoder", "Physics model"],
     "Trajectory": ["Trajectory"],
@@ -102,7 +102,7 @@ def test_the_page_has_groups_display_units_and_what_items_mean(fmus: BuiltFmus) 
         page = archive.read("documentation/index.html").decode()
     headings = re.findall(r'scope="rowgroup">([^<]+)</th>', page)
     assert headings == [
-        *("Inputs", "Outputs", "Look-ahead and residual model", "Residual model with trust", "Compensation"),
+        *("Inputs", "Outputs", "Look-ahead and residual model", "Residual model with averaging", "Compensation"),
         "Physics model",
     ]
     assert "<td>x_h_std</td><td>Real, m</td><td>um</td>" in page

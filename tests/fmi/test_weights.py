@@ -192,12 +192,12 @@ def test_weights_in_memory_are_those_of_the_file(tmp_path: Path) -> None:
     assert from_file.state.tobytes() != CModel("predictor_2", settings).initialise().state.tobytes()
 
 
-TRUST = {"p": 4, "q": 2, "Np": 20, "trust": 1}
+AVERAGING = {"p": 4, "q": 2, "Np": 20, "averaging": 1}
 
 
-def trained_with_trust() -> HybridPredictor:
-    """Return a predictor of the default machine with short windows that has learned with trust."""
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
+def trained_with_averaging() -> HybridPredictor:
+    """Return a predictor of the default machine with short windows that has learned with averaging."""
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=True)
     predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings, start=0.0)
     for k in range(20):
         command = 1e-3 * np.sin(0.01 * np.arange(20 * k, 20 * k + 20))
@@ -207,10 +207,10 @@ def trained_with_trust() -> HybridPredictor:
 
 
 def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
-    content = weights_file(trained_with_trust())
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
+    content = weights_file(trained_with_averaging())
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=True)
     predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
-    from_file, in_memory = CModel("predictor", TRUST, tmp_path), CModel("predictor", TRUST)
+    from_file, in_memory = CModel("predictor", AVERAGING, tmp_path), CModel("predictor", AVERAGING)
     damaged, other = spoiled(content)
     for name, changed in (damaged | other).items():
         with pytest.raises(StateError):
@@ -230,7 +230,7 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
         {"lambda": 1e-8},
         {"T_s": 1e-3 / 3},
         {"input_hold": 1, "dead_time": 7},
-        {"trust": 1},
+        {"averaging": 1},
     ):
         learned, now = (
             HybridPredictor(

@@ -1,5 +1,5 @@
-/* The HAL component without LinuxCNC, one axis at a time: pins are plain memory, and Python steps them. COMPONENT is the
- * file that hybridsep hal has written; the headers that it includes are empty here. */
+/* The HAL component without LinuxCNC, one axis at a time: pins are plain memory, and Python steps them. COMPONENT is
+ * the file that hybridsep hal has written; the headers that it includes are empty here. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -101,8 +101,8 @@ int stub_messages(void) { return n_messages; }
 int stub_longest_name(void) { return longest_name; }
 const char *stub_message(void) { return last_message; }
 
-/* A period, ns, with the inputs cmd, fb, active, enable, reset; to outputs out, delayed, fb-joint, predicted, error, std
- * and state. */
+/* A period, ns, with the inputs cmd, fb, active, enable, reset; to outputs out, delayed, fb-joint, predicted, error,
+ * std and state. */
 void stub_step(long period, const double inputs[5], double outputs[7])
 {
     axis_pins *pins = axis_all[0].pins;

@@ -115,7 +115,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "T_s": 0.002,
         "t_init": -1.0,
         "input_hold": 0,
-        "trust": True,
+        "averaging": True,
         "effect": 0.0,
         "noise_std": 0.0,
         "forgetting": 0.0,
@@ -167,7 +167,7 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
         machine = load_machine(name)
         compensator = machine.new_compensator()
         assert compensator.predictor.settings == PredictorSettings(Np=50)
-        paper = {"trust": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
+        paper = {"averaging": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
         assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=1e-3)
@@ -187,7 +187,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "t_init": -1.0,
         "input_hold": 0,
         "dead_time": 0,
-        "trust": True,
+        "averaging": True,
         "effect": 0.0,
         "noise_std": 0.0,
         "forgetting": 0.0,
@@ -217,7 +217,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert compensator.predictor.settings == settings
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
-    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, trust=False))
+    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, averaging=False))
     assert without.predictor.regression.n_features == 2 + 9 + 20
     assert machine.fmi_parameters()["Np"] == 50
 
@@ -230,16 +230,16 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
     own = load_machine(write(tmp_path, text + "measurement_delay = 0\n"))
     assert own.fmi_compensator_parameters()["measurement_delay"] == 0
     assert own.fmi_parameters()["measurement_delay"] == 3
-    refused = "measurement_delay of a compensator must be 0 with trust = false, got 3"
+    refused = "measurement_delay of a compensator must be 0 with averaging = false, got 3"
     with pytest.raises(MachineError, match=f"compensator: {refused}"):
-        load_machine(write(tmp_path, text + "trust = false\nmeasurement_delay = 3\n"))
+        load_machine(write(tmp_path, text + "averaging = false\nmeasurement_delay = 3\n"))
     for predictor_alone in (
-        load_machine(write(tmp_path, text + "trust = false\n")),
-        machine.changed("predictor", {"trust": False}),
+        load_machine(write(tmp_path, text + "averaging = false\n")),
+        machine.changed("predictor", {"averaging": False}),
     ):
         assert predictor_alone.new_predictor().settings.measurement_delay == 3
         with pytest.raises(
-            MachineError, match=rf"{refused}.* set trust = true or measurement_delay = 0 in \[compensator"
+            MachineError, match=rf"{refused}.* set averaging = true or measurement_delay = 0 in \[compensator"
         ):
             predictor_alone.fmi_compensator_parameters()
         with pytest.raises(ParameterError, match=refused):

@@ -7,15 +7,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from averaged_cases import PERIOD, averaged, averaged_model, cycles, friction, physics, run
 from random_drives.generator import RandomDrive, random_drives
 from random_drives.simulation import simulate
-from trusted_cases import PERIOD, cycles, friction, physics, run, trusted, trusted_model
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.model import OF_PHYSICS
-from hybridsep.predict.averaging.stacking import COMMAND, DOUBTING, LAGGED
+from hybridsep.predict.averaging.model import MODEL_RESIDUAL
+from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, FRESH_START
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-6  # m
@@ -27,7 +27,7 @@ def rms(error: Array) -> float:
 
 def learned(x_d: Array, e: Array) -> HybridPredictor:
     """Return a predictor after a run with residuals ``e``, about to begin another."""
-    predictor = trusted()
+    predictor = averaged()
     run(predictor, x_d, physics(x_d) + e + NOISE * np.random.default_rng(7).normal(size=len(x_d)))
     predictor.restart()
     return predictor
@@ -67,33 +67,41 @@ def test_what_has_changed_is_relearned_as_cold(factor: float) -> None:
     x_d = cycles(4 * PERIOD)
     x = physics(x_d) + factor * friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
-    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    found, cold = run(warm, x_d, x), run(averaged(), x_d, x)
     assert rms((x - found)[2000:]) <= 1.01 * rms((x - cold)[2000:])
-    model = trusted_model(warm)
+    model = averaged_model(warm)
     assert not model.doubts
-    assert model.learned.stack.weights[DOUBTING] == 0.0
-    assert model.evidence[OF_PHYSICS].n_rows == len(x_d)
+    assert model.learned.stack.weights[FRESH_START] == 0.0
+    assert model.evidence[MODEL_RESIDUAL].n_rows == len(x_d)
 
 
 def test_what_has_not_changed_keeps_what_was_learned() -> None:
     x_d = cycles(4 * PERIOD)
     x = physics(x_d) + friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
-    carried = trusted_model(warm).evidence[OF_PHYSICS].n_rows
-    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    carried = averaged_model(warm).evidence[MODEL_RESIDUAL].n_rows
+    found, cold = run(warm, x_d, x), run(averaged(), x_d, x)
     assert rms(x - found) < 1.15 * NOISE < 0.5 * rms(x - cold)
-    assert trusted_model(warm).evidence[OF_PHYSICS].n_rows == pytest.approx(carried + len(x_d))
+    assert averaged_model(warm).evidence[MODEL_RESIDUAL].n_rows == pytest.approx(carried + len(x_d))
 
 
 def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert_it_doubts() -> None:
     x_d = cycles(2 * PERIOD)
-    model = trusted_model(learned(x_d, friction(x_d)))
+    model = averaged_model(learned(x_d, friction(x_d)))
     assert model.doubts
-    evidence = model.evidence[OF_PHYSICS]
-    assert evidence.all(CONSTANTS.less).n_rows == pytest.approx(CONSTANTS.less * evidence.n_rows)
-    assert model.learned.stack.gram[DOUBTING, DOUBTING] == model.learned.stack.gram[LAGGED, LAGGED] > 0.0
-    assert model.learned.stack.cross[DOUBTING] == model.learned.stack.cross[LAGGED]
-    assert model.learned.errors_of(DOUBTING).noise_variance == model.learned.errors_of(LAGGED).noise_variance > 0.0
+    evidence = model.evidence[MODEL_RESIDUAL]
+    assert evidence.all(CONSTANTS.warm_prior_weight).n_rows == pytest.approx(
+        CONSTANTS.warm_prior_weight * evidence.n_rows
+    )
+    assert (
+        model.learned.stack.gram[FRESH_START, FRESH_START] == model.learned.stack.gram[ARX_RESIDUAL, ARX_RESIDUAL] > 0.0
+    )
+    assert model.learned.stack.cross[FRESH_START] == model.learned.stack.cross[ARX_RESIDUAL]
+    assert (
+        model.learned.errors_of(FRESH_START).noise_variance
+        == model.learned.errors_of(ARX_RESIDUAL).noise_variance
+        > 0.0
+    )
 
 
 @pytest.mark.slow
@@ -103,18 +111,22 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()
-    model = trusted_model(warm)
-    assert model.leading == COMMAND
-    assert model.learned.stack.gram[DOUBTING, DOUBTING] == model.learned.stack.gram[COMMAND, COMMAND] > 0.0
-    assert model.learned.errors_of(DOUBTING).noise_variance == model.learned.errors_of(COMMAND).noise_variance > 0.0
+    model = averaged_model(warm)
+    assert model.leading == ARX_COMMAND
+    assert (
+        model.learned.stack.gram[FRESH_START, FRESH_START] == model.learned.stack.gram[ARX_COMMAND, ARX_COMMAND] > 0.0
+    )
+    assert (
+        model.learned.errors_of(FRESH_START).noise_variance == model.learned.errors_of(ARX_COMMAND).noise_variance > 0.0
+    )
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
-    assert not trusted_model(warm).doubts
+    assert not averaged_model(warm).doubts
 
 
 def test_a_cold_run_doubts_nothing() -> None:
-    predictor = trusted()
-    assert not trusted_model(predictor).doubts
+    predictor = averaged()
+    assert not averaged_model(predictor).doubts
     run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
-    assert not trusted_model(predictor).doubts
-    assert trusted_model(predictor).learned.errors_of(COMMAND).noise_variance > 0.0
+    assert not averaged_model(predictor).doubts
+    assert averaged_model(predictor).learned.errors_of(ARX_COMMAND).noise_variance > 0.0

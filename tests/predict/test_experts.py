@@ -68,7 +68,7 @@ def test_prediction_is_the_formulas(p: int, k: int, correlation: float, largest_
     np.testing.assert_allclose(found.e_h, shrunk, rtol=0, atol=1e-12)
     assert (np.abs(found.e_h) < np.abs(found.unshrunk)).all()
     again = one.predict(rows + 1.0, past, largest_square, 100.0, held=found)
-    np.testing.assert_array_equal(again.kept, found.kept)
+    np.testing.assert_array_equal(again.shrinkage, found.shrinkage)
 
 
 def test_predictions_are_bounded() -> None:
@@ -76,7 +76,7 @@ def test_predictions_are_bounded() -> None:
     found = solved(0, evidence, 1e-6).predict(np.ones((N, N_STATIC)), np.zeros(2), 81.0, 5.0)
     assert found.unshrunk[0] > 8.9
     np.testing.assert_allclose(found.e_h, 5.0, rtol=1e-5)
-    np.testing.assert_allclose(found.kept * np.clip(found.unshrunk, -5.0, 5.0), found.e_h)
+    np.testing.assert_allclose(found.shrinkage * np.clip(found.unshrunk, -5.0, 5.0), found.e_h)
 
 
 def test_noise_that_is_not_known_is_the_first_one_and_none_is_below_the_least() -> None:

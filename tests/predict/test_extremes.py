@@ -38,7 +38,7 @@ SMALL = {"Np": 8, "p": 4, "q": 2, "dead_time": 0, "preview": 24, "spacing": 2}
 """Small windows, so that several fit into a short run."""
 
 LEARNING = ("lambda", "T_s", "t_init")
-TRUST = ("effect", "noise_std", "forgetting")
+AVERAGING = ("effect", "noise_std", "forgetting")
 PLANNING = ("jerk_weight", "v_max", "a_max", "j_max", "change_max")
 MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
@@ -139,7 +139,7 @@ def test_the_predictor(learning: dict[str, float], modes: dict[str, float], samp
 
     def run() -> None:
         parameters = {**learning, **{name: SMALL[name] for name in ("Np", "p", "q")}, "input_hold": hold}
-        predictor = HybridPredictor(model_from(modes), PredictorSettings.from_fmi({"trust": False, **parameters}))
+        predictor = HybridPredictor(model_from(modes), PredictorSettings.from_fmi({"averaging": False, **parameters}))
         check_look_ahead(
             LookAhead(predictor, 0.0),
             ("x_d", "x_pb", "x_h", "x_h_std", "e_servo", "rms_pb", "rms_h", "rms_hold"),
@@ -160,11 +160,17 @@ def test_the_predictor_in_c(learning: dict[str, float], modes: dict[str, float],
 
 @pytest.mark.slow
 @bounded
-@given(values_of(*LEARNING, *TRUST), modes_of(2), positions, st.sampled_from([0, 1]))
-def test_the_predictor_with_trust_in_c(
+@given(values_of(*LEARNING, *AVERAGING), modes_of(2), positions, st.sampled_from([0, 1]))
+def test_the_predictor_with_averaging_in_c(
     learning: dict[str, float], modes: dict[str, float], samples: Any, hold: int
 ) -> None:
-    values = {"trust": 1.0, **learning, **modes, **{name: SMALL[name] for name in ("Np", "p", "q")}, "input_hold": hold}
+    values = {
+        "averaging": 1.0,
+        **learning,
+        **modes,
+        **{name: SMALL[name] for name in ("Np", "p", "q")},
+        "input_hold": hold,
+    }
     model = CModel("predictor_2", values)
     refused(values, lambda: check_c_model(model, samples, values["T_s"]))
 

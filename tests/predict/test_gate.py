@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from averaged_cases import averaged_model
 from numpy.typing import NDArray
-from trusted_cases import trusted_model
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
@@ -13,8 +13,8 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.gate import Reach, reached
-from hybridsep.predict.averaging.model import OF_COMMAND, OF_PHYSICS
+from hybridsep.predict.averaging.gate import InnovationGate, gated
+from hybridsep.predict.averaging.model import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.predictor import HybridPredictor
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ def motion(n: int = 3000) -> tuple[Array, Array]:
 
 
 def believed(x: Array, x_pb: Array, *, scale: float = 1.0, Np: int = NP) -> NDArray[np.bool_]:
-    reach, before, fastest, largest, found = Reach(), 0.0, 0.0, 0.0, []
+    reach, before, fastest, largest, found = InnovationGate(), 0.0, 0.0, 0.0, []
     for i in range(0, len(x), Np):
         window = slice(i, i + Np)
         at, predicted = scale * x[window], scale * x_pb[window]
         fastest = max(fastest, float(np.abs(np.diff(predicted, prepend=before)).max()))
-        one, reach = reached(reach, at - predicted, largest, fastest, T_S)
+        one, reach = gated(reach, at - predicted, largest, fastest, T_S)
         before, largest = predicted[-1], max(largest, float(np.abs(at - predicted)[one].max(initial=0.0)))
         found.append(one)
     return np.concatenate(found)
@@ -140,7 +140,7 @@ def test_what_rings_is_learned() -> None:
 def test_missing_samples_are_counted_and_bridged() -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     x_d = staircase()[:2000]
-    predictor = HybridPredictor(model, PredictorSettings(trust=True))
+    predictor = HybridPredictor(model, PredictorSettings(averaging=True))
     x_pb, _ = predictor.discrete.forced_response(predictor.discrete.rest(), x_d)
     e_pb = 0.5 * np.diff(x_pb, prepend=0.0)  # a residual that a feature describes exactly
     gaps = np.random.default_rng(3).random(2000) < 0.01
@@ -149,32 +149,32 @@ def test_missing_samples_are_counted_and_bridged() -> None:
         window = slice(i, i + NP)
         errors.append(e_pb[window] - predictor.predict(x_d[window]).e_h)
         predictor.update(np.where(gaps[window], np.nan, (x_pb + e_pb)[window]))
-    assert trusted_model(predictor).n_rejected == gaps.sum()
+    assert averaged_model(predictor).n_rejected == gaps.sum()
     assert rms(np.concatenate(errors[10:])) < 0.05 * rms(e_pb[1000:])
 
 
 def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags() -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    predictor = HybridPredictor(model, PredictorSettings(trust=True, p=10))
+    predictor = HybridPredictor(model, PredictorSettings(averaging=True, p=10))
     x = staircase()[: 2 * NP]
     for i in range(0, 2 * NP, NP):
         predictor.predict(x[i : i + NP])
         predictor.update(np.where(np.arange(NP) // 8 == 11, np.nan, x[i : i + NP]))  # 8 missing, 4 more before the end
-    learned = trusted_model(predictor)
+    learned = averaged_model(predictor)
     # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
-    assert learned.evidence[OF_PHYSICS].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
-    assert learned.evidence[OF_COMMAND].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
+    assert learned.evidence[MODEL_RESIDUAL].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
+    assert learned.evidence[COMMAND_RESIDUAL].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
 
 
-def test_without_trust_a_missing_sample_is_an_error() -> None:
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False))
+def test_without_averaging_a_missing_sample_is_an_error() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False))
     predictor.predict(np.zeros(NP))
     with pytest.raises(SignalError, match="must be finite, got nan at sample 3"):
         predictor.update(np.where(np.arange(NP) == 3, np.nan, 0.0))
 
 
-def test_infinite_measurements_stay_errors_with_trust() -> None:
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=True))
+def test_infinite_measurements_stay_errors_with_averaging() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=True))
     predictor.predict(np.zeros(NP))
     with pytest.raises(SignalError, match="must be finite, got inf at sample 3"):
         predictor.update(np.where(np.arange(NP) == 3, np.inf, 0.0))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from averaged_cases import averaged_model, cycles, physics
 from compensator_cases import DRIVE_LIMITS, TS, beyond
 from predictor_cases import MODEL
-from trusted_cases import cycles, physics, trusted_model
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
@@ -26,7 +26,11 @@ from hybridsep.predict.predictor import HybridPredictor
 
 NP, DELAY, N = 40, 6, 400
 
-SETTINGS: list[dict[str, Any]] = [{"trust": True}, {"trust": False, "t_init": 0.0}, {"trust": False, "t_init": 0.063}]
+SETTINGS: list[dict[str, Any]] = [
+    {"averaging": True},
+    {"averaging": False, "t_init": 0.0},
+    {"averaging": False, "t_init": 0.063},
+]
 
 
 def drive() -> tuple[Array, Array]:
@@ -52,8 +56,8 @@ def test_windows_are_predicted_from_the_last_measurement_on(delay: int, settings
     """By a predictor without delay that predicts the samples not measured yet as well, and starts so much earlier."""
     x_d, x_meas = drive()[0], late(delay)
     predictor, peer = new(delay, **settings), new(0, **settings)
-    if settings["trust"]:  # only what is published is judged
-        model = trusted_model(peer)
+    if settings["averaging"]:  # only what is published is judged
+        model = averaged_model(peer)
         model = replace(model, fixed=replace(model.fixed, settings=predictor.settings))
         peer.state = replace(peer.state, residual=model)
     commands = np.concatenate((np.full(delay, x_d[0]), x_d))
@@ -84,7 +88,7 @@ def test_a_saved_predictor_goes_on(settings: dict[str, Any]) -> None:
 
 def test_the_operator_is_that_of_the_commands_to_come() -> None:
     x_d, x_meas = drive()[0], late(DELAY)
-    predictor = new(DELAY, trust=False, t_init=0.0)
+    predictor = new(DELAY, averaging=False, t_init=0.0)
     backtest(predictor, x_d[:200], x_meas[:200])
     model = predictor.operator()
     np.testing.assert_allclose(model(x_d[200:240]), predictor.predict(x_d[200:240]).x_h, rtol=0, atol=1e-12)
@@ -112,8 +116,10 @@ def test_a_delay_of_chunks_is_that_of_the_whole() -> None:
 
 
 def test_the_papers_compensator_refuses_a_delay() -> None:
-    with pytest.raises(ParameterError, match="measurement_delay of a compensator must be 0 with trust = false, got 6"):
-        SepCompensator(new(DELAY, trust=False))
+    with pytest.raises(
+        ParameterError, match="measurement_delay of a compensator must be 0 with averaging = false, got 6"
+    ):
+        SepCompensator(new(DELAY, averaging=False))
 
 
 def compensated(known: int, delay: int, compensate: str = "hybrid") -> list[Run]:

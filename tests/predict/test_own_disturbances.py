@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from averaged_cases import TS, cycles, physics, run
 from numpy.typing import ArrayLike
 from predictor_cases import MODEL
-from trusted_cases import TS, cycles, physics, run
 
 from benchmarks.periodic import CASES, STARTS, moves, new_predictor
 from hybridsep.base.errors import ParameterError, SignalError, StateError
@@ -136,8 +136,8 @@ def test_a_function_that_fails_where_the_drive_was_measured_changes_nothing() ->
     np.testing.assert_array_equal(one.predict(x_d[100:200]).x_h, twin.predict(x_d[100:200]).x_h)
 
 
-def test_disturbances_need_trust_and_must_be_functions() -> None:
-    with pytest.raises(ParameterError, match="with trust = true only"):
-        HybridPredictor(MODEL, PredictorSettings(trust=False), disturbances=(spring,))
+def test_disturbances_need_averaging_and_must_be_functions() -> None:
+    with pytest.raises(ParameterError, match="with averaging = true only"):
+        HybridPredictor(MODEL, PredictorSettings(averaging=False), disturbances=(spring,))
     with pytest.raises(ParameterError, match=r"disturbances\[1\] must be a function of x and v, got 3"):
         HybridPredictor(MODEL, disturbances=(spring, 3))  # type: ignore[arg-type]

@@ -32,7 +32,9 @@ def rms(error: Array) -> float:
 def replayed() -> tuple[Array, Array, Array]:
     """Return the paper's run with noise seed 0."""
     return replay(
-        HybridPredictor(MODEL, PredictorSettings(**PAPER, trust=False)), staircase.commanded(), staircase.measured(0)
+        HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)),
+        staircase.commanded(),
+        staircase.measured(0),
     )
 
 
@@ -49,7 +51,7 @@ class TestStaircase:
     @pytest.mark.slow
     def test_equals_the_oracle_elsewhere_on_the_axis(self) -> None:
         x_d, x = staircase.commanded() + 0.1, staircase.measured(0) + 0.1
-        _, x_h, _ = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, trust=False)), x_d, x)
+        _, x_h, _ = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)), x_d, x)
         slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
         np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
         np.testing.assert_allclose(x_h - 0.1, replayed()[1], rtol=0, atol=1e-10)
@@ -58,7 +60,7 @@ class TestStaircase:
         x_d = staircase.commanded()
         physics, cold, warm = [], [], []
         for seed in range(10):
-            predictor = HybridPredictor(MODEL, PredictorSettings(**PAPER, trust=False))
+            predictor = HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False))
             x = staircase.measured(seed)
             x_pb, x_h, _ = replay(predictor, x_d, x)
             physics.append(rms(x - x_pb))
@@ -91,7 +93,7 @@ def test_equals_the_oracle_with_other_parameters(
     x_d, x = small_signals(655, start=0.07)
     parameters: dict[str, Any] = {"T_s": 1e-3, "Np": Np, "p": p, "q": q, "lam": 1e-7, "t_init": t_init}
     x_pb, x_h, active = replay(
-        HybridPredictor(model, PredictorSettings(trust=False, input_hold=hold, **parameters)), x_d, x
+        HybridPredictor(model, PredictorSettings(averaging=False, input_hold=hold, **parameters)), x_d, x
     )
     slow = oracle.run(*oracle.transfer_function(modes), x_d, x, hold=hold, dead_time=dead_time, **parameters)
     np.testing.assert_allclose(x_pb, slow.x_pb, rtol=0, atol=1e-13)
@@ -122,7 +124,7 @@ def test_operator_equals_predict(data: st.DataObject, Np: int, windows: int, hol
     n = data.draw(st.integers(1, 3 * Np), "n")
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)], dead_time)
     predictor = HybridPredictor(
-        model, PredictorSettings(trust=False, Np=Np, p=p, q=q, lam=1e-6, t_init=0.0, input_hold=hold), start=start
+        model, PredictorSettings(averaging=False, Np=Np, p=p, q=q, lam=1e-6, t_init=0.0, input_hold=hold), start=start
     )
     replay(predictor, *small_signals(windows * Np + data.draw(st.integers(0, Np - 1), "rest"), start=start))
     operator = predictor.operator(n)

@@ -19,7 +19,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
-PAPER = PredictorSettings(trust=False)
+PAPER = PredictorSettings(averaging=False)
 
 
 def test_update_with_the_beginning_of_the_window() -> None:
@@ -68,7 +68,9 @@ def test_saved_in_mid_run_continues_bit_for_bit(way: str, measured: bool, tmp_pa
     x_d, x = small_signals(120)
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 2)
     original = HybridPredictor(
-        model, PredictorSettings(trust=False, Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"), start=0.001
+        model,
+        PredictorSettings(averaging=False, Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"),
+        start=0.001,
     )
     replay(original, x_d[:63], x[:63])
     if not measured:
@@ -141,7 +143,7 @@ def test_memory_does_not_grow() -> None:
 
 def test_fmi_names() -> None:
     parameters = {"lambda": 1e-9, "T_s": 5e-4, "input_hold": 1, "Np": 8, "p": 3, "q": 1, "t_init": 0.0}
-    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi({"trust": False, **parameters}), start=0.5)
+    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi({"averaging": False, **parameters}), start=0.5)
     assert (predictor.settings.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
     assert (predictor.Np, predictor.settings.p, predictor.settings.q, predictor.start) == (8, 3, 1, 0.5)
     assert predictor.regression.n_features == len(predictor.weights) == 6
@@ -207,7 +209,7 @@ def test_a_file_that_is_no_predictor(tmp_path: Path) -> None:
 
 def test_a_predictor_says_its_settings_and_how_much_it_has_learned() -> None:
     found = HybridPredictor(MODEL, PredictorSettings(Np=20, p=5, q=2))
-    assert repr(found) == "HybridPredictor(Np = 20, p = 5, q = 2, T_s = 0.001, trust = True, n_learned = 0)"
+    assert repr(found) == "HybridPredictor(Np = 20, p = 5, q = 2, T_s = 0.001, averaging = True, n_learned = 0)"
     found.predict(np.zeros(20))
     found.update(np.full(20, 1e-6))
     assert repr(found).endswith("n_learned = 20)")

@@ -175,7 +175,7 @@ def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, 
     x_d, x = staircase.commanded()[:n], staircase.measured(0)[:n]
     predictor = HybridPredictor(
         ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K),
-        PredictorSettings(trust=False, p=p, q=q, lam=lam),
+        PredictorSettings(averaging=False, p=p, q=q, lam=lam),
     )
     x_pb: list[float] = []
     for first in range(0, n, predictor.Np):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from averaged_cases import FRICTION, TS, averaged, cycles, friction, physics
 from predictor_cases import MODEL
-from trusted_cases import FRICTION, TS, cycles, friction, physics, trusted
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
@@ -41,7 +41,7 @@ def test_the_state_is_found_in_the_first_window(model: ModalModel, hold: str, de
     x_d, x_meas = x_d[delay:], x[: len(x) - delay]
     settings = PredictorSettings(input_hold=hold, measurement_delay=delay)
     predictor = HybridPredictor(model, settings)
-    paper = HybridPredictor(model, PredictorSettings(trust=False, input_hold=hold, measurement_delay=delay))
+    paper = HybridPredictor(model, PredictorSettings(averaging=False, input_hold=hold, measurement_delay=delay))
     errors = []
     for each in (predictor, paper):
         each.predict(x_d[:100])
@@ -52,7 +52,7 @@ def test_the_state_is_found_in_the_first_window(model: ModalModel, hold: str, de
 
 def test_the_paper_begins_at_rest() -> None:
     x_d, x = in_motion(MODEL)
-    paper = HybridPredictor(MODEL, PredictorSettings(trust=False))
+    paper = HybridPredictor(MODEL, PredictorSettings(averaging=False))
     for k in range(0, 300, 100):
         np.testing.assert_allclose(paper.predict(x_d[k : k + 100]).x_pb, physics(x_d)[k : k + 100], rtol=0, atol=1e-12)
         paper.update(x[k : k + 100])
@@ -60,7 +60,7 @@ def test_the_paper_begins_at_rest() -> None:
 
 def test_a_drive_at_rest_stays_there_though_its_command_moves_at_once() -> None:
     x_d = cycles(300)
-    predictor = trusted()
+    predictor = averaged()
     for k in range(0, 300, 100):
         expected = physics(x_d)[k : k + 100]
         np.testing.assert_allclose(predictor.predict(x_d[k : k + 100]).x_pb, expected, rtol=0, atol=1e-12)
@@ -71,7 +71,7 @@ def test_a_drive_at_rest_stays_there_though_its_command_moves_at_once() -> None:
 def test_few_samples_tell_nothing(n: int) -> None:
     """Four of each number of the state are needed, here eight."""
     x_d, x = in_motion(MODEL)
-    predictor = trusted()
+    predictor = averaged()
     predictor.predict(x_d[:100])
     predictor.update(x[:n])
     found = predictor.predict(x_d[n : n + 100]).x_pb
@@ -82,7 +82,7 @@ def test_missing_samples_are_left_out() -> None:
     x_d, x = in_motion(MODEL)
     x_meas = x.copy()
     x_meas[10:60:3] = np.nan
-    predictor = trusted()
+    predictor = averaged()
     predictor.predict(x_d[:100])
     predictor.update(x_meas[:100])
     assert np.abs(predictor.predict(x_d[100:200]).x_pb - x[100:200]).max() < 1e-5
@@ -93,7 +93,7 @@ def test_the_unit_has_no_effect(size: float) -> None:
     predictions = []
     for scale in (1.0, size):
         x_d, x = in_motion(MODEL, size=scale)
-        predictor = trusted()
+        predictor = averaged()
         for k in range(0, 400, 100):
             found = predictor.predict(x_d[k : k + 100])
             predictor.update(x[k : k + 100])

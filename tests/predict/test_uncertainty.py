@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trusted_cases import FRICTION, cycles, friction, physics, trusted
+from averaged_cases import FRICTION, averaged, cycles, friction, physics
 
 from hybridsep.base.metrics import coverage
 from hybridsep.base.records import numbers_of, unsound, with_numbers
@@ -180,11 +180,11 @@ def test_a_warm_run_over_the_staircase_covers_at_each_third_of_the_window() -> N
         np.testing.assert_allclose(shares, LEVELS, atol=0.05)
 
 
-@pytest.mark.parametrize(("trust", "atol"), [(True, 0.04), (False, 0.07)])
-def test_intervals_cover_friction_and_noise(trust: bool, atol: float) -> None:
+@pytest.mark.parametrize(("averaging", "atol"), [(True, 0.04), (False, 0.07)])
+def test_intervals_cover_friction_and_noise(averaging: bool, atol: float) -> None:
     x_d = cycles(8000)
     x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(6).normal(0.0, 2e-6, len(x_d))
-    predictor = trusted() if trust else HybridPredictor(trusted().model, PredictorSettings(trust=False))
+    predictor = averaged() if averaging else HybridPredictor(averaged().model, PredictorSettings(averaging=False))
     shares = covered(predictor, x_d, x)
     np.testing.assert_allclose(shares[1:], LEVELS[1:], atol=atol)
     assert shares[0] == pytest.approx(0.5, abs=0.1)
@@ -193,7 +193,7 @@ def test_intervals_cover_friction_and_noise(trust: bool, atol: float) -> None:
 def test_the_warm_up_has_the_deviation_of_the_physics_model() -> None:
     x_d = cycles(3000)
     x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(7).normal(0.0, 1e-6, len(x_d))
-    results: dict[float, Any] = {t_init: backtest(trusted(t_init=t_init), x_d, x) for t_init in (-1.0, 2.0)}
+    results: dict[float, Any] = {t_init: backtest(averaged(t_init=t_init), x_d, x) for t_init in (-1.0, 2.0)}
     assert not results[2.0].active[:2000].any()
     residual = float(np.sqrt(np.mean((x - results[2.0].x_pb)[1000:2000] ** 2)))
     assert 0.5 * residual < np.median(results[2.0].x_h_std[1000:2000]) < 2.0 * residual

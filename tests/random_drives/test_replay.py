@@ -25,7 +25,7 @@ def drive() -> RandomDrive:
 @pytest.mark.slow
 def test_figures_are_those_of_backtest(drive: RandomDrive) -> None:
     result = replay(drive, "paper")
-    scores = backtest(HybridPredictor(drive.model, PredictorSettings(trust=False)), drive.x_d, drive.x_meas)
+    scores = backtest(HybridPredictor(drive.model, PredictorSettings(averaging=False)), drive.x_d, drive.x_meas)
     assert result.rms_pb == pytest.approx(scores.overall.rms_pb, rel=1e-9)
     assert result.rms_h == pytest.approx(scores.overall.rms_h, rel=1e-12)
     # Backtest publishes x_pb during the warm-up.

@@ -1,8 +1,8 @@
 """The implementations against the library, output by output and sample by sample, in closed loops of the library.
 
-1e-12 m for a predictor with trust, 1e-11 m for the paper's and for a compensator with its usual limits, 1e-9 m for all
-other parameters of a compensator, whose loop amplifies what is rounded apart; a pythonfmu FMU is the library itself and
-agrees to the last bit, over the first third of each loop.
+1e-12 m for a predictor with averaging, 1e-11 m for the paper's and for a compensator with its usual limits, 1e-9 m for
+all other parameters of a compensator, whose loop amplifies what is rounded apart; a pythonfmu FMU is the library itself
+and agrees to the last bit, over the first third of each loop.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from streams import StreamMaker, on_all
 
 from hybridsep.plants.trajectory import staircase
 
-PAPER: dict[str, Any] = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+PAPER: dict[str, Any] = {"averaging": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 BEST = PAPER | {"Np": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
 """The paper's model, and the settings of a compensator that are best for it."""
 
@@ -93,8 +93,8 @@ def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, val
 
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
-def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
-    loop = assert_agreement(new_stream, 2550, {"trust": True, "t_init": -1.0}, 1e-12, start=start)
+def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+    loop = assert_agreement(new_stream, 2550, {"averaging": True, "t_init": -1.0}, 1e-12, start=start)
     assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
     assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
 
@@ -117,11 +117,11 @@ def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: Str
     ],
     ids=named,
 )
-def test_every_parameter_predicts_with_trust_as_in_the_library(
+def test_every_parameter_predicts_with_averaging_as_in_the_library(
     new_stream: StreamMaker, values: dict[str, Value], path: str
 ) -> None:
     n = 150 if values.get("Np") == 1 else 650
-    assert_agreement(new_stream, n, {"trust": True, **values}, 1e-12, path=path)
+    assert_agreement(new_stream, n, {"averaging": True, **values}, 1e-12, path=path)
 
 
 def faulty(k: int, x_meas: float, last: float) -> float:
@@ -141,7 +141,7 @@ def faulty(k: int, x_meas: float, last: float) -> float:
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("values", [{}, {"Np": 30, "p": 7, "q": 1}], ids=named)
 def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    given = {"trust": True, "t_init": -1.0, **values}
+    given = {"averaging": True, "t_init": -1.0, **values}
     loop = assert_agreement(new_stream, 2850, given, 1e-12, sensor=faulty)
     sound = closed_loop(new_stream.model, 2850, given)
     change = np.abs(loop.column(PREDICTOR, "x_h") - loop.column(PREDICTOR, "x_pb"))
@@ -149,7 +149,7 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
     assert np.isfinite(loop.outputs).all()
     n_rejected = loop.column(PREDICTOR, "n_rejected")
     assert 150 < n_rejected[-1] < 500
-    assert not closed_loop(new_stream.model, 2850, {}).column(PREDICTOR, "n_rejected").any()  # without trust
+    assert not closed_loop(new_stream.model, 2850, {}).column(PREDICTOR, "n_rejected").any()  # without averaging
 
 
 @pytest.mark.slow
@@ -210,7 +210,7 @@ def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, val
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.1, pytest.param(0.0, marks=pytest.mark.nightly)])
-def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     loop = assert_agreement(new_stream, 1600, {}, 1e-11, start=start)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert loop.column(COMPENSATOR, "rms_e")[-1] < 1e-5
@@ -236,7 +236,7 @@ def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: S
     ],
     ids=named,
 )
-def test_every_parameter_compensates_with_trust_as_in_the_library(
+def test_every_parameter_compensates_with_averaging_as_in_the_library(
     new_stream: StreamMaker, values: dict[str, Value]
 ) -> None:
     assert_agreement(new_stream, 150 if values.get("Np") == 2 else 750, values, 1e-9)
@@ -269,10 +269,10 @@ def at_rest_first(k: int, x_meas: float, last: float) -> float:
 
 
 @on_all(LOOK_AHEADS)
-@pytest.mark.parametrize("trust", [True, False])
-def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker, trust: bool) -> None:
+@pytest.mark.parametrize("averaging", [True, False])
+def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker, averaging: bool) -> None:
     """As a sequential master carries it; the outputs are those of measurements in time, bit for bit."""
-    values: dict[str, Value] = SHORT[kind_of(new_stream.model)] | {"trust": trust}
+    values: dict[str, Value] = SHORT[kind_of(new_stream.model)] | {"averaging": averaging}
     loop = closed_loop(new_stream.model, 300, values, sensor=at_rest_first)
     early = replace(loop, x=np.append(loop.x[1:], loop.x[-1]))
     in_time, held = new_stream(), new_stream()

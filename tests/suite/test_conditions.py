@@ -1,6 +1,6 @@
 """Late measurements, starts in motion and plants that have changed, in every implementation.
 
-Every implementation shows what the library shows: within 1e-12 m with trust, 1e-11 m with the paper's model, to the
+Every implementation shows what the library shows: within 1e-12 m with averaging, 1e-11 m with the paper's model, to the
 last bit in a pythonfmu FMU. That what it shows is good is tested beside it.
 """
 
@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from averaged_cases import averaged_model, change_learned
 from driving import T_S
 from library_stream import LookAheadStream
 from staircase_data import commanded
 from stream import OUTPUTS, PREDICTOR, PYTHON, STAGE_PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
-from trusted_cases import change_learned, trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
-from hybridsep.predict.averaging.stacking import COMMAND, LAGGED, N_EXPERTS
+from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, N_EXPERTS
 
-TRUST: dict[str, Value] = {"trust": True, "t_init": 0.0}
+AVERAGING: dict[str, Value] = {"averaging": True, "t_init": 0.0}
 DELAY = 5
 
 CUT = 1060
@@ -56,12 +56,12 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
 
 
 @cache
-def learned(model: str, leading: int = LAGGED) -> bytes:
-    """Return the ``weights.bin`` of the model's predictor with trust after the staircase, in which an expert led."""
+def learned(model: str, leading: int = ARX_RESIDUAL) -> bytes:
+    """Return the ``weights.bin`` of the model's predictor with averaging after the staircase in which an expert led."""
     machine = machine_of(model)
-    predictor = machine.new_predictor(replace(machine.predictor_settings, trust=True))
+    predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True))
     backtest(predictor, *moved(model))
-    stack = trusted_model(predictor).learned.stack
+    stack = averaged_model(predictor).learned.stack
     change_learned(predictor, stack=replace(stack, weights=np.eye(N_EXPERTS)[leading]))
     return weights_file(predictor)
 
@@ -103,8 +103,8 @@ def of_library(model: str, inputs: tuple[Array, Array], values: dict[str, Value]
     return _OF_LIBRARY[key]
 
 
-def assert_same(shown: Array, expected: Array, implementation: str, *, trust: bool = True) -> None:
-    tolerance = 0.0 if implementation == PYTHON else 1e-12 if trust else 1e-11
+def assert_same(shown: Array, expected: Array, implementation: str, *, averaging: bool = True) -> None:
+    tolerance = 0.0 if implementation == PYTHON else 1e-12 if averaging else 1e-11
     for name, output, of_library in zip(OUTPUTS[PREDICTOR], shown.T, expected.T, strict=True):
         whole = name in ("batch", "n_rejected", "hybrid_active")
         np.testing.assert_allclose(output, of_library, rtol=0, atol=0 if whole else tolerance, err_msg=name)
@@ -113,7 +113,7 @@ def assert_same(shown: Array, expected: Array, implementation: str, *, trust: bo
 def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], values: dict[str, Value]) -> None:
     expected = of_library(new_stream.model, inputs, values)
     shown = run(new_stream(), inputs, values, saved_at=733)
-    assert_same(shown, expected, new_stream.implementation, trust=bool(values.get("trust")))
+    assert_same(shown, expected, new_stream.implementation, averaging=bool(values.get("averaging")))
 
 
 def last(outputs: Array, name: str) -> float:
@@ -130,10 +130,10 @@ def named(values: dict[str, Any]) -> str:
 @pytest.mark.parametrize(
     "values",
     [
-        TRUST | {"measurement_delay": 1},
-        TRUST | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1},
-        TRUST | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50},  # later than a window
-        TRUST | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25},
+        AVERAGING | {"measurement_delay": 1},
+        AVERAGING | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1},
+        AVERAGING | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50},  # later than a window
+        AVERAGING | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25},
         {"p": 20, "measurement_delay": DELAY},
         {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50, "t_init": 0.0},
     ],
@@ -149,18 +149,18 @@ def test_a_late_measurement_is_predicted_as_by_the_library(
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
 @pytest.mark.parametrize(
-    "values", [{}, {"Np": 30, "p": 5}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"trust": False}], ids=named
+    "values", [{}, {"Np": 30, "p": 5}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"averaging": False}], ids=named
 )
 def test_a_start_in_motion_is_predicted_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     inputs = cut(new_stream.model, int(values.get("Np", 100)), 0)
-    assert_agreement(new_stream, inputs, TRUST | values)
+    assert_agreement(new_stream, inputs, AVERAGING | values)
 
 
 @on_all((PREDICTOR,), needs="figures")
-@pytest.mark.parametrize("trust", [True, False])
-def test_a_known_delay_costs_little(new_stream: StreamMaker, trust: bool) -> None:
+@pytest.mark.parametrize("averaging", [True, False])
+def test_a_known_delay_costs_little(new_stream: StreamMaker, averaging: bool) -> None:
     """At most 5 % more than without delay at the same horizon, but many times as much where the delay is not known."""
-    values: dict[str, Value] = {**TRUST, "trust": trust}
+    values: dict[str, Value] = {**AVERAGING, "averaging": averaging}
     horizon = 100 + DELAY
     sound = run(new_stream(), late(PREDICTOR, horizon, 0, 2700), values | {"Np": horizon})
     known = run(new_stream(), late(PREDICTOR, 100, DELAY, 2700), values | {"measurement_delay": DELAY})
@@ -176,7 +176,7 @@ def test_a_rejected_measurement_is_within_the_interval(new_stream: StreamMaker) 
     """Of the windows that follow, as long as it is rejected; a sensor that is set anew by 1 mm is so for a second."""
     r, x = late(PREDICTOR, 100, 0, 3000)
     x = x + 1e-3 * (np.arange(3000) >= 1830)
-    shown = dict(zip(OUTPUTS[PREDICTOR], run(new_stream(), (r, x), TRUST)[:-1].T, strict=True))
+    shown = dict(zip(OUTPUTS[PREDICTOR], run(new_stream(), (r, x), AVERAGING)[:-1].T, strict=True))
     error, std = np.abs(x - shown["x_h"]), shown["x_h_std"]
     assert shown["n_rejected"][-1] == 1000
     assert error[1900:2830].min() > 9e-4
@@ -197,29 +197,34 @@ def growing(model: str) -> tuple[Array, Array]:
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
 @pytest.mark.parametrize("Np", [100, 50])
 def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:
-    assert_agreement(new_stream, growing(new_stream.model), TRUST | {"Np": Np, "p": 20})
+    assert_agreement(new_stream, growing(new_stream.model), AVERAGING | {"Np": Np, "p": 20})
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
 def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> None:
     inputs = cut(new_stream.model, 100, 0, 2000)
-    trusted, paper = (run(new_stream(), inputs, {**TRUST, "trust": trust}) for trust in (True, False))
-    assert last(trusted, "rms_h") < 1.02 * last(trusted, "rms_pb")
-    assert last(trusted, "rms_pb") < 0.97 * last(paper, "rms_pb")  # the state is found after the first window
+    averaged, paper = (run(new_stream(), inputs, {**AVERAGING, "averaging": averaging}) for averaging in (True, False))
+    assert last(averaged, "rms_h") < 1.02 * last(averaged, "rms_pb")
+    assert last(averaged, "rms_pb") < 0.97 * last(paper, "rms_pb")  # the state is found after the first window
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
 @pytest.mark.parametrize(
     ("name", "factor", "saved_at", "leading"),
     [
-        ("k", 1.2, 1333, LAGGED),
-        ("c_nl", 3.0, 150, COMMAND),
-        ("c", 1.0, 733, LAGGED),
-        ("k_nl", 0.7, 2499, LAGGED),  # of the drive, told by errors alone in the window that ends then, predicted again
-        pytest.param("k", 1.2, 1333, COMMAND, marks=pytest.mark.nightly),
-        pytest.param("c_nl", 3.0, 150, LAGGED, marks=pytest.mark.nightly),
-        pytest.param("c", 1.0, 733, COMMAND, marks=pytest.mark.nightly),
-        pytest.param("k_nl", 0.7, 2499, COMMAND, marks=pytest.mark.nightly),
+        ("k", 1.2, 1333, ARX_RESIDUAL),
+        ("c_nl", 3.0, 150, ARX_COMMAND),
+        ("c", 1.0, 733, ARX_RESIDUAL),
+        (
+            "k_nl",
+            0.7,
+            2499,
+            ARX_RESIDUAL,
+        ),  # of the drive, told by errors alone in the window that ends then, predicted again
+        pytest.param("k", 1.2, 1333, ARX_COMMAND, marks=pytest.mark.nightly),
+        pytest.param("c_nl", 3.0, 150, ARX_RESIDUAL, marks=pytest.mark.nightly),
+        pytest.param("c", 1.0, 733, ARX_COMMAND, marks=pytest.mark.nightly),
+        pytest.param("k_nl", 0.7, 2499, ARX_COMMAND, marks=pytest.mark.nightly),
     ],
 )
 def test_a_changed_plant_is_relearned_as_by_the_library(
@@ -229,8 +234,10 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
     model = new_stream.model
     name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
     inputs, weights = changed(model, name, factor), learned(model, leading)
-    expected = of_library(model, inputs, TRUST, weights)
-    assert_same(run(new_stream.planted(weights), inputs, TRUST, saved_at=saved_at), expected, new_stream.implementation)
+    expected = of_library(model, inputs, AVERAGING, weights)
+    assert_same(
+        run(new_stream.planted(weights), inputs, AVERAGING, saved_at=saved_at), expected, new_stream.implementation
+    )
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
@@ -243,7 +250,7 @@ def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
     inputs = changed(model, "f" if model == STAGE_PREDICTOR else "k_nl", factor)
     error = []
     for stream in (new_stream(), new_stream.planted(learned(model))):
-        shown = run(stream, inputs, TRUST)
+        shown = run(stream, inputs, AVERAGING)
         x_h = shown[2000:-1, OUTPUTS[PREDICTOR].index("x_h")]
         error.append(np.sqrt(np.mean((x_h - inputs[1][2000:]) ** 2)))
     assert error[1] < most * error[0]

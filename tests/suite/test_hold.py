@@ -43,18 +43,18 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
         {"t_init": 0.333},
         pytest.param({"measurement_delay": 7}, marks=pytest.mark.nightly),
         {"measurement_delay": 45},  # later than a window
-        {"trust": False},
-        {"trust": False, "t_init": 0.2},
+        {"averaging": False},
+        {"averaging": False, "t_init": 0.2},
     ],
-    ids=lambda more: ",".join(f"{key}={value}" for key, value in more.items()) or "trust",
+    ids=lambda more: ",".join(f"{key}={value}" for key, value in more.items()) or "averaging",
 )
 def test_hold_is_the_residual_of_the_last_sample_measured(new_stream: StreamMaker, more: dict[str, Value]) -> None:
-    values: dict[str, Value] = {"Np": 20, "p": 6, "q": 2, "trust": True, "t_init": 0.0} | more
+    values: dict[str, Value] = {"Np": 20, "p": 6, "q": 2, "averaging": True, "t_init": 0.0} | more
     fill, delay = 20, int(values.get("measurement_delay", 0))
     if new_stream.model == COMPENSATOR:
         fill = 50  # which ends within a window
         values |= {"preview": fill, "compensate": 2}
-    x_d, x = disturbed(new_stream.model, delay, missing=bool(values["trust"]))
+    x_d, x = disturbed(new_stream.model, delay, missing=bool(values["averaging"]))
     stream = new_stream()
     stream.initialise({**values, "x_d_ahead": float(x_d[0]), "x_meas": float(x[0])})
     shown: list[Any] = []

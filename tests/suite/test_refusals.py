@@ -66,9 +66,9 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"spacing": 0}, "spacing must be 1 … 1000, got 0"),
     ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 50, got 3"),
     (
-        {"measurement_delay": 4, "trust": False},
-        "measurement_delay of a compensator must be 0 with trust = false, got 4: only the model with trust plans from "
-        "a late measurement",
+        {"measurement_delay": 4, "averaging": False},
+        "measurement_delay of a compensator must be 0 with averaging = false, got 4: only the model with averaging "
+        "plans from a late measurement",
     ),
     ({"jerk_weight": -1.0}, "jerk_weight must be 0 … 1e+12, got -1.0"),
     ({"jerk_weight": math.nan}, "jerk_weight must be finite, got nan"),
@@ -215,7 +215,7 @@ def test_an_input_that_is_no_position_changes_nothing(
 ) -> None:
     stream, untroubled = new_stream(), new_stream()
     for each in (stream, untroubled):
-        initialise(each, trust=not math.isnan(value))  # with trust a measurement may be missing
+        initialise(each, averaging=not math.isnan(value))  # with averaging a measurement may be missing
         steps(each, 0, 145)
         each.step(0.145, 0.4 * T_S)
         set_inputs(each, 0.146)

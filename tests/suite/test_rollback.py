@@ -72,8 +72,8 @@ def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker, measureme
 
 
 @on_adapters((PREDICTOR,))
-def test_rollback_is_exact_with_trust(new_stream: StreamMaker) -> None:
-    assert_exact(new_stream, SHORT[PREDICTOR] | {"trust": True, "forgetting": 0.3})
+def test_rollback_is_exact_with_averaging(new_stream: StreamMaker) -> None:
+    assert_exact(new_stream, SHORT[PREDICTOR] | {"averaging": True, "forgetting": 0.3})
 
 
 @on_adapters((COMPENSATOR,))
@@ -87,7 +87,7 @@ def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMake
 def test_rollback_is_exact_while_a_late_measurement_is_planned_from(
     new_stream: StreamMaker, limits: dict[str, Value]
 ) -> None:
-    assert_exact(new_stream, SHORT[COMPENSATOR] | {"trust": True, "measurement_delay": 35} | limits)
+    assert_exact(new_stream, SHORT[COMPENSATOR] | {"averaging": True, "measurement_delay": 35} | limits)
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int)
 @on_adapters(LOOK_AHEADS)
 def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: StreamMaker) -> None:
     first, second = new_stream(), new_stream()
-    initialise(first, trust=new_stream.model == PREDICTOR)  # which the second one has not, by its machine file
+    initialise(first, averaging=new_stream.model == PREDICTOR)  # which the second one has not, by its machine file
     steps(first, 0, 155)
     blob = first.save()
     second.restore(blob)
@@ -118,7 +118,7 @@ def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: Str
 @on_adapters((PREDICTOR, COMPENSATOR))
 def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
     stream = new_stream()
-    initialise(stream, trust=True)
+    initialise(stream, averaging=True)
     steps(stream, 0, 107)
     for k in range(107, 110):
         stream.set("x_d_ahead", position(k * T_S))
@@ -133,18 +133,18 @@ def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
 
 
 @on_adapters((PREDICTOR,))
-def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
+def test_a_reset_ends_averaging(new_stream: StreamMaker) -> None:
     stream, fresh = new_stream(), new_stream()
-    initialise(stream, trust=True)
-    with_trust = steps(stream, 0, 150)
+    initialise(stream, averaging=True)
+    with_averaging = steps(stream, 0, 150)
     stream.reset()
     for each in (stream, fresh):
         initialise(each)
     expected = steps(fresh, 0, 150)
-    assert steps(stream, 0, 150) == expected != with_trust
+    assert steps(stream, 0, 150) == expected != with_averaging
     stream.reset()
-    initialise(stream, trust=True)
-    assert steps(stream, 0, 150) == with_trust
+    initialise(stream, averaging=True)
+    assert steps(stream, 0, 150) == with_averaging
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from hybridsep.base.metrics import coverage, rms
 def shown(stream: Stream, name: str, Np: int) -> tuple[dict[str, Array], Array]:
     """Return the outputs over the servo's run, (n,) each, and what it measured, (n,), m."""
     x_d, x = slow_servo(name)
-    values: dict[str, Value] = {"trust": True, "Np": Np, "p": min(Np, 50), "q": 3, "t_init": 0.0}
+    values: dict[str, Value] = {"averaging": True, "Np": Np, "p": min(Np, 50), "q": 3, "t_init": 0.0}
     stream.initialise({**values, "x_d_ahead": float(x_d[0]), "x_meas": float(x[0])})
     outputs = []
     for k, (ahead, measured) in enumerate(zip(x_d, np.concatenate((np.full(Np, x[0]), x)), strict=False)):

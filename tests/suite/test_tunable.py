@@ -21,7 +21,7 @@ CHANGES = {129: ("compensate", 0), 248: ("compensate", 2), 311: ("change_max", 5
 
 LIMITS = {"v_max": 0.5, "a_max": 30.0, "j_max": 3000.0}
 
-trusting = pytest.mark.parametrize("trust", [True, False])
+averages = pytest.mark.parametrize("averaging", [True, False])
 compensators = on_adapters((COMPENSATOR,))
 
 
@@ -37,9 +37,9 @@ def changed_run(stream: Stream, first: int = 0, last: int = N_RUN) -> Array:
 
 
 @cache
-def of_the_library(trust: bool) -> Array:
+def of_the_library(averaging: bool) -> Array:
     library = LookAheadStream(COMPENSATOR)
-    initialise(library, trust=trust, **LIMITS)
+    initialise(library, averaging=averaging, **LIMITS)
     return changed_run(library)
 
 
@@ -47,12 +47,12 @@ def column(outputs: Array, name: str) -> Array:
     return outputs[:, OUTPUTS[COMPENSATOR].index(name)]
 
 
-@trusting
+@averages
 @compensators
-def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, trust: bool) -> None:
+def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, averaging: bool) -> None:
     stream = new_stream()
-    initialise(stream, trust=trust, **LIMITS)
-    outputs, expected = changed_run(stream), of_the_library(trust)
+    initialise(stream, averaging=averaging, **LIMITS)
+    outputs, expected = changed_run(stream), of_the_library(averaging)
     x_dm, x_d, state = (column(outputs, name) for name in ("x_dm", "x_d", "sep_state"))
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=TOLERANCE)
     assert state.tolist() == column(expected, "sep_state").tolist()

@@ -10,19 +10,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from averaged_cases import averaged_model, change_learned
 from driving import closed_loop, replay, steps
 from library_models import trained_predictor
 from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters
-from trusted_cases import change_learned, trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.averaging.stacking import COMMAND, N_EXPERTS, Stack
+from hybridsep.predict.averaging.stacking import ARX_COMMAND, N_EXPERTS, Stack
 
 Trained = Callable[[str], Path]
 
@@ -45,8 +45,8 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
 def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a compensator's predictor, saved, in which the command's expert led."""
     path, predictor = tmp_path_factory.mktemp("led") / "command.state", trained_predictor(COMPENSATOR)
-    stack = trusted_model(predictor).learned.stack
-    weights, less = np.eye(N_EXPERTS)[COMMAND], 1e-3
+    stack = averaged_model(predictor).learned.stack
+    weights, less = np.eye(N_EXPERTS)[ARX_COMMAND], 1e-3
     change_learned(predictor, stack=Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence))
     predictor.save(path)
     return path
@@ -160,24 +160,24 @@ def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker
 
 
 @cache
-def learned_with_trust() -> bytes:
-    """Return the ``weights.bin`` of the default machine's predictor with trust after one staircase."""
+def learned_with_averaging() -> bytes:
+    """Return the ``weights.bin`` of the default machine's predictor with averaging after one staircase."""
     machine = load_machine("spring_mass_damper")
-    predictor = machine.new_predictor(replace(machine.predictor_settings, p=20, trust=True))
+    predictor = machine.new_predictor(replace(machine.predictor_settings, p=20, averaging=True))
     backtest(predictor, staircase(), simulate(machine.new_plant(), staircase(), machine.T_s))
     return weights_file(predictor)
 
 
 @on_adapters((COMPENSATOR,))
 def test_a_predictor_may_train_a_compensator(new_stream: StreamMaker) -> None:
-    new_stream.planted(learned_with_trust()).initialise({"p": 20})
-    with pytest.raises(RefusedStreamError, match=re.escape("trust must be 1, with which this FMU was trained")):
-        new_stream.planted(learned_with_trust()).initialise({"p": 20, "trust": False})
+    new_stream.planted(learned_with_averaging()).initialise({"p": 20})
+    with pytest.raises(RefusedStreamError, match=re.escape("averaging must be 1, with which this FMU was trained")):
+        new_stream.planted(learned_with_averaging()).initialise({"p": 20, "averaging": False})
 
 
 @on_adapters((PREDICTOR,))
-def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker) -> None:
-    learned, values = learned_with_trust(), {"trust": True, "p": 20, "t_init": -1.0}
+def test_what_was_learned_with_averaging_is_all_there_again(new_stream: StreamMaker) -> None:
+    learned, values = learned_with_averaging(), {"averaging": True, "p": 20, "t_init": -1.0}
     cold, warm = LookAheadStream(PREDICTOR), LookAheadStream(PREDICTOR, learned)
     stream = new_stream.planted(learned)
     runs = []
@@ -192,8 +192,8 @@ def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker)
 
 
 @on_adapters(LOOK_AHEADS)
-def test_what_was_learned_with_trust_is_for_no_other_model(new_stream: StreamMaker) -> None:
-    stream = new_stream.planted(learned_with_trust())
-    said = "trust must be 1, with which this FMU was trained (weights.bin), got 0"
+def test_what_was_learned_with_averaging_is_for_no_other_model(new_stream: StreamMaker) -> None:
+    stream = new_stream.planted(learned_with_averaging())
+    said = "averaging must be 1, with which this FMU was trained (weights.bin), got 0"
     with pytest.raises(RefusedStreamError, match=re.escape(said)):
-        stream.initialise({"p": 20, "trust": False})
+        stream.initialise({"p": 20, "averaging": False})

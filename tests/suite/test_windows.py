@@ -137,7 +137,7 @@ def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
 
 @on_all(LOOK_AHEADS)
 def test_the_warm_up_counts_from_the_end_of_the_fill(new_stream: StreamMaker) -> None:
-    # A plan with trust acts 24 samples after its window begins.
+    # A plan with averaging acts 24 samples after its window begins.
     name, hybrid, fill = ("hybrid_active", 1.0, 100) if new_stream.model == PREDICTOR else ("sep_state", 2.0, 224)
     shown = shown_by(new_stream, 700, {"t_init": 0.3})
     assert np.flatnonzero(shown[name] == hybrid)[0] == fill + 300

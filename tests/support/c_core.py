@@ -25,10 +25,10 @@ from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import (
+    AVERAGING_SETTINGS,
     COMPENSATOR_SETTINGS,
     INTERPOLATED,
     PREDICTOR_SETTINGS,
-    TRUST_SETTINGS,
     FmuTable,
 )
 from hybridsep.machines.machine import load_machine
@@ -55,7 +55,7 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 
 STAGE_MODES = tuple(asdict(mode) for mode in load_machine("als25010_x").model.modes)
 """The stage's X axis, Table 1."""
-PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}), "trust": 0}  # the paper's model
+PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS}), "averaging": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {
     "f": 1.4211e-5,
@@ -69,7 +69,7 @@ STAGE_DRIVE = {
     "seed": 7,
 }
 
-COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}), "trust": 0}
+COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS, **COMPENSATOR_SETTINGS}), "averaging": 0}
 
 TABLES: dict[str, FmuTable] = {
     table.name: table
@@ -253,9 +253,9 @@ class CModel:
 
 def write_weights(folder: Path, name: str, factor: Array, n_rows: int, **settings: float) -> None:
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
-    values = {"trust": 0, "period": 0.0, **TABLES[name].parameters, **settings}
+    values = {"averaging": 0, "period": 0.0, **TABLES[name].parameters, **settings}
     modes = TABLES[name].modes
-    names = (*PREDICTOR_SETTINGS, "trust", "period")
+    names = (*PREDICTOR_SETTINGS, "averaging", "period")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
     errors = numbers_of(Uncertainty.init(values["lambda"]))

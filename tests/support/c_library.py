@@ -16,7 +16,7 @@ from c_compiler import C_SOURCES, build_folder
 from c_core import library as core_library
 
 from hybridsep.base.parameters import Parameter
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 
 STRICT = "-Wall -Wextra -Wconversion -pedantic -Werror"
 
@@ -73,10 +73,10 @@ class PredictorPart(ctypes.Structure):
     _fields_ = _fields(dict(PREDICTOR_SETTINGS))
 
 
-class TrustPart(ctypes.Structure):
-    """hsep_trust_settings."""
+class AveragingPart(ctypes.Structure):
+    """hsep_averaging_settings."""
 
-    _fields_ = _fields(dict(TRUST_SETTINGS))
+    _fields_ = _fields(dict(AVERAGING_SETTINGS))
 
 
 class CompensatorPart(ctypes.Structure):
@@ -90,7 +90,7 @@ class Parameters(ctypes.Structure):
 
     _fields_ = (
         ("predictor", PredictorPart),
-        ("trust", TrustPart),
+        ("averaging", AveragingPart),
         ("compensator", CompensatorPart),
         ("n_modes", ctypes.c_uint64),
         ("modes", ctypes.POINTER(Mode)),
@@ -98,7 +98,11 @@ class Parameters(ctypes.Structure):
 
     def __setitem__(self, name: str, value: float) -> None:
         """Set a setting, whichever part has it."""
-        parts = (("predictor", PREDICTOR_SETTINGS), ("trust", TRUST_SETTINGS), ("compensator", COMPENSATOR_SETTINGS))
+        parts = (
+            ("predictor", PREDICTOR_SETTINGS),
+            ("averaging", AVERAGING_SETTINGS),
+            ("compensator", COMPENSATOR_SETTINGS),
+        )
         part = next(part for part, settings in parts if name in settings)
         setattr(getattr(self, part), name, value)
 

@@ -35,7 +35,7 @@ def compensator(
     no_reversal: bool = True,
     **changes: Any,
 ) -> SepCompensator:
-    predictor = HybridPredictor(MODEL, PredictorSettings(**{"trust": False, **changes}))
+    predictor = HybridPredictor(MODEL, PredictorSettings(**{"averaging": False, **changes}))
     return SepCompensator(
         predictor,
         CompensatorSettings(preview=200, limits=limits, compensate=compensate, no_reversal=no_reversal),

@@ -46,7 +46,7 @@ def trained(n: int, **changes: Any) -> HybridPredictor:
     """Return a small predictor in mid-run, after n samples."""
     settings_ = {"T_s": 1e-3, "Np": 10, "p": 4, "q": 2, "lam": 1e-9, "t_init": 0.0} | changes
     predictor = HybridPredictor(
-        ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)]), PredictorSettings(**{"trust": False, **settings_})
+        ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)]), PredictorSettings(**{"averaging": False, **settings_})
     )
     x_d, x = small_signals(n)
     replay(predictor, x_d, x)

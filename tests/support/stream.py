@@ -121,7 +121,7 @@ def kind_of(model: str) -> str:
 
 
 def machine_of(model: str) -> Machine:
-    """Return the machine of a model; a predictor has the paper's settings, so that trust is what a test says."""
+    """Return the machine of a model; a predictor has the paper's settings, so that averaging is what a test says."""
     name = model.partition("_")[2] or "spring_mass_damper"
     return paper_machine(name) if kind_of(model) == "HybridPredictor" else load_machine(name)
 

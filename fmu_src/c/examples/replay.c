@@ -161,7 +161,7 @@ static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *a
     const double omega = 2.0 * 3.14159265358979323846 * numbers[1];
     *mode = (hsep_mode){.f_n = numbers[1], .zeta = numbers[2], .alpha = omega * omega};
     hsep_defaults(parameters);
-    parameters->predictor.Np = (hsep_word)numbers[0];
+    parameters->predictor.Np = (hsep_int)numbers[0];
     parameters->predictor.p = parameters->predictor.Np < 50 ? parameters->predictor.Np : 50;
     parameters->n_modes = 1;
     parameters->modes = mode;

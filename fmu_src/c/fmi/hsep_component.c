@@ -59,7 +59,7 @@ HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call)
     if (instance == NULL || (call->legal & (unsigned)instance->experiment.phase) != 0) {
         return instance;
     }
-    const char *const *phases = instance->words->phases;
+    const char *const *phases = instance->names->phases;
     for (int place = 0; place < HSEP_N_PHASES; place++) {
         if ((call->legal & (1U << place)) != 0) {
             (void)strcat(strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), phases[place]);
@@ -74,17 +74,17 @@ HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call)
 /* Check name and token and take the table; why not is logged. */
 static hsep_status component_open(hsep_instance *instance, const char *name, const char *token, const char *resources)
 {
-    const hsep_words *words = instance->words;
+    const hsep_fmi_names *names = instance->names;
     char message[HSEP_MESSAGE_SIZE] = "";
     hsep_status status = HSEP_REFUSED;
     if (name == NULL || name[0] == '\0') {
-        (void)hsep_message_add(message, "%s: instanceName must not be empty", words->instantiate);
+        (void)hsep_message_add(message, "%s: instanceName must not be empty", names->instantiate);
     } else {
         status = hsep_open(instance, name, resources, message);
     }
     if (status != HSEP_REFUSED && (token == NULL || strcmp(token, instance->context.guid) != 0)) {
         status = hsep_message_add(
-            message, "%s: %s must be %s as in modelDescription.xml, got %.100s", words->instantiate, words->token,
+            message, "%s: %s must be %s as in modelDescription.xml, got %.100s", names->instantiate, names->token,
             instance->context.guid, (token == NULL) ? "NULL" : token);
     }
     if (status != HSEP_OK) {
@@ -100,7 +100,7 @@ HSEP_API hsep_component *hsep_component_new(
     if (component == NULL) {
         char text[HSEP_MESSAGE_SIZE];
         (void)hsep_text(
-            text, sizeof text, "%s: no memory for an instance of %lu bytes", filled->instance.words->instantiate,
+            text, sizeof text, "%s: no memory for an instance of %lu bytes", filled->instance.names->instantiate,
             (unsigned long)sizeof *component);
         if (filled->logger != NULL) {
             filled->hand(filled, component_status[2], component_categories[2], text);

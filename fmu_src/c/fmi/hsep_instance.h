@@ -10,7 +10,7 @@
 #include "hsep_api.h"
 #include "hsep_fmu.h"
 #include "hsep_layout.h"
-#include "hsep_words.h"
+#include "hsep_fmi_names.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -46,7 +46,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_experiment, 4);
 
 typedef struct {
-    const hsep_words *words;
+    const hsep_fmi_names *names;
     hsep_allocate allocate;
     hsep_release release;
     char *name;      /* NULL until it is known */

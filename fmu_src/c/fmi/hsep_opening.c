@@ -16,20 +16,20 @@ enum { OPENING_WINDOWS = 0 };
 /* Take the folder of a URI or path, or NULL. HSEP_WARNED: it is none. */
 static hsep_status opening_folder(hsep_instance *instance, const char *uri, char message[])
 {
-    const hsep_words *words = instance->words;
+    const hsep_fmi_names *names = instance->names;
     if (uri == NULL) {
         return HSEP_OK;
     }
     instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(uri)));
     if (instance->resources == NULL) {
-        return hsep_message_add(message, "%s: no memory for the path of the resources", words->instantiate);
+        return hsep_message_add(message, "%s: no memory for the path of the resources", names->instantiate);
     }
     if (hsep_uri_folder(uri, OPENING_WINDOWS, instance->resources)) {
         return HSEP_OK;
     }
     hsep_message_add(
-        message, "%s: %s must be %s on this machine, got %.300s; it is not used", words->instantiate, words->location,
-        words->location_form, uri);
+        message, "%s: %s must be %s on this machine, got %.300s; it is not used", names->instantiate, names->location,
+        names->location_form, uri);
     hsep_delete(instance, instance->resources);
     instance->resources = NULL;
     return HSEP_WARNED;
@@ -49,7 +49,7 @@ static hsep_status opening_table(hsep_instance *instance, char message[])
 
 HSEP_API hsep_status hsep_open(hsep_instance *instance, const char *name, const char *resources, char message[])
 {
-    const char *call = instance->words->instantiate;
+    const char *call = instance->names->instantiate;
     instance->name = hsep_new(instance, strlen(name) + 1);
     if (instance->name == NULL) {
         return hsep_message_add(message, "%s: no memory for the instance's name", call);

@@ -127,7 +127,7 @@ static FILE *table_find(const char *folder)
 
 HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, char message[])
 {
-    const char *call = instance->words->instantiate, *location = instance->words->location;
+    const char *call = instance->names->instantiate, *location = instance->names->location;
     char reason[HSEP_MESSAGE_SIZE] = "";
     hsep_status status = HSEP_OK;
     FILE *file = table_find(instance->resources);

@@ -10,14 +10,14 @@ static const char *const values_causalities[] = {
 HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_context *context = &instance->context;
-    const hsep_words *words = instance->words;
-    const size_t n = access->n_references, n_variables = words->n_variables(context);
+    const hsep_fmi_names *names = instance->names;
+    const size_t n = access->n_references, n_variables = names->n_variables(context);
     char name[HSEP_NAME_SIZE];
     size_t n_values = 0;
     if (n > 0 && (access->references == NULL || access->values == NULL)) {
         return hsep_message_add(
             message, "%s: %s is NULL, but %s is %lu", access->call,
-            access->references == NULL ? words->references : words->values, words->n_references, (unsigned long)n);
+            access->references == NULL ? names->references : names->values, names->n_references, (unsigned long)n);
     }
     for (size_t i = 0; i < n; i++) {
         const unsigned reference = access->references[i];
@@ -26,19 +26,19 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
                 message, "%s: value reference must be 0 ... %lu, got %u", access->call, (unsigned long)n_variables - 1,
                 reference);
         }
-        const hsep_found found = words->find(context, reference);
-        const char *type = words->types[found.row->kind];
+        const hsep_found found = names->find(context, reference);
+        const char *type = names->types[found.row->kind];
         if (type != access->type) {
             return hsep_message_add(
                 message, "%s: %s (value reference %u) is of type %s, not %s", access->call,
-                words->name(context, reference, name), reference, type, access->type);
+                names->name(context, reference, name), reference, type, access->type);
         }
         n_values += found.count;
     }
     if (n_values != access->n_values) {
         return hsep_message_add(
             message, "%s: %s must be %lu, the number of values of all variables, got %lu", access->call,
-            words->n_values, (unsigned long)n_values, (unsigned long)access->n_values);
+            names->n_values, (unsigned long)n_values, (unsigned long)access->n_values);
     }
     return HSEP_OK;
 }
@@ -46,21 +46,21 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
 HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_context *context = &instance->context;
-    const hsep_words *words = instance->words;
+    const hsep_fmi_names *names = instance->names;
     char name[HSEP_NAME_SIZE];
     for (size_t i = 0; i < access->n_references; i++) {
         const unsigned reference = access->references[i];
-        const hsep_variable *variable = words->find(context, reference).row;
+        const hsep_variable *variable = names->find(context, reference).row;
         if (variable->causality != HSEP_INPUT && variable->causality != HSEP_PARAMETER) {
             return hsep_message_add(
-                message, "%s: %s is %s and cannot be set", access->call, words->name(context, reference, name),
+                message, "%s: %s is %s and cannot be set", access->call, names->name(context, reference, name),
                 values_causalities[variable->causality]);
         }
         if (variable->causality == HSEP_PARAMETER && !variable->tunable &&
             instance->experiment.phase == HSEP_STEPPING) {
             return hsep_message_add(
                 message, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first",
-                access->call, words->name(context, reference, name), words->reset);
+                access->call, names->name(context, reference, name), names->reset);
         }
     }
     return HSEP_OK;
@@ -68,7 +68,7 @@ HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const 
 
 HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[])
 {
-    const hsep_words *words = instance->words;
+    const hsep_fmi_names *names = instance->names;
     char reason[HSEP_MESSAGE_SIZE] = "", name[HSEP_NAME_SIZE];
     if (instance->state != NULL) {
         return HSEP_OK;
@@ -79,10 +79,10 @@ HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_acc
     }
     for (size_t i = 0; i < access->n_references; i++) {
         const unsigned reference = access->references[i];
-        const hsep_variable *variable = words->find(&instance->context, reference).row;
+        const hsep_variable *variable = names->find(&instance->context, reference).row;
         if (variable->causality == HSEP_OUTPUT || variable->causality == HSEP_LOCAL) {
             return hsep_message_add(
-                message, "%s: %s is not known yet: %s", access->call, words->name(&instance->context, reference, name),
+                message, "%s: %s is not known yet: %s", access->call, names->name(&instance->context, reference, name),
                 reason);
         }
     }

@@ -29,7 +29,7 @@ fmi2Component fmi2Instantiate(
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
     hsep_component filled = {.hand = fmi2_hand, .categories = HSEP_LOG_ERROR};
     (void)visible;
-    filled.instance.words = hsep_fmi2_words();
+    filled.instance.names = hsep_fmi2_names();
     filled.instance.allocate = own_memory ? HSEP_CALLOC : functions->allocateMemory;
     filled.instance.release = own_memory ? HSEP_FREE : functions->freeMemory;
     if (functions != NULL) {

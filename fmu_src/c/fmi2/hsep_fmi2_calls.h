@@ -53,7 +53,7 @@ static const hsep_call hsep_fmi2_calls[] = {HSEP_FMI2_CALLS(HSEP_FMI2_ROW)};
 #define HSEP_FMI2(constant) (&hsep_fmi2_calls[HSEP_FMI2_##constant])
 
 /* The words of FMI 2.0. */
-HSEP_API const hsep_words *hsep_fmi2_words(void);
+HSEP_API const hsep_fmi_names *hsep_fmi2_names(void);
 
 /* A status as FMI 2.0 has it. */
 HSEP_API fmi2Status hsep_fmi2_status(hsep_status status);

@@ -28,9 +28,9 @@
         return (self == NULL) ? fmi2Error : fmi2OK; \
     }
 
-FMI2_ACCESS(Real, REAL, hsep_fmi2_words()->types[HSEP_REAL], number, number)
-FMI2_ACCESS(Integer, INTEGER, hsep_fmi2_words()->types[HSEP_INTEGER], hsep_values_integer(number), (double)number)
-FMI2_ACCESS(Boolean, BOOLEAN, hsep_fmi2_words()->types[HSEP_BOOLEAN], number != 0.0, number ? 1.0 : 0.0)
+FMI2_ACCESS(Real, REAL, hsep_fmi2_names()->types[HSEP_REAL], number, number)
+FMI2_ACCESS(Integer, INTEGER, hsep_fmi2_names()->types[HSEP_INTEGER], hsep_values_integer(number), (double)number)
+FMI2_ACCESS(Boolean, BOOLEAN, hsep_fmi2_names()->types[HSEP_BOOLEAN], number != 0.0, number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
@@ -82,7 +82,7 @@ fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
     const hsep_call *call = HSEP_FMI2(SET_REAL_INPUT_DERIVATIVES);
-    const hsep_access access = {call->name, hsep_fmi2_words()->types[HSEP_REAL], vr, nvr, value, nvr};
+    const hsep_access access = {call->name, hsep_fmi2_names()->types[HSEP_REAL], vr, nvr, value, nvr};
     hsep_instance *instance = hsep_begin(c, call);
     char message[HSEP_MESSAGE_SIZE] = "";
     if (instance == NULL) {

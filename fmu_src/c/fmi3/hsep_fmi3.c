@@ -19,7 +19,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     hsep_component filled = {.hand = fmi3_hand, .categories = HSEP_LOG_ERROR};
     /* An early return is allowed, never needed; without intermediate updates there is nothing to ask for in them. */
     (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
-    filled.instance.words = hsep_fmi3_words();
+    filled.instance.names = hsep_fmi3_names();
     filled.instance.allocate = HSEP_CALLOC;
     filled.instance.release = HSEP_FREE;
     filled.logger = (void (*)(void))logMessage;

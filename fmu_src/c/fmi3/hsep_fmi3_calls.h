@@ -65,7 +65,7 @@ static const hsep_call hsep_fmi3_calls[] = {HSEP_FMI3_CALLS(HSEP_FMI3_ROW)};
 #define HSEP_FMI3(constant) (&hsep_fmi3_calls[HSEP_FMI3_##constant])
 
 /* The words of FMI 3.0. */
-HSEP_API const hsep_words *hsep_fmi3_words(void);
+HSEP_API const hsep_fmi_names *hsep_fmi3_names(void);
 
 /* A status as FMI 3.0 has it. */
 HSEP_API fmi3Status hsep_fmi3_status(hsep_status status);

@@ -4,7 +4,7 @@
 /* The values of a variable. */
 static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReference reference, size_t *count)
 {
-    const hsep_found found = hsep_fmi3_words()->find(&instance->context, reference);
+    const hsep_found found = hsep_fmi3_names()->find(&instance->context, reference);
     *count = found.count;
     return found.row->causality == HSEP_INDEPENDENT ? &instance->experiment.time : &instance->values[found.place];
 }
@@ -15,7 +15,7 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
     fmi3Status fmi3Get##name( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, fmi3##name values[], size_t n_values) \
     { \
-        const char *type = hsep_fmi3_words()->types[kind]; \
+        const char *type = hsep_fmi3_names()->types[kind]; \
         const hsep_instance *self = \
             hsep_call_access(instance, HSEP_FMI3(GET_##NAME), 0, type, references, n, values, n_values); \
         for (size_t i = 0; self != NULL && i < n; i++) { \
@@ -32,7 +32,7 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3##name values[], \
         size_t n_values) \
     { \
-        const char *type = hsep_fmi3_words()->types[kind]; \
+        const char *type = hsep_fmi3_names()->types[kind]; \
         hsep_instance *self = \
             hsep_call_access(instance, HSEP_FMI3(SET_##NAME), 1, type, references, n, values, n_values); \
         for (size_t i = 0; self != NULL && i < n; i++) { \

@@ -36,8 +36,8 @@ HSEP_API int hsep_check_lags(double Np, double p, double q, char message[]);
 /* Refuse outputs of a window that diverges. */
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);
 
-/* Check that a position, m or rad, is finite and no further out than any machine is. where: format of at, the end of the
- * message. */
+/* Check that a position, m or rad, is finite and no further out than any machine is. where: format of at, the end of
+ * the message. */
 HSEP_API hsep_status hsep_check_position(
     const hsep_context *context, const char *name, double value, const char *where, double at, char message[]);
 

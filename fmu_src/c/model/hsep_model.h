@@ -80,7 +80,8 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[]);
 
-/* Do one communication step from t by h with the inputs, and the tunable parameters, in range, in values; outputs and locals go to values.
+/* Do one communication step from t by h with the inputs, and the tunable parameters, in range, in values; outputs and
+ * locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
  * unchanged, if an output would not be a finite number, because the learned recursion diverges: every later step fails
  * then, until another state is set or the model is initialised. A drive's step in

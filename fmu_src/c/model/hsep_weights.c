@@ -40,7 +40,7 @@ static int weights_compare_settings(
             weights_compare(setting.name, setting.value, values[place], variable->kind, message);
             n_missing -= variable->learned != 0;
         } else if (strncmp(setting.name, "mode[", 5) != 0) {
-            const hsep_kind kind = strcmp(setting.name, "trust") == 0 ? HSEP_BOOLEAN : HSEP_REAL;
+            const hsep_kind kind = strcmp(setting.name, "averaging") == 0 ? HSEP_BOOLEAN : HSEP_REAL;
             weights_compare(setting.name, setting.value, 0.0, kind, message);
         }
     }

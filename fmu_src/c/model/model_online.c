@@ -41,8 +41,8 @@ static hsep_status online_checked(
 #define READ(type, name) common.predictor.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
 #undef READ
-#define READ(type, name) common.trust.name = (type)values[HSEP_VR_##name];
-    HSEP_TRUST_SETTINGS(READ)
+#define READ(type, name) common.averaging.name = (type)values[HSEP_VR_##name];
+    HSEP_AVERAGING_SETTINGS(READ)
 #undef READ
     *parameters = hsep_online_derive(values, &common);
     return HSEP_OK;

@@ -24,10 +24,11 @@ HSEP_API int hsep_online_check(const double values[], char message[])
             preview);
         problems++;
     }
-    if (values[HSEP_VR_measurement_delay] > 0.0 && values[HSEP_VR_trust] == 0.0) {
+    if (values[HSEP_VR_measurement_delay] > 0.0 && values[HSEP_VR_averaging] == 0.0) {
         hsep_message_add(
             message,
-            "measurement_delay of a compensator must be 0 with trust = false, got %.0f: only the model with trust "
+            "measurement_delay of a compensator must be 0 with averaging = false, got %.0f: only the model with "
+            "averaging "
             "plans from a late measurement",
             values[HSEP_VR_measurement_delay]);
         problems++;
@@ -79,9 +80,9 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_dm] = values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
-    /* The model with trust predicts from the beginning, with the noise that is assumed. */
+    /* The model with averaging predicts from the beginning, with the noise that is assumed. */
     const double noise = hsep_uncertainty_first_variance(values[HSEP_VR_lambda], values[HSEP_VR_noise_std]);
-    const int predicts = values[HSEP_VR_trust] > 0.0 && values[HSEP_VR_compensate] > 1.0;
+    const int predicts = values[HSEP_VR_averaging] > 0.0 && values[HSEP_VR_compensate] > 1.0;
     values[HSEP_VR_x_h_std] = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
     values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = 0.0;
     values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = values[HSEP_VR_rms_hold] = 0.0;

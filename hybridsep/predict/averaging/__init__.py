@@ -1,1 +1,1 @@
-"""Trusted model of the residual: experts shrunk by their variance, their stack, and which samples are believed."""
+"""Online model averaging of the residual: experts, their stack, and which samples are believed."""

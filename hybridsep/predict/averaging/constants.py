@@ -1,4 +1,4 @@
-"""Constants of the residual model with trust: all of them, each with its reason and the experiment that chose it.
+"""Constants of online model averaging: all of them, each with its reason and the experiment that chose it.
 
 The C core's header is generated from here. ``benchmarks/ablation`` switches each rule off; its tables are in
 ``docs/experiments``. Constants were chosen on the recordings ``cnc_a_*`` and ``xl330_sin_sin_*``, the simulated cases
@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["CONSTANTS", "TrustConstants"]
+__all__ = ["CONSTANTS", "AveragingConstants"]
 
 
 @dataclass(frozen=True)
-class TrustConstants:
-    """Constants of the residual model with trust.
+class AveragingConstants:
+    """Constants of the residual model with averaging.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class TrustConstants:
         change errors by 1 to 3 %.
     gamma : float
         Factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %.
-    first_lagged, first_static : float
+    first_arx_residual, first_static : float
         First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
         the worst drives are worse.
     lags_of_command : int
@@ -46,15 +46,15 @@ class TrustConstants:
         CNC axes that creep before a motion have 3 and 4 times the error.
     growth : float
         Largest growth of that bound.
-    outgrown : float
+    velocity_jump : float
         Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep:
         without, the rounding of a command at rest sets their scale, and drives have to 1.4 times the error.
-    carried : float
+    warm_windows_max : float
         Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
-    less : float
+    warm_prior_weight : float
         Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
         window. Without any, changed plants are worse by an eighth.
-    doubt : float
+    discard_above : float
         Weight of that expert in the stack from which on earlier runs are forgotten: with 0.5 plants that have not
         changed are worse by 2 %.
     friction_least, friction_ratio : float
@@ -62,7 +62,7 @@ class TrustConstants:
         six to the next: half a decade, which neighbours interpolate within.
     difference_share : float
         Effect of a disturbance's first difference relative to its own: it only corrects the timing.
-    reach_residuals, reach_steps : float
+    gate_residuals, gate_steps : float
         Largest residual that is believed: relative to the largest so far, and in steps of the fastest motion of the
         physics model so far on top of it.
     patience : float
@@ -71,7 +71,7 @@ class TrustConstants:
 
     kappa: float = 1.0
     gamma: float = 0.95
-    first_lagged: float = 0.5
+    first_arx_residual: float = 0.5
     first_static: float = 0.5
     lags_of_command: int = 36
     last_lag: float = 0.005
@@ -82,17 +82,17 @@ class TrustConstants:
     bound: float = 1.2
     bound_of_command: float = 2.0
     growth: float = 30.0
-    outgrown: float = 1000.0
-    carried: float = 30.0
-    less: float = 0.003
-    doubt: float = 0.7
+    velocity_jump: float = 1000.0
+    warm_windows_max: float = 30.0
+    warm_prior_weight: float = 0.003
+    discard_above: float = 0.7
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795
     difference_share: float = 0.03
-    reach_residuals: float = 2.0
-    reach_steps: float = 2.0
+    gate_residuals: float = 2.0
+    gate_steps: float = 2.0
     patience: float = 1.0
 
 
-CONSTANTS = TrustConstants()
+CONSTANTS = AveragingConstants()
 """The product's."""

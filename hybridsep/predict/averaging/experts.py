@@ -1,4 +1,4 @@
-"""Expert of the residual: a regression with normal priors, trusted as far as its own variance allows."""
+"""Expert of the residual: a regression with normal priors, counted as far as its own variance allows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ...base.records import within
+from ...base.records import bounded
 from ...base.signals import Array
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from .constants import CONSTANTS
@@ -41,8 +41,8 @@ class ResidualScale:
         Largest magnitude.
     """
 
-    largest_square: float = field(default=0.0, metadata=within())
-    largest: float = field(default=0.0, metadata=within())
+    largest_square: float = field(default=0.0, metadata=bounded())
+    largest: float = field(default=0.0, metadata=bounded())
 
     def grown(self, growth: float) -> ResidualScale:
         """Return the scale of residuals that are larger by a factor."""
@@ -62,7 +62,7 @@ class ExpertPrediction(NamedTuple):
     e_h : (n,) array, m
         Shrunk by its variance, and bounded.
     unshrunk : (n,) array, m
-    kept : (n,) array
+    shrinkage : (n,) array
         What the variance leaves of it.
     variance : (n,) array, m²
         What is left of the variance of the residual, ``v·τ²/(v + τ²)``.
@@ -72,7 +72,7 @@ class ExpertPrediction(NamedTuple):
 
     e_h: Array
     unshrunk: Array
-    kept: Array
+    shrinkage: Array
     variance: Array
     noise_variance: float
 
@@ -89,8 +89,8 @@ class ExpertErrors:
         Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
     """
 
-    noise_variance: float = field(default=0.0, metadata=within())
-    correlation: float = field(default=1.0, metadata=within(1.0))
+    noise_variance: float = field(default=0.0, metadata=bounded())
+    correlation: float = field(default=1.0, metadata=bounded(1.0))
 
     def variance(self, target_square: float, first: float, least: float) -> float:
         """Return the variance of the noise that penalties come from, m².
@@ -187,7 +187,7 @@ class SolvedExpert(NamedTuple):
         finite = np.isfinite(drive)
         e = np.clip(np.where(finite, drive, 0.0), -_LAG_BOUND * bound, _LAG_BOUND * bound)
         if held is not None:
-            kept = held.kept
+            shrinkage = held.shrinkage
         else:
             lagged = lags(np.concatenate((past[:p][::-1], e[:-1])), p) if p else np.empty((len(e), 0))
             features = np.hstack((rows, lagged))
@@ -201,9 +201,9 @@ class SolvedExpert(NamedTuple):
                 variance = np.asarray(lfilter(response**2, [1.0], variance))
             most = _DIVERGED * bound**2
             variance = np.where(finite, np.minimum(variance, most), most)
-            kept = largest_square / (largest_square + variance)
+            shrinkage = largest_square / (largest_square + variance)
         return ExpertPrediction(
-            np.clip(e, -bound, bound) * kept, e, kept, largest_square * (1.0 - kept), self.noise_variance
+            np.clip(e, -bound, bound) * shrinkage, e, shrinkage, largest_square * (1.0 - shrinkage), self.noise_variance
         )
 
 

@@ -1,4 +1,4 @@
-"""Reach: a measurement is believed, unless the axis cannot have got there.
+"""Innovation gate: a measurement is believed, unless the axis cannot have got there.
 
 The residual of an axis grows from sample to sample by no more than the axis and its model move. A value whose residual
 is beyond twice the largest so far, by more than a few of the fastest steps of the model, is missing. So are the values
@@ -14,15 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.records import within
+from ...base.records import bounded
 from ...base.signals import PREDICTION_MAX, Array
 from .constants import CONSTANTS
 
-__all__ = ["Reach", "reached"]
+__all__ = ["InnovationGate", "gated"]
 
 
 @dataclass(frozen=True)
-class Reach:
+class InnovationGate:
     """What is known of the samples before a window.
 
     Attributes
@@ -30,24 +30,26 @@ class Reach:
     n_missing : int
         Samples since the last one that was believed.
     n_beyond : int
-        Of these, values out of reach, less the values within reach that followed.
+        Of these, values beyond the gate, less the values within it that followed.
     farthest : float, m
         Largest residual out of reach among them.
     """
 
     n_missing: int = 0
     n_beyond: int = 0
-    farthest: float = field(default=0.0, metadata=within())
+    farthest: float = field(default=0.0, metadata=bounded())
 
 
-def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) -> tuple[NDArray[np.bool_], Reach]:
+def gated(
+    gate: InnovationGate, e: Array, largest: float, fastest: float, T_s: float
+) -> tuple[NDArray[np.bool_], InnovationGate]:
     """Return whether each sample of a window is believed, ``(n,)`` bool, and the reach after it.
 
     Before the first motion, and over the first window that has a residual, all are.
 
     Parameters
     ----------
-    reach : Reach
+    gate : InnovationGate
     e : (n,) array, m
         Measured residuals, NaN where missing.
     largest : float, m
@@ -57,16 +59,16 @@ def reached(reach: Reach, e: Array, largest: float, fastest: float, T_s: float) 
     T_s : float, s
     """
     known = largest > 0.0 and fastest > 0.0
-    believed, n_missing, n_beyond, farthest = np.isfinite(e), reach.n_missing, reach.n_beyond, reach.farthest
+    believed, n_missing, n_beyond, farthest = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.farthest
     patience = math.ceil(CONSTANTS.patience / T_s)
     for k, size in enumerate(np.abs(e).tolist()):
         n_missing += 1
         if not believed[k]:
             continue
-        beyond = size > CONSTANTS.reach_residuals * largest + CONSTANTS.reach_steps * fastest
+        beyond = size > CONSTANTS.gate_residuals * largest + CONSTANTS.gate_steps * fastest
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
             believed[k], farthest = False, max(farthest, min(size, PREDICTION_MAX))
         else:
             n_missing, n_beyond, farthest, largest = 0, 0, 0.0, max(largest, size)
-    return believed, Reach(n_missing, n_beyond, farthest)
+    return believed, InnovationGate(n_missing, n_beyond, farthest)

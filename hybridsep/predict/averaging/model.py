@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.records import FIXED, within
+from ...base.records import FIXED, bounded
 from ...base.settings import PredictorSettings
 from ...base.signals import Array
 from ...model.discrete import DiscreteModel
@@ -27,18 +27,18 @@ from ..window import FeatureScales, Forecast, ResidualWindow
 from .constants import CONSTANTS
 from .experts import ExpertErrors, ExpertPrediction, ResidualScale, SolvedExpert, solve
 from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
-from .gate import Reach, reached
-from .stacking import COMMAND, DOUBTING, HOLD, LAGGED, N_EXPERTS, N_JUDGED, STATIC, Stack
-from .warm_start import Evidence
+from .gate import InnovationGate, gated
+from .stacking import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, HOLD, N_EXPERTS, N_JUDGED, STATIC, Stack
+from .warm_start import WarmStartRows
 
 __all__ = [
-    "OF_COMMAND",
-    "OF_PHYSICS",
+    "COMMAND_RESIDUAL",
+    "MODEL_RESIDUAL",
+    "AveragedForecast",
+    "AveragedModel",
     "Learned",
     "Parameters",
     "RunState",
-    "TrustedForecast",
-    "TrustedModel",
     "begin_in_motion",
     "forecast",
     "forecast_by",
@@ -51,7 +51,7 @@ __all__ = [
     "take_over",
 ]
 
-OF_PHYSICS, OF_COMMAND, N_RESIDUALS = range(3)
+MODEL_RESIDUAL, COMMAND_RESIDUAL, N_RESIDUALS = range(3)
 """Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
 
 _AHEAD = 20
@@ -92,7 +92,7 @@ class RunState:
         Last residuals of the physics model, and of the command; newest first.
     bridged : (max(p, p_A),) array of bool
         Whether the last ones stand for samples without a measurement, oldest first.
-    reach : Reach
+    gate : InnovationGate
     n_rejected : int
         Measurements that were missing or not plausible.
     """
@@ -101,7 +101,7 @@ class RunState:
     commands: Array
     past: tuple[Array, Array]
     bridged: NDArray[np.bool_]
-    reach: Reach
+    gate: InnovationGate
     n_rejected: int
 
     @classmethod
@@ -109,7 +109,7 @@ class RunState:
         """Return the beginning of a run, at rest."""
         p, command = fixed.settings.p, fixed.command
         past, bridged = (np.zeros(p), np.zeros(command.p)), np.zeros(max(p, command.p), dtype=np.bool_)
-        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, Reach(), 0)
+        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,19 +125,19 @@ class Learned:
     scales : pair of ResidualScale
         Sizes of the residuals, of the physics model and of the command.
     errors : tuple of ExpertErrors
-        Of the experts from LAGGED on.
+        Of the experts from ARX_RESIDUAL on.
     stack : Stack
     largest : (n_static,) array
         Largest magnitudes of the static features.
     """
 
-    velocity_scale: float = field(metadata=within())
-    largest_step: float = field(metadata=within())
-    fastest: float = field(metadata=within())
-    scales: tuple[ResidualScale, ResidualScale] = field(metadata=within())
-    errors: tuple[ExpertErrors, ...] = field(metadata=within())
+    velocity_scale: float = field(metadata=bounded())
+    largest_step: float = field(metadata=bounded())
+    fastest: float = field(metadata=bounded())
+    scales: tuple[ResidualScale, ResidualScale] = field(metadata=bounded())
+    errors: tuple[ExpertErrors, ...] = field(metadata=bounded())
     stack: Stack
-    largest: Array = field(metadata=within())
+    largest: Array = field(metadata=bounded())
 
     @classmethod
     def init(cls, fixed: Parameters) -> Learned:
@@ -147,11 +147,11 @@ class Learned:
 
     def errors_of(self, expert: int) -> ExpertErrors:
         """Return what is known of the errors of an expert."""
-        return self.errors[expert - LAGGED]
+        return self.errors[expert - ARX_RESIDUAL]
 
     def with_errors(self, changed: dict[int, ExpertErrors]) -> Learned:
         """Return the same with other errors of some experts."""
-        errors = tuple(changed.get(LAGGED + i, one) for i, one in enumerate(self.errors))
+        errors = tuple(changed.get(ARX_RESIDUAL + i, one) for i, one in enumerate(self.errors))
         return replace(self, errors=errors)
 
     @property
@@ -162,21 +162,21 @@ class Learned:
 
 
 @dataclass(frozen=True, eq=False)
-class TrustedModel:
+class AveragedModel:
     """State of the model: what it has learned, and its run. It stays the physics model where it does not know better.
 
     Attributes
     ----------
     fixed : Parameters
     learned : Learned
-    evidence : pair of Evidence
+    evidence : pair of WarmStartRows
         Rows of the residuals of the physics model, and of the command.
     noise : tuple of float, m²
-        Of the experts from LAGGED on, variances that the penalties of the next solution come from; 0: none yet.
+        Of the experts from ARX_RESIDUAL on, variances that the penalties of the next solution come from; 0: none yet.
     command_square : float, m²
         Largest mean square of the command's residual, before the last sample of the last window; 0: none yet.
     leading : int
-        Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
+        Expert that led when earlier runs ended, ARX_RESIDUAL or ARX_COMMAND: FRESH_START is its counterpart.
     run : RunState
     """
 
@@ -184,19 +184,23 @@ class TrustedModel:
 
     fixed: Parameters = field(metadata=FIXED)
     learned: Learned
-    evidence: tuple[Evidence, Evidence]
-    noise: tuple[float, ...] = field(metadata=within())
-    command_square: float = field(metadata=within())
+    evidence: tuple[WarmStartRows, WarmStartRows]
+    noise: tuple[float, ...] = field(metadata=bounded())
+    command_square: float = field(metadata=bounded())
     leading: int
     run: RunState
 
     def kind_of(self, expert: int) -> int:
-        """Return OF_COMMAND if an expert predicts the residual of the command, else OF_PHYSICS."""
-        return OF_COMMAND if expert == COMMAND or (expert == DOUBTING and self.leading == COMMAND) else OF_PHYSICS
+        """Return COMMAND_RESIDUAL if an expert predicts the residual of the command, else MODEL_RESIDUAL."""
+        return (
+            COMMAND_RESIDUAL
+            if expert == ARX_COMMAND or (expert == FRESH_START and self.leading == ARX_COMMAND)
+            else MODEL_RESIDUAL
+        )
 
     def noise_of(self, expert: int) -> float:
         """Return the variance of the noise that an expert's penalties come from, m²; 0: none yet."""
-        return self.noise[expert - LAGGED]
+        return self.noise[expert - ARX_RESIDUAL]
 
     @property
     def early(self) -> int:
@@ -204,7 +208,7 @@ class TrustedModel:
         Np = self.fixed.settings.Np
         return Np - min(Np // 2, _AHEAD)
 
-    def with_noise(self, learned: Learned) -> TrustedModel:
+    def with_noise(self, learned: Learned) -> AveragedModel:
         """Return the model with the variances of the noise that follow from what is learned so far."""
         settings = self.fixed.settings
 
@@ -213,15 +217,15 @@ class TrustedModel:
             square = learned.scales[kind].largest_square
             first = settings.noise_std**2 or CONSTANTS.first_noise * square
             least = min(settings.lam, CONSTANTS.least_noise * square)
-            kept = CONSTANTS.less if expert == DOUBTING else 1.0
-            return learned.errors_of(expert).variance(self.evidence[kind].target_square(kept), first, least)
+            weight = CONSTANTS.warm_prior_weight if expert == FRESH_START else 1.0
+            return learned.errors_of(expert).variance(self.evidence[kind].target_square(weight), first, least)
 
-        return replace(self, noise=tuple(noise(LAGGED + i) for i in range(N_JUDGED)))
+        return replace(self, noise=tuple(noise(ARX_RESIDUAL + i) for i in range(N_JUDGED)))
 
     @property
     def doubts(self) -> bool:
         """Whether what earlier runs have trained is doubted."""
-        return self.evidence[OF_PHYSICS].earlier.n_rows > 0.0
+        return self.evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0
 
     @property
     def n_rejected(self) -> int:
@@ -231,12 +235,12 @@ class TrustedModel:
     @property
     def farthest(self) -> float:
         """Largest residual among the last samples, m, where these were rejected; else 0."""
-        return self.run.reach.farthest
+        return self.run.gate.farthest
 
     @property
     def last(self) -> float:
         """Last residual that was accepted or bridged, m."""
-        return float(self.run.past[OF_PHYSICS][0])
+        return float(self.run.past[MODEL_RESIDUAL][0])
 
     @property
     def regressions(self) -> tuple[RidgeRegression, ...]:
@@ -246,16 +250,16 @@ class TrustedModel:
     @property
     def lag_weights(self) -> Array:
         """Weights of the lags from all learned samples, ``(p,)``."""
-        return self.regressions[OF_PHYSICS].weights[self.fixed.static.n :]
+        return self.regressions[MODEL_RESIDUAL].weights[self.fixed.static.n :]
 
     @property
     def is_sound(self) -> bool:
         """Whether the numbers, which are in range, fit each other."""
         factors = all(part.is_sound for one in self.evidence for part in (one.this, one.earlier))
-        return factors and self.learned.is_sound and self.leading in (LAGGED, COMMAND)
+        return factors and self.learned.is_sound and self.leading in (ARX_RESIDUAL, ARX_COMMAND)
 
 
-def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()) -> TrustedModel:
+def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()) -> AveragedModel:
     """Return the model at rest, with nothing learned.
 
     Parameters
@@ -268,30 +272,32 @@ def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Distur
     """
     static = StaticFeatures(discrete, settings.q, settings.period, own)
     fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
-    evidence = Evidence.init(static.n + settings.p), Evidence.init(2 * fixed.command.p + 2)
-    return TrustedModel(fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, 0.0, LAGGED, RunState.init(fixed))
+    evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * fixed.command.p + 2)
+    return AveragedModel(
+        fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, 0.0, ARX_RESIDUAL, RunState.init(fixed)
+    )
 
 
-def restart(state: TrustedModel) -> TrustedModel:
+def restart(state: AveragedModel) -> AveragedModel:
     """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
     fixed, learned = state.fixed, state.learned
-    most = CONSTANTS.carried * fixed.settings.Np
+    most = CONSTANTS.warm_windows_max * fixed.settings.Np
     of_physics, of_command = (one.begin_run(most) for one in state.evidence)
-    leading, stack, errors = learned.stack.leader, learned.stack.forget(DOUBTING), ExpertErrors()
+    leading, stack, errors = learned.stack.leader, learned.stack.forget(FRESH_START), ExpertErrors()
     if of_physics.earlier.n_rows > 0.0:
-        stack, errors = stack.copy(leading, DOUBTING), learned.errors_of(leading)
-    learned = replace(learned.with_errors({DOUBTING: errors}), stack=stack)
+        stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
+    learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
     evidence = of_physics, of_command
-    begun = TrustedModel(fixed, learned, evidence, state.noise, 0.0, leading, RunState.init(fixed))
+    begun = AveragedModel(fixed, learned, evidence, state.noise, 0.0, leading, RunState.init(fixed))
     return begun.with_noise(learned)
 
 
-def plan_ahead(state: TrustedModel) -> TrustedModel:
+def plan_ahead(state: AveragedModel) -> AveragedModel:
     """Return the model where a compensator decides the commands."""
     return replace(state, fixed=replace(state.fixed, static=replace(state.fixed.static, damping_of_motion=True)))
 
 
-def take_over(state: TrustedModel, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> TrustedModel:
+def take_over(state: AveragedModel, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
     """Return the model with what another one has learned."""
     both = zip(state.evidence, regressions, strict=True)
     of_physics, of_command = (replace(one.forget(), this=rows) for one, rows in both)
@@ -303,8 +309,8 @@ _LEAST = 1e-150
 
 
 @dataclass(frozen=True)
-class TrustedForecast(Forecast):
-    """Window predicted by the trusted model.
+class AveragedForecast(Forecast):
+    """Window predicted by the averaged model.
 
     Attributes
     ----------
@@ -323,12 +329,12 @@ class TrustedForecast(Forecast):
     scales: FeatureScales
 
 
-def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
+def scales_of(state: AveragedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
     """Return the scales of the features, with the next window's.
 
     Parameters
     ----------
-    state : TrustedModel
+    state : AveragedModel
     window : ResidualWindow
     path : (m,) array, m, optional
         Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
@@ -337,15 +343,15 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     T_s = settings.T_s
     before = learned.velocity_scale
     peak = static.peak_velocity(state.run.static, window.x_d)
-    outgrown = peak > max(CONSTANTS.outgrown * before, LEAST_VELOCITY)
+    outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
     step = max(learned.largest_step, peak * T_s)
-    if path is not None and state.evidence[OF_PHYSICS].n_rows == 0.0:
+    if path is not None and state.evidence[MODEL_RESIDUAL].n_rows == 0.0:
         peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
         outgrown = peak > max(before, LEAST_VELOCITY)
     velocity = peak if outgrown else before
     rows, _ = static.rows(state.run.static, window, window.x_pb, velocity)
     largest = np.zeros(static.n) if outgrown else learned.largest
-    command_step, command_square = step, learned.scales[OF_COMMAND].largest_square
+    command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
     if path is None and settings.Np > 1 and state.command_square > 0.0:
         # A controller solves for the command's expert one sample before the window, as far as its commands are known.
         known = window.x_d[: settings.n_late + settings.Np - 1]
@@ -356,10 +362,10 @@ def scales_of(state: TrustedModel, window: ResidualWindow, path: Array | None = 
     return FeatureScales(velocity, largest, step, command_step, command_square)
 
 
-def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
+def _solved(state: AveragedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
     """Return an expert with the weights that follow from rows."""
     settings, kind = state.fixed.settings, state.kind_of(expert)
-    if kind == OF_COMMAND:
+    if kind == COMMAND_RESIDUAL:
         command, square = state.fixed.command, scales.command_square
         p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
     else:
@@ -370,40 +376,40 @@ def _solved(state: TrustedModel, expert: int, rows: RidgeRegression, scales: Fea
     return solve(rows, state.noise_of(expert), priors, p)
 
 
-def solved(state: TrustedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
+def solved(state: AveragedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
     """Return the experts that know something, with their weights."""
     found: dict[int, SolvedExpert] = {}
-    for kind, experts in ((OF_PHYSICS, (LAGGED, STATIC)), (OF_COMMAND, (COMMAND,))):
+    for kind, experts in ((MODEL_RESIDUAL, (ARX_RESIDUAL, STATIC)), (COMMAND_RESIDUAL, (ARX_COMMAND,))):
         evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
         if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
             continue
-        if kind == OF_COMMAND or not outgrown:
+        if kind == COMMAND_RESIDUAL or not outgrown:
             rows = evidence.all()
             found |= {expert: _solved(state, expert, rows, scales) for expert in experts if state.noise_of(expert)}
-            if state.doubts and state.leading == experts[0] and state.noise_of(DOUBTING):
-                found[DOUBTING] = _solved(state, DOUBTING, evidence.all(CONSTANTS.less), scales)
+            if state.doubts and state.leading == experts[0] and state.noise_of(FRESH_START):
+                found[FRESH_START] = _solved(state, FRESH_START, evidence.all(CONSTANTS.warm_prior_weight), scales)
     return found
 
 
-def _growth(state: TrustedModel, scales: FeatureScales) -> float:
+def _growth(state: AveragedModel, scales: FeatureScales) -> float:
     """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
 
     What follows the command alone is linear in it: it may be larger than anything so far by as much.
     """
     before = state.learned.largest_step
-    if not (before > 0.0 and state.learned.stack.leader == COMMAND):
+    if not (before > 0.0 and state.learned.stack.leader == ARX_COMMAND):
         return 1.0
     return min(scales.step / before, CONSTANTS.growth)
 
 
 def forecast_by(
-    state: TrustedModel,
+    state: AveragedModel,
     experts: Mapping[int, SolvedExpert],
     window: ResidualWindow,
     scales: FeatureScales,
     held: Mapping[int, ExpertPrediction] | None = None,
     counts: NDArray[np.intp] | None = None,
-) -> TrustedForecast:
+) -> AveragedForecast:
     """Predict as :func:`forecast` by the experts of :func:`solved`.
 
     Parameters
@@ -416,12 +422,16 @@ def forecast_by(
     """
     x_d, x_pb, _ = window
     learned, command, run = state.learned, state.fixed.command, state.run
-    bound, growth = CONSTANTS.bound * learned.scales[OF_PHYSICS].largest, _growth(state, scales)
+    bound, growth = CONSTANTS.bound * learned.scales[MODEL_RESIDUAL].largest, _growth(state, scales)
 
     def predicted(expert: int, features: Array, counts: NDArray[np.intp] | None) -> ExpertPrediction:
         kind = state.kind_of(expert)
-        scale = learned.scales[OF_COMMAND].grown(growth) if kind == OF_COMMAND else learned.scales[OF_PHYSICS]
-        most = CONSTANTS.bound_of_command * scale.largest if kind == OF_COMMAND else bound
+        scale = (
+            learned.scales[COMMAND_RESIDUAL].grown(growth)
+            if kind == COMMAND_RESIDUAL
+            else learned.scales[MODEL_RESIDUAL]
+        )
+        most = CONSTANTS.bound_of_command * scale.largest if kind == COMMAND_RESIDUAL else bound
         shrunk = None if held is None else held.get(expert)
         return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk, counts)
 
@@ -435,7 +445,7 @@ def forecast_by(
     stacked = np.zeros((N_EXPERTS, len(x_d)))
     stacked[HOLD] = min(max(state.last, -bound), bound)
     for expert in experts:
-        if state.kind_of(expert) == OF_COMMAND:
+        if state.kind_of(expert) == COMMAND_RESIDUAL:
             found[expert] = predicted(expert, command.rows(run.commands, x_d), counts)
             follows = command.late(run.commands, x_d) - x_pb
             stacked[expert] = np.clip(found[expert].e_h + follows, -growth * bound, growth * bound)
@@ -448,15 +458,15 @@ def forecast_by(
     for expert, prediction in found.items():
         second[expert] += prediction.variance
     variance = np.maximum(weights @ second - e_h**2, 0.0)
-    return TrustedForecast(window, e_h, variance, x, stacked, found, scales)
+    return AveragedForecast(window, e_h, variance, x, stacked, found, scales)
 
 
-def forecast(state: TrustedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> TrustedForecast:
+def forecast(state: AveragedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
     """Predict the residual over the next window.
 
     Parameters
     ----------
-    state : TrustedModel
+    state : AveragedModel
     window : ResidualWindow
     scales : FeatureScales, optional
         By :func:`scales_of` from its commands if left out; a compensator takes its preview's.
@@ -469,12 +479,12 @@ _BRIDGED = 3
 """Lags of a row that may stand for samples without a measurement."""
 
 
-def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel:
+def begin_in_motion(state: AveragedModel, window: ResidualWindow) -> AveragedModel:
     """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
 
     Parameters
     ----------
-    state : TrustedModel
+    state : AveragedModel
     window : ResidualWindow
         The first one, with the motion before it.
     """
@@ -482,37 +492,37 @@ def begin_in_motion(state: TrustedModel, window: ResidualWindow) -> TrustedModel
     commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
     positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
     late = commands[-1 - command.dead_time :: -1][: command.p]
-    past = state.run.past[OF_PHYSICS], positions[: -command.p - 1 : -1] - late
+    past = state.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
     static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
     return replace(state, run=replace(state.run, static=static, commands=commands, past=past))
 
 
-def _with_scales(state: TrustedModel, forecast: TrustedForecast, fastest: float) -> TrustedModel:
+def _with_scales(state: AveragedModel, forecast: AveragedForecast, fastest: float) -> AveragedModel:
     """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
     learned, (velocity, largest, step, _, _) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
     if velocity != learned.velocity_scale:
-        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(DOUBTING)
+        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(FRESH_START)
     learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
     return replace(state, learned=learned, evidence=(of_physics, of_command))
 
 
 def _folded(
-    state: TrustedModel,
-    forecast: TrustedForecast,
+    state: AveragedModel,
+    forecast: AveragedForecast,
     rows: tuple[Array, Array],
     e: tuple[Array, Array],
     bridged: NDArray[np.bool_],
-) -> TrustedModel:
+) -> AveragedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
     Variances of the noise for the next window are taken before the last rows, the size of the command's residual
     before the last one.
     """
-    settings, n, early = state.fixed.settings, len(e[OF_PHYSICS]), state.early
+    settings, n, early = state.fixed.settings, len(e[MODEL_RESIDUAL]), state.early
     accepted = ~bridged[-n:]
-    kept = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
+    forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
     def taken(kind: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         past = state.run.past[kind]
@@ -522,26 +532,26 @@ def _folded(
         lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
         return rows[kind], lagged, e[kind], accepted & (n_bridged <= _BRIDGED)
 
-    of_kind = taken(OF_PHYSICS), taken(OF_COMMAND)
+    of_kind = taken(MODEL_RESIDUAL), taken(COMMAND_RESIDUAL)
 
-    def learned(evidence: Iterable[Evidence], part: slice) -> tuple[Evidence, Evidence]:
+    def learned(evidence: Iterable[WarmStartRows], part: slice) -> tuple[WarmStartRows, WarmStartRows]:
         of_physics, of_command = (
             one.learn(features[part][counts[part]], lagged[part][counts[part]], target[part][counts[part]])
             for one, (features, lagged, target, counts) in zip(evidence, of_kind, strict=True)
         )
         return of_physics, of_command
 
-    state = replace(state, evidence=learned((one.discount(kept) for one in state.evidence), slice(early)))
+    state = replace(state, evidence=learned((one.discount(forgetting_factor) for one in state.evidence), slice(early)))
     state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
-    of_command, last = state.learned.scales[OF_COMMAND], settings.Np - 1
+    of_command, last = state.learned.scales[COMMAND_RESIDUAL], settings.Np - 1
     if accepted[:last].any():
-        of_command = of_command.follow(e[OF_COMMAND][:last][accepted[:last]])
+        of_command = of_command.follow(e[COMMAND_RESIDUAL][:last][accepted[:last]])
     evidence = learned(state.evidence, slice(early, n))
     return replace(state, evidence=evidence, command_square=of_command.largest_square)
 
 
 def _judged_experts(
-    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+    state: AveragedModel, forecast: AveragedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> Learned:
     """Judge the experts, and the sizes of the residuals, by the first samples of their window."""
     learned, given = state.learned, state.fixed.settings.noise_std**2
@@ -563,8 +573,8 @@ def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array
 
 
 def _judged(
-    state: TrustedModel, forecast: TrustedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
-) -> TrustedModel:
+    state: AveragedModel, forecast: AveragedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+) -> AveragedModel:
     """Judge the experts and their stack by the measurement of their window."""
     learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
     n, late = len(accepted), settings.n_late
@@ -572,26 +582,26 @@ def _judged(
     stack = learned.stack
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
-        stack = stack.update(predicted, e[OF_PHYSICS][published], settings.lam)
+        stack = stack.update(predicted, e[MODEL_RESIDUAL][published], settings.lam)
     learned = replace(learned, stack=stack)
-    if not (state.doubts and stack.weights[DOUBTING] > CONSTANTS.doubt):
+    if not (state.doubts and stack.weights[FRESH_START] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
-    anew = {LAGGED: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(DOUBTING)}
+    anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}
     learned = replace(learned.with_errors(anew), stack=Stack.init())
     evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
     return replace(state, learned=learned, evidence=evidence).with_noise(learned)
 
 
 def learn(
-    state: TrustedModel, forecast: TrustedForecast, x: Array, *, fold: bool = True
-) -> tuple[TrustedModel, NDArray[np.bool_]]:
+    state: AveragedModel, forecast: AveragedForecast, x: Array, *, fold: bool = True
+) -> tuple[AveragedModel, NDArray[np.bool_]]:
     """Learn from the measurement of a window.
 
     Parameters
     ----------
-    state : TrustedModel
-    forecast : TrustedForecast
+    state : AveragedModel
+    forecast : AveragedForecast
         Of that state.
     x : (m,) array, m
         Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
@@ -600,7 +610,7 @@ def learn(
 
     Returns
     -------
-    TrustedModel, (m,) array of bool
+    AveragedModel, (m,) array of bool
         Which samples are accepted.
     """
     m, fixed, run = len(x), state.fixed, state.run
@@ -608,8 +618,8 @@ def learn(
     fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
     state = _with_scales(state, forecast, max(state.learned.fastest, fastest))
     learned, measured = state.learned, x - window.x_pb
-    largest, T_s = learned.scales[OF_PHYSICS].largest, fixed.settings.T_s
-    accepted, reach = reached(run.reach, measured, largest, learned.fastest, T_s)
+    largest, T_s = learned.scales[MODEL_RESIDUAL].largest, fixed.settings.T_s
+    accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
     e = _bridged(state.last, measured, accepted)
     e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
     rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
@@ -621,4 +631,4 @@ def learn(
     past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
     n_rejected = run.n_rejected + m - int(accepted.sum())
     commands = np.concatenate((run.commands, window.x_d))[m:]
-    return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], reach, n_rejected)), accepted
+    return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected)), accepted

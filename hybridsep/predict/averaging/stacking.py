@@ -7,21 +7,31 @@ from itertools import combinations
 
 import numpy as np
 
-from ...base.records import within
+from ...base.records import bounded
 from ...base.signals import Array
 from .constants import CONSTANTS
 
-__all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "N_EXPERTS", "N_JUDGED", "STATIC", "Stack", "simplex_minimum"]
+__all__ = [
+    "ARX_COMMAND",
+    "ARX_RESIDUAL",
+    "FRESH_START",
+    "HOLD",
+    "N_EXPERTS",
+    "N_JUDGED",
+    "STATIC",
+    "Stack",
+    "simplex_minimum",
+]
 
-HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
+HOLD, ARX_RESIDUAL, STATIC, ARX_COMMAND, FRESH_START = range(5)
 """Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
-a counterpart of LAGGED or COMMAND, whichever led, that gives earlier runs little weight."""
+a counterpart of ARX_RESIDUAL or ARX_COMMAND, whichever led, that gives earlier runs little weight."""
 
 N_EXPERTS = 5
 """All of them."""
 
-N_JUDGED = N_EXPERTS - LAGGED
-"""Experts from LAGGED on, whose errors are judged."""
+N_JUDGED = N_EXPERTS - ARX_RESIDUAL
+"""Experts from ARX_RESIDUAL on, whose errors are judged."""
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
@@ -44,10 +54,10 @@ class Stack:
         ``eᵀe`` so far, m², and samples.
     """
 
-    weights: Array = field(metadata=within(0.0, 1.0))
+    weights: Array = field(metadata=bounded(0.0, 1.0))
     gram: Array
     cross: Array
-    evidence: Array = field(metadata=within())
+    evidence: Array = field(metadata=bounded())
 
     @classmethod
     def init(cls) -> Stack:
@@ -78,8 +88,12 @@ class Stack:
 
     @property
     def leader(self) -> int:
-        """COMMAND, if it has more of the weights than LAGGED and STATIC together, else LAGGED."""
-        return COMMAND if self.weights[COMMAND] > self.weights[LAGGED] + self.weights[STATIC] else LAGGED
+        """COMMAND, if it has more of the weights than ARX_RESIDUAL and STATIC together, else ARX_RESIDUAL."""
+        return (
+            ARX_COMMAND
+            if self.weights[ARX_COMMAND] > self.weights[ARX_RESIDUAL] + self.weights[STATIC]
+            else ARX_RESIDUAL
+        )
 
     def copy(self, expert: int, to: int) -> Stack:
         """Return the stack with the evidence of an expert given to another, as if it had predicted the same so far."""
@@ -96,7 +110,7 @@ class Stack:
 
 def _first_weights() -> Array:
     """Return the weights without evidence, ``π₀``."""
-    return np.array([0.0, CONSTANTS.first_lagged, CONSTANTS.first_static, 0.0, 0.0])
+    return np.array([0.0, CONSTANTS.first_arx_residual, CONSTANTS.first_static, 0.0, 0.0])
 
 
 def simplex_minimum(hessian: Array, linear: Array) -> Array:

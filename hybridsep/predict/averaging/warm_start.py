@@ -9,14 +9,14 @@ import numpy as np
 from ...base.signals import Array
 from ..regression import RidgeRegression
 
-__all__ = ["Evidence"]
+__all__ = ["WarmStartRows"]
 
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class WarmStartRows:
     """Rows of this run and of earlier ones, by their factors.
 
     Attributes
@@ -30,7 +30,7 @@ class Evidence:
     earlier: RidgeRegression
 
     @classmethod
-    def init(cls, n_features: int) -> Evidence:
+    def init(cls, n_features: int) -> WarmStartRows:
         """Return no evidence on the weights of ``n_features`` features."""
         nothing = RidgeRegression.init(n_features, _NO_PENALTY)
         return cls(nothing, nothing)
@@ -40,39 +40,39 @@ class Evidence:
         """Number of all rows, weighted."""
         return self.this.n_rows + self.earlier.n_rows
 
-    def forget(self) -> Evidence:
+    def forget(self) -> WarmStartRows:
         """Forget all rows."""
-        return Evidence.init(self.this.n_features)
+        return WarmStartRows.init(self.this.n_features)
 
-    def believe_earlier(self) -> Evidence:
+    def believe_earlier(self) -> WarmStartRows:
         """Go on with all rows as rows of this run."""
         return replace(self.forget(), this=self.all())
 
-    def forget_earlier(self) -> Evidence:
+    def forget_earlier(self) -> WarmStartRows:
         """Go on with the rows of this run alone."""
         return replace(self.forget(), this=self.this)
 
-    def discount(self, kept: float) -> Evidence:
-        """Weigh all rows so far by ``kept``."""
-        return Evidence(self.this.discount(kept), self.earlier.discount(kept))
+    def discount(self, forgetting_factor: float) -> WarmStartRows:
+        """Weigh all rows so far by ``forgetting_factor``."""
+        return WarmStartRows(self.this.discount(forgetting_factor), self.earlier.discount(forgetting_factor))
 
-    def begin_run(self, most: float) -> Evidence:
+    def begin_run(self, most: float) -> WarmStartRows:
         """Begin another run: all rows so far are of earlier ones, and weigh at most as ``most`` of this one."""
         everything = self.all()
         return replace(self.forget(), earlier=everything.discount(most / max(everything.n_rows, most)))
 
-    def all(self, kept: float = 1.0) -> RidgeRegression:
-        """Return all rows, the rows of earlier runs weighed by ``kept``."""
+    def all(self, forgetting_factor: float = 1.0) -> RidgeRegression:
+        """Return all rows, the rows of earlier runs weighed by ``forgetting_factor``."""
         if self.earlier.n_rows == 0.0:
             return self.this
-        earlier = self.earlier.discount(kept)
+        earlier = self.earlier.discount(forgetting_factor)
         return earlier if self.this.n_rows == 0.0 else self.this.add(earlier)
 
-    def target_square(self, kept: float = 1.0) -> float:
-        """Return the sum of the squares of the targets, m², the rows of earlier runs weighed by ``kept``."""
-        return self.this.target_square + kept * self.earlier.target_square
+    def target_square(self, forgetting_factor: float = 1.0) -> float:
+        """Return the sum of the squares of the targets, m², earlier runs' weighed by ``forgetting_factor``."""
+        return self.this.target_square + forgetting_factor * self.earlier.target_square
 
-    def learn(self, rows: Array, lagged: Array, target: Array) -> Evidence:
+    def learn(self, rows: Array, lagged: Array, target: Array) -> WarmStartRows:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
         if not len(target):
             return self

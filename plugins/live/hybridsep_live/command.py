@@ -13,7 +13,7 @@ import typer
 
 if TYPE_CHECKING:
     from hybridsep.logs.checks import Finding
-    from hybridsep.logs.units import Shown
+    from hybridsep.logs.units import DisplayUnits
 
 __all__ = ["live"]
 
@@ -126,7 +126,7 @@ def _say(words: str) -> None:
     typer.echo(words, err=True)
 
 
-def _print_run(status: Mapping[str, Any], shown: Shown, *, as_json: bool) -> None:
+def _print_run(status: Mapping[str, Any], shown: DisplayUnits, *, as_json: bool) -> None:
     """Print counts, errors and step times of a run."""
     if as_json:
         finite = {name: value if math.isfinite(value) else None for name, value in status.items()}

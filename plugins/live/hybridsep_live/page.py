@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hybridsep.base.errors import ParameterError
-from hybridsep.logs.units import Shown
+from hybridsep.logs.units import DisplayUnits
 
 from .core import Row
 from .state import State, table
@@ -43,7 +43,7 @@ class Page:
     Parameters
     ----------
     title : str
-    shown : Shown
+    shown : DisplayUnits
         Units.
     port : int
         0 for a free one.
@@ -61,7 +61,7 @@ class Page:
         If the port is taken.
     """
 
-    def __init__(self, title: str, shown: Shown, port: int = 0) -> None:
+    def __init__(self, title: str, shown: DisplayUnits, port: int = 0) -> None:
         token, self.n_dropped = secrets.token_urlsafe(24), 0
         context = multiprocessing.get_context("spawn")
         self._told, own = context.Pipe()
@@ -125,7 +125,7 @@ class Page:
                 self._told.send((kind, (table(arguments[0]), arguments[1]) if kind == "take" else arguments))
 
 
-def _serve(told: Connection, title: str, shown: Shown, port: int, token: str) -> None:
+def _serve(told: Connection, title: str, shown: DisplayUnits, port: int, token: str) -> None:
     """Serve the page of a run until its process ends; what it was bound to, or why not, is told first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the run
     for name in [name for name in os.environ if name.startswith(_FOREIGN)]:

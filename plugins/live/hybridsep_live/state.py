@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybridsep.base.signals import Array
-from hybridsep.logs.units import Shown
+from hybridsep.logs.units import DisplayUnits
 
 from .core import Row
 
@@ -117,14 +117,14 @@ def table(rows: list[Row]) -> Array:
     )
 
 
-def signals(rows: Array, shown: Shown) -> Array:
+def signals(rows: Array, shown: DisplayUnits) -> Array:
     """Return what is drawn, ``(n, len(DRAWN))``.
 
     Parameters
     ----------
     rows : (n, len(COLUMNS)) array
         As of :func:`table`.
-    shown : Shown
+    shown : DisplayUnits
         Units.
     """
     t, x_d, x_meas, x_pb, x_h, std, _, step, _ = rows.T
@@ -148,7 +148,7 @@ class State:
     Attributes
     ----------
     title : str
-    shown : Shown
+    shown : DisplayUnits
         Units.
     T_s : float
         Sampling interval, s; 0 before the first sample.
@@ -162,7 +162,7 @@ class State:
     """
 
     title: str
-    shown: Shown
+    shown: DisplayUnits
     T_s: float = 0.0
     delay: float = 0.0
     status: dict[str, Any] = field(default_factory=dict)

@@ -144,7 +144,7 @@ def test_what_is_refused(fmus: BuiltFmus) -> None:
     fmu = fmus("HybridPredictor")
     kept = Kept()
     with pytest.raises(FmuError, match=r"sample 0 is refused: .*x_meas must be finite"):
-        run_live(Listed([Sample(0.0, math.nan)] * 200), FmuController(fmu, {"trust": False}, 0.0), [kept])
+        run_live(Listed([Sample(0.0, math.nan)] * 200), FmuController(fmu, {"averaging": False}, 0.0), [kept])
     assert len(kept.ends) == 1
     assert "sample 0 is refused" in kept.ends[0]
     with pytest.raises(SignalError, match="sample 1: either all commands are ahead"):

@@ -43,9 +43,9 @@ static void choose(source *from, hsep_parameters *parameters, hsep_mode *mode)
     parameters->predictor.input_hold = byte(from) % 2;
     parameters->predictor.measurement_delay = byte(from) % 5;
     parameters->predictor.dead_time = byte(from) % 5;
-    parameters->trust.trust = byte(from) % 2;
-    parameters->trust.period = byte(from) % 2 ? 1e-3 : 0.0;
-    parameters->trust.forgetting = byte(from) % 2 ? 0.05 : 0.0;
+    parameters->averaging.averaging = byte(from) % 2;
+    parameters->averaging.period = byte(from) % 2 ? 1e-3 : 0.0;
+    parameters->averaging.forgetting = byte(from) % 2 ? 0.05 : 0.0;
     parameters->compensator.spacing = byte(from) % 5;
     parameters->compensator.preview = byte(from) % 64;
     parameters->compensator.compensate = byte(from) % 3;
@@ -78,7 +78,7 @@ static void predict(source *from, const hsep_parameters *parameters)
         (void)hsep_predictor_init(predictor, parameters, start, weights ? from->next : NULL, weights);
         for (; from->left > 0 && k < 400; k++) {
             const double x_d = position(from),
-                         x = byte(from) % 16 == 0 && parameters->trust.trust ? NAN : position(from);
+                         x = byte(from) % 16 == 0 && parameters->averaging.averaging ? NAN : position(from);
             (void)hsep_predictor_sample(predictor, x_d, x);
             hsep_predictor_read(predictor, &outputs);
         }

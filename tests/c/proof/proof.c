@@ -77,13 +77,13 @@ void prove_stack(void)
         }
     }
     hsep_stack_update(&stack, products, Frama_C_double_interval(1.0, 1e4), 1e-18);
-    const hsep_word leader = hsep_stack_leader(&stack);
-    const hsep_word expert = (hsep_word)(Frama_C_interval(0, HSEP_N_EXPERTS - 1) + SHORT);
-    hsep_stack_copy(&stack, leader, HSEP_DOUBTING); /* another one */
+    const hsep_int leader = hsep_stack_leader(&stack);
+    const hsep_int expert = (hsep_int)(Frama_C_interval(0, HSEP_N_EXPERTS - 1) + SHORT);
+    hsep_stack_copy(&stack, leader, HSEP_FRESH_START); /* another one */
     hsep_stack_forget(&stack, expert);
 }
 
-/* The rings of commands and signals: some windows of a whole predictor, with the paper's model and with trust. */
+/* The rings of commands and signals: some windows of a whole predictor, with the paper's model and with averaging. */
 #define NP 3
 #define SAMPLES (4 * NP + 1)
 
@@ -97,8 +97,8 @@ static void small_parameters(hsep_parameters *parameters)
     parameters->predictor.Np = NP;
     parameters->predictor.p = 2;
     parameters->predictor.q = 1;
-    parameters->predictor.measurement_delay = TRUST ? 1 : 0;
-    parameters->trust.trust = TRUST;
+    parameters->predictor.measurement_delay = AVERAGING ? 1 : 0;
+    parameters->averaging.averaging = AVERAGING;
     parameters->n_modes = 1;
     parameters->modes = &mode;
 }
@@ -187,8 +187,8 @@ void prove_sizes(void)
     HSEP_PREDICTOR_RANGES(ANY)
 #undef ANY
 #define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters.trust.name = (type)Frama_C_double_interval(least, most);
-    HSEP_TRUST_RANGES(ANY)
+    parameters.averaging.name = (type)Frama_C_double_interval(least, most);
+    HSEP_AVERAGING_RANGES(ANY)
 #undef ANY
 #define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
     parameters.compensator.name = (type)Frama_C_double_interval(least, most);

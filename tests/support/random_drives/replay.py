@@ -43,13 +43,13 @@ if it refuses a sample."""
 
 PREDICTORS: dict[str, Callable[[PredictorSettings], PredictorSettings]] = {
     "default": lambda settings: settings,
-    "paper": lambda settings: replace(settings, trust=False),
+    "paper": lambda settings: replace(settings, averaging=False),
 }
 """Settings of a predictor, from the settings of a drive."""
 
 
 def library_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
-    """Return ``x_h`` of the library's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
+    """Return ``x_h`` of the library's predictor, ``(n,)``, m; with averaging ``x_meas`` is NaN where missing."""
     return backtest(HybridPredictor(model, PREDICTORS[predictor](settings)), x_d, x_meas).x_h
 
 
@@ -189,7 +189,7 @@ def _hold(x_pb: Array, x_meas: Array, Np: int) -> Array:
 
 
 def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
-    """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
+    """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with averaging ``x_meas`` is NaN where missing."""
     outputs = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))
     return np.asarray(outputs[0])
 

@@ -8,11 +8,11 @@
 
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 
-static hsep_trusted_task compensator_task(hsep_compensator *self)
+static hsep_averaged_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    return (hsep_trusted_task){
-        .model = hsep_residual_trusted(hsep_predictor_model(predictor)),
+    return (hsep_averaged_task){
+        .model = hsep_residual_averaged(hsep_predictor_model(predictor)),
         .planner = hsep_compensator_planner(self),
         .spline = hsep_at(self, self->spline_pb),
         .x_d = hsep_at(predictor, predictor->x_d)};
@@ -23,13 +23,13 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
-    const hsep_word preview = predictor->preview, Np = predictor->Np;
+    const hsep_int preview = predictor->preview, Np = predictor->Np;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
-    for (hsep_word k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         const hsep_real command = x_d[k] - predictor->start + hsep_planner_decided(planner, k);
         hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
@@ -39,7 +39,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
         memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
         memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
         hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-        for (hsep_word k = 0; k < preview; k++) {
+        for (hsep_int k = 0; k < preview; k++) {
             target[k] -= e[preview - 1 - k];
         }
     }
@@ -51,16 +51,16 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    const hsep_word preview = predictor->preview;
+    const hsep_int preview = predictor->preview;
     const hsep_real *spline_pb = hsep_at(self, self->spline_pb);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    for (hsep_word k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         x[preview - 1 - k] = spline_pb[k];
     }
     memset(x + preview, 0, (size_t)recursion.q * sizeof(hsep_real));
     memset(e + preview, 0, (size_t)recursion.p * sizeof(hsep_real));
     hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-    for (hsep_word k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         x[k] = spline_pb[k] + e[preview - 1 - k];
     }
     return x;
@@ -68,19 +68,19 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 
 HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
 {
-    const hsep_word p = recursion->p;
+    const hsep_int p = recursion->p;
     hsep_real *a = work, *next = work + p;
-    for (hsep_word i = 0; i < p; i++) {
+    for (hsep_int i = 0; i < p; i++) {
         a[i] = -recursion->w_e[i];
     }
-    for (hsep_word m = p; m-- > 0;) {
+    for (hsep_int m = p; m-- > 0;) {
         const hsep_real reflection = a[m];
         if (!(hsep_fabs(reflection) < 1.0)) { /* NaN too */
             return 0;
         }
         /* a_i := (a_i - kappa a_(m-i)) / (1 - kappa^2) */
         const hsep_real inverse = 1.0 / ((1.0 - reflection) * (1.0 + reflection));
-        for (hsep_word i = 0; i < m; i++) {
+        for (hsep_int i = 0; i < m; i++) {
             next[i] = (a[i] - reflection * a[m - 1 - i]) * inverse;
         }
         hsep_real *swap = a;
@@ -91,7 +91,7 @@ HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real wo
 }
 
 /* Whether the hybrid model may plan the window that begins. */
-static int compensator_trusts(hsep_compensator *self)
+static int compensator_averages(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
@@ -102,21 +102,21 @@ static int compensator_trusts(hsep_compensator *self)
 
 /* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from
  * differences. */
-static hsep_word compensator_pinned(hsep_compensator *self)
+static hsep_int compensator_pinned(hsep_compensator *self)
 {
-    const hsep_word pinned = hsep_planner_pinned(hsep_compensator_planner(self));
+    const hsep_int pinned = hsep_planner_pinned(hsep_compensator_planner(self));
     return pinned > 1 ? pinned : 0;
 }
 
 /* Set the commands of the window up to last - 1 and predict its position; eqs. (2) and (4). */
-static void compensator_publish(hsep_compensator *self, hsep_word last)
+static void compensator_publish(hsep_compensator *self, hsep_int last)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_word Np = predictor->Np, first = predictor->n_published;
+    const hsep_int Np = predictor->Np, first = predictor->n_published;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
     hsep_real *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
     hsep_real *command = hsep_at(predictor, predictor->command);
-    for (hsep_word k = first; k < last; k++) {
+    for (hsep_int k = first; k < last; k++) {
         x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
         command[Np - 1 - k] = x_dm[k] - predictor->start;
         hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
@@ -124,10 +124,10 @@ static void compensator_publish(hsep_compensator *self, hsep_word last)
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
-    if (self->trusted) { /* the window's part of the preview, and what is late before it */
-        const hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
+    if (self->averaged) { /* the window's part of the preview, and what is late before it */
+        const hsep_averaged_planner *averaged = hsep_compensator_averaged(self);
         memcpy(
-            hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
+            hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
             (size_t)predictor->n * sizeof(hsep_real));
     } else {
         const hsep_residual_window window = hsep_predictor_window(predictor);
@@ -137,27 +137,27 @@ static void compensator_publish(hsep_compensator *self, hsep_word last)
     hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
-/* Do parts of a plan with trust, at least one: this sample's equal share of the work that may be left until the plan is
- * due, to the nearest part. Return whether the plan is made. */
-static int compensator_advance(hsep_compensator *self, hsep_word samples)
+/* Do parts of a plan with averaging, at least one: this sample's equal share of the work that may be left until the
+ * plan is due, to the nearest part. Return whether the plan is made. */
+static int compensator_advance(hsep_compensator *self, hsep_int samples)
 {
-    hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
-    const hsep_trusted_task task = compensator_task(self);
-    hsep_real next = hsep_trusted_planner_next(trusted, &task), done = 0.0, due = INFINITY;
+    hsep_averaged_planner *averaged = hsep_compensator_averaged(self);
+    const hsep_averaged_task task = compensator_task(self);
+    hsep_real next = hsep_averaged_planner_next(averaged, &task), done = 0.0, due = INFINITY;
     while (next > 0.0 && done + 0.5 * next <= due) {
-        hsep_trusted_planner_advance(trusted, &task);
+        hsep_averaged_planner_advance(averaged, &task);
         done += next;
-        next = hsep_trusted_planner_next(trusted, &task);
-        due = samples > 1 ? (done + hsep_trusted_planner_left(trusted, &task)) / (hsep_real)samples : INFINITY;
+        next = hsep_averaged_planner_next(averaged, &task);
+        due = samples > 1 ? (done + hsep_averaged_planner_left(averaged, &task)) / (hsep_real)samples : INFINITY;
     }
     return !(next > 0.0);
 }
 
 /* Parts of the solver's steps of a bounded plan; return whether it is solved. */
-static int compensator_step(hsep_compensator *self, hsep_word due)
+static int compensator_step(hsep_compensator *self, hsep_int due)
 {
     int done = 0;
-    for (hsep_word step = 0; !done && step < due; step++) {
+    for (hsep_int step = 0; !done && step < due; step++) {
         done = hsep_planner_advance(hsep_compensator_planner(self));
     }
     return done;
@@ -167,12 +167,12 @@ static int compensator_step(hsep_compensator *self, hsep_word due)
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_word pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
-    const hsep_word left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    const hsep_word due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_word)-1;
-    if (self->trusted ? compensator_advance(self, left) : compensator_step(self, due)) {
+    const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
+    const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
+    const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
+    if (self->averaged ? compensator_advance(self, left) : compensator_step(self, due)) {
         self->solving = 0;
-        self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
+        self->state = self->averaged ? hsep_compensator_averaged(self)->planned : self->state;
         compensator_publish(self, predictor->Np);
     }
 }
@@ -189,17 +189,17 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self), 0)
                                         ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_exact)
                                         : HSEP_PLAN_FAILED;
-    self->state = (hsep_word)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
+    self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
 
-/* Begin a plan on the paper's model, or on the physics model where the paper's is not trusted. */
+/* Begin a plan on the paper's model, or on the physics model where the paper's must not plan. */
 static void compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
-    if (compensator_trusts(self)) {
+    if (compensator_averages(self)) {
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
@@ -209,30 +209,30 @@ static void compensator_plan(hsep_compensator *self)
     self->solving = status == HSEP_PLAN_BOUNDED;
 }
 
-/* Begin a plan on the residual model with trust; which model planned is known when the plan is made. */
-static void compensator_plan_trusted(hsep_compensator *self)
+/* Begin a plan on the residual model with averaging; which model planned is known when the plan is made. */
+static void compensator_plan_averaged(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_trusted_task task = compensator_task(self);
+    const hsep_averaged_task task = compensator_task(self);
     const int warm = (hsep_real)predictor->k >= predictor->n_init;
-    const hsep_word best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
+    const hsep_int best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
-    const hsep_trusted_before before = {
+    const hsep_averaged_before before = {
         .physics = hsep_predictor_physics(predictor),
         .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
         .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
         .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
-    hsep_trusted_planner_begin(hsep_compensator_trusted(self), &task, &before, best);
+    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, &before, best);
     self->solving = 1;
 }
 
 HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max)
 {
-    if (!(change_max > 0.0 && isfinite(change_max)) || (hsep_word)compensate > HSEP_SEP_HYBRID) {
+    if (!(change_max > 0.0 && isfinite(change_max)) || (hsep_int)compensate > HSEP_SEP_HYBRID) {
         return 0;
     }
-    self->compensate_next = (hsep_word)compensate;
+    self->compensate_next = (hsep_int)compensate;
     self->change_max_next = change_max;
     return 1;
 }
@@ -249,8 +249,8 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_predictor_begin(predictor);
-    if (self->trusted) {
-        compensator_plan_trusted(self);
+    if (self->averaged) {
+        compensator_plan_averaged(self);
     } else {
         compensator_plan(self);
     }
@@ -288,10 +288,10 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
 {
     const hsep_predictor *predictor = (const hsep_predictor *)hsep_at_const(self, self->predictor);
     const hsep_planner *planner = (const hsep_planner *)hsep_at_const(self, self->planner);
-    const hsep_word i = predictor->k % predictor->Np;
-    const int follows = self->trusted && i < hsep_planner_pinned(planner);
+    const hsep_int i = predictor->k % predictor->Np;
+    const int follows = self->averaged && i < hsep_planner_pinned(planner);
     hsep_predictor_read(predictor, &outputs->predicted);
-    if (self->trusted ? self->compensate != HSEP_SEP_HYBRID : self->state != HSEP_SEP_HYBRID) {
+    if (self->averaged ? self->compensate != HSEP_SEP_HYBRID : self->state != HSEP_SEP_HYBRID) {
         outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */
     }
     outputs->x_dm = hsep_at_const(self, self->x_dm)[i];

@@ -4,9 +4,9 @@
  * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs belong to k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
- * while the command follows the last plan. With trust every plan is solved so, over HSEP_PLANNING_PINNED_AVERAGED
+ * while the command follows the last plan. With averaging every plan is solved so, over HSEP_PLANNING_PINNED_AVERAGED
  * samples: each of these does an equal share of the work that may be left, counted in multiply-adds
- * (hsep_trusted_planner_left).
+ * (hsep_averaged_planner_left).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
  * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
@@ -15,8 +15,8 @@
  * often, or 2 HSEP_QP_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real
  * time.
  *
- * With trust a late measurement adds late^2 / 2 multiply-adds for each expert in two samples of a window: negligible up
- * to 100 samples, 2 ms on a desktop's core for 1000.
+ * With averaging a late measurement adds late^2 / 2 multiply-adds for each expert in two samples of a window:
+ * negligible up to 100 samples, 2 ms on a desktop's core for 1000.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
  * window, as in hsep_predictor.h.
@@ -29,33 +29,33 @@
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
 #include "hsep_real.h"
-#include "hsep_trusted_planner.h"
+#include "hsep_averaged_planner.h"
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
     hsep_sep_state compensate;
-    hsep_word n_lost; /* samples without a measurement after which the change fades; 0: never */
+    hsep_int n_lost; /* samples without a measurement after which the change fades; 0: never */
 } hsep_compensator_parameters;
 
 struct hsep_compensator {
-    hsep_word compensate;      /* hsep_sep_state, the best model allowed in the window, */
-    hsep_word compensate_next; /* and from the next one on */
+    hsep_int compensate;       /* hsep_sep_state, the best model allowed in the window, */
+    hsep_int compensate_next;  /* and from the next one on */
     hsep_real change_max_next; /* m, of the command, likewise */
-    hsep_word state;           /* hsep_sep_state of the window, */
-    hsep_word before;          /* and of the window before, whose plan the first samples follow with trust */
-    hsep_word solving;         /* whether its plan is being solved */
-    hsep_word n_lost;          /* as the parameter */
-    hsep_word missing;         /* measurements that were missing one after another, n_lost at most */
+    hsep_int state;            /* hsep_sep_state of the window, */
+    hsep_int before;           /* and of the window before, whose plan the first samples follow with averaging */
+    hsep_int solving;          /* whether its plan is being solved */
+    hsep_int n_lost;           /* as the parameter */
+    hsep_int missing;          /* measurements that were missing one after another, n_lost at most */
     /* Offsets in words from the beginning of the struct */
-    hsep_word x_dm;      /* (Np,) m, the window: modified commands */
-    hsep_word trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
-    hsep_word trial_e;   /* (preview + p,) m, its residuals */
-    hsep_word target;    /* (preview,) m */
-    hsep_word spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
-    hsep_word trial;     /* the physics model of a trial */
-    hsep_word planner, predictor;
-    hsep_word trusted; /* the planner on the residual model with trust; 0: the paper's */
+    hsep_int x_dm;      /* (Np,) m, the window: modified commands */
+    hsep_int trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
+    hsep_int trial_e;   /* (preview + p,) m, its residuals */
+    hsep_int target;    /* (preview,) m */
+    hsep_int spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
+    hsep_int trial;     /* the physics model of a trial */
+    hsep_int planner, predictor;
+    hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */
 };
 
 HSEP_ASSERT_WORDS(hsep_compensator, 17);
@@ -70,16 +70,15 @@ HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
 
 HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self);
 
-/* The planner with trust, if there is one. */
-HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self);
+/* The planner with averaging, if there is one. */
+HSEP_API hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self);
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
 /* Whether a block, in any alignment and of hsep_compensator_block_size(parameters) bytes, is a valid state for these
  * parameters at sample k: hsep_compensator_block_init would lay it out so, and every index lies within it. */
-HSEP_API int hsep_compensator_block_valid(
-    const void *block, const hsep_compensator_parameters *parameters, hsep_word k);
+HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_int k);
 
 /* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
  * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */

@@ -17,9 +17,9 @@ HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
     return (hsep_predictor *)hsep_at(self, self->predictor);
 }
 
-HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self)
+HSEP_API hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self)
 {
-    return (hsep_trusted_planner *)hsep_at(self, self->trusted);
+    return (hsep_averaged_planner *)hsep_at(self, self->averaged);
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -38,8 +38,9 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
-    self->trusted =
-        predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&model, &parameters->planner)) : 0;
+    self->averaged = predictor->averaging.averaging
+                         ? hsep_take_block(&end, hsep_averaged_planner_size(&model, &parameters->planner))
+                         : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -56,11 +57,11 @@ HSEP_API void hsep_compensator_block_init(
     (void)compensator_lay_out(self, parameters);
     hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
-    if (self->trusted) {
+    if (self->averaged) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-        hsep_trusted_planner_init(hsep_compensator_trusted(self), &model, &parameters->planner, start);
+        hsep_averaged_planner_init(hsep_compensator_averaged(self), &model, &parameters->planner, start);
     }
-    self->compensate = self->compensate_next = (hsep_word)parameters->compensate;
+    self->compensate = self->compensate_next = (hsep_int)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
@@ -75,7 +76,7 @@ HSEP_API void hsep_compensator_block_init(
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
 }
 
-HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_word k)
+HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_int k)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
@@ -92,7 +93,7 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
             hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
            hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
-           (!got.trusted ||
-            hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &model, &parameters->planner)) &&
+           (!got.averaged ||
+            hsep_averaged_planner_valid(hsep_at_bytes(block, got.averaged), &model, &parameters->planner)) &&
            hsep_predictor_block_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }

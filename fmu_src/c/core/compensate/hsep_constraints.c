@@ -5,7 +5,7 @@
 HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_word preview = splines->preview;
+    const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     hsep_real last = self->x_d_before[2];
     hsep_real before[HSEP_ORDERS]; /* differences of orders 0 to 2 at the sample before */
@@ -16,7 +16,7 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[])
     before[0] = y[2];
     before[1] = y[2] - y[1];
     before[2] = (y[2] - y[1]) - (y[1] - y[0]);
-    for (hsep_word k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         const hsep_real delta = hsep_planner_delta(self, k), step = x_d[k] - last;
         hsep_real now[HSEP_ORDERS];
         last = x_d[k];
@@ -33,9 +33,9 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[])
     }
 }
 
-HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep_real *least, hsep_real *most)
+HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
 {
-    const hsep_word preview = hsep_planner_splines(self)->preview;
+    const hsep_int preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
     *most = 1.0 - HSEP_QP_ROUNDING;
     *least = -*most;
@@ -51,9 +51,9 @@ HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep
 HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
-    const hsep_word rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
+    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
     hsep_real share = 1.0;
-    for (hsep_word r = 0; r < rows; r++) {
+    for (hsep_int r = 0; r < rows; r++) {
         hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);
         const hsep_real here = total[r] + from[r];
@@ -68,8 +68,8 @@ HSEP_API hsep_real hsep_constraints_share(const hsep_planner *self, const hsep_r
 HSEP_API int hsep_constraints_allow(const hsep_planner *self, const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
-    const hsep_word rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
-    for (hsep_word r = 0; r < rows; r++) {
+    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
+    for (hsep_int r = 0; r < rows; r++) {
         const hsep_real there = total[r] + way[r];
         hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);

@@ -12,7 +12,7 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const hsep_real x_d[]);
 
 /* Bounds of a row, in shares. The remainder of the last plan is always feasible, with a small margin: an
  * interior-point method needs an interior. */
-HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_word r, hsep_real *least, hsep_real *most);
+HSEP_API void hsep_constraints_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most);
 
 /* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
  * remainder and from. */

@@ -10,7 +10,7 @@
 
 /* The arrays behind the struct. */
 typedef struct {
-    hsep_word n;         /* entries of x */
+    hsep_int n;          /* entries of x */
     hsep_real *x, *v;    /* (n,) iterate and linear term */
     hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
@@ -21,12 +21,12 @@ typedef struct {
 /* Take count numbers of a block; NULL if there is no block but only its size is asked for. */
 static hsep_real *interior_take(hsep_real *block, hsep_real *end, hsep_real count)
 {
-    const hsep_word offset = hsep_take(end, count);
+    const hsep_int offset = hsep_take(end, count);
     return block != NULL ? block + offset : NULL;
 }
 
 /* Walk the arrays of n splines; return the bytes of the block. */
-static hsep_real interior_lay_out(hsep_real *block, hsep_word preview, hsep_word n, interior_arrays *a)
+static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n, interior_arrays *a)
 {
     const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview;
     hsep_real end = HSEP_WORDS(hsep_interior);
@@ -53,13 +53,13 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_word preview, hsep_word
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n)
+HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n)
 {
     interior_arrays arrays;
     return interior_lay_out(NULL, preview, n, &arrays);
 }
 
-HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max)
+HSEP_API int hsep_interior_valid(const void *block, hsep_int first_max)
 {
     hsep_interior got;
     memcpy(&got, block, sizeof got);
@@ -75,7 +75,7 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     a.slacks.rho = self->rho;
     a.slacks.sides = self->sides;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_word begin, end;
+        hsep_int begin, end;
         hsep_splines_touched(splines, self->first, order, &begin, &end);
         a.slacks.range[order].begin = begin + order * splines->preview;
         a.slacks.range[order].end = end + order * splines->preview;
@@ -102,10 +102,10 @@ static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep
 
 /* The proximal term that bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding
  * in it would outgrow P. */
-static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_word n)
+static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_int n)
 {
     hsep_real largest = 0.0;
-    for (hsep_word i = 0; i < n; i++) {
+    for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, P[0]);
         P += n - i;
     }
@@ -125,7 +125,7 @@ static void interior_start(
 }
 
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance)
 {
     self->first = first;
@@ -149,8 +149,8 @@ HSEP_API void hsep_interior_again(
 static void interior_gradient(const interior_arrays *a, const hsep_real *P)
 {
     memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
-    for (hsep_word i = 0; i < a->n; i++) {
-        const hsep_word left = a->n - i - 1;
+    for (hsep_int i = 0; i < a->n; i++) {
+        const hsep_int left = a->n - i - 1;
         a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
         hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
         P += a->n - i;
@@ -160,13 +160,13 @@ static void interior_gradient(const interior_arrays *a, const hsep_real *P)
 /* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its
  * terms. */
 static hsep_real interior_dual_residual(
-    const interior_arrays *a, const hsep_splines *splines, hsep_word first, const hsep_real *P)
+    const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
     interior_gradient(a, P);
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
     hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
-    for (hsep_word j = 0; j < a->n; j++) {
+    for (hsep_int j = 0; j < a->n; j++) {
         largest = hsep_fmax(
             hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
         a->r_d[j] += a->dx[j];
@@ -176,7 +176,7 @@ static hsep_real interior_dual_residual(
 }
 
 /* dx := (P + A' W A)^-1 (r_d + A' push), and what it does to the rows. */
-static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_word first)
+static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_int first)
 {
     hsep_slacks_push(&a->slacks);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
@@ -210,7 +210,7 @@ static int interior_residuals(
 static int interior_factor(
     const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[], int second)
 {
-    const hsep_word half = a->n / 6 / HSEP_CHOLESKY_PANEL * HSEP_CHOLESKY_PANEL;
+    const hsep_int half = a->n / 6 / HSEP_CHOLESKY_PANEL * HSEP_CHOLESKY_PANEL;
     if (second) {
         return !hsep_cholesky_rows(a->factor, a->n, half, a->n, NULL);
     }
@@ -222,7 +222,7 @@ static int interior_factor(
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    const hsep_word part = self->part;
+    const hsep_int part = self->part;
     P = interior_free_rows(self, splines, P);
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
     if (part < HSEP_INTERIOR_PARTS - 1) {
@@ -234,7 +234,7 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     hsep_slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
     interior_direction(&a, splines, self->first);
     const hsep_real alpha = hsep_slacks_move(&a.slacks);
-    for (hsep_word j = 0; j < a.n; j++) {
+    for (hsep_int j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];
     }
     return 0;

@@ -17,16 +17,16 @@ typedef struct {
     hsep_real mu;            /* complementarity mu at the end, as a share of the cost per bound */
     hsep_real dual_residual; /* dual residual at the end, as a share of its largest term */
     hsep_real margin;        /* shares by which its bounds are tighter, and may be exceeded at the end */
-    hsep_word steps;         /* at most */
+    hsep_int steps;          /* at most */
 } hsep_tolerance;
 
 #define HSEP_INTERIOR_PARTS 4 /* of a step */
 
 typedef struct {
     hsep_tolerance tolerance;
-    hsep_word first;  /* the splines before it are fixed; x is (n - first,) */
-    hsep_word steps;  /* begun for this plan */
-    hsep_word part;   /* of the last one that comes next: 0 residuals, 1 and 2 the factor, 3 directions */
+    hsep_int first;   /* the splines before it are fixed; x is (n - first,) */
+    hsep_int steps;   /* begun for this plan */
+    hsep_int part;    /* of the last one that comes next: 0 residuals, 1 and 2 the factor, 3 directions */
     hsep_real mu;     /* m2, of its beginning */
     hsep_real cost;   /* m2, scale of the cost per bound */
     hsep_real sides;  /* number of bounds, low and high ones */
@@ -37,7 +37,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_interior, 12);
 
-HSEP_API hsep_real hsep_interior_size(hsep_word preview, hsep_word n); /* bytes of the block, counted as a number */
+HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */
 
 /* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
 typedef struct {
@@ -51,12 +51,12 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
 
 /* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of fixed
  * splines. */
-HSEP_API int hsep_interior_valid(const void *block, hsep_word first_max);
+HSEP_API int hsep_interior_valid(const void *block, hsep_int first_max);
 
 /* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
  * tolerance. */
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_word first, hsep_real cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
 /* Begin as near a minimum as one of a programme with the same bounds and nearly the same cost is: with its multipliers,

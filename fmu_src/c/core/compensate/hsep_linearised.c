@@ -11,26 +11,26 @@
 #define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
 
 /* Whole parts of a recursion, in samples. */
-static hsep_word linearised_padded(hsep_word count)
+static hsep_int linearised_padded(hsep_int count)
 {
     return (count + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER * LINEARISED_TOGETHER;
 }
 
-static const hsep_word linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
+static const hsep_int linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_ARX_RESIDUAL, HSEP_STATIC, HSEP_FRESH_START};
 
 #define LINEARISED_OF_COMMAND 2
-static const hsep_word linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
+static const hsep_int linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_ARX_COMMAND, HSEP_FRESH_START};
 
 /* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. */
-static hsep_real linearised_weight(const hsep_trusted *model, hsep_word expert, hsep_word kind)
+static hsep_real linearised_weight(const hsep_averaged *model, hsep_int expert, hsep_int kind)
 {
-    const int of_kind = hsep_trusted_kind_of(model, expert) == kind;
+    const int of_kind = hsep_averaged_kind_of(model, expert) == kind;
     return model->predicted[expert] && of_kind ? model->learned.stack.weights[expert] : 0.0;
 }
 
-HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert)
+HSEP_API int hsep_linearised_counts(const hsep_averaged *model, hsep_int expert)
 {
-    return linearised_weight(model, expert, HSEP_OF_PHYSICS) > 0.0;
+    return linearised_weight(model, expert, HSEP_MODEL_RESIDUAL) > 0.0;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -46,7 +46,7 @@ static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_p
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_LINEARISED_EXPERTS);
     self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
-    self->kept = hsep_take(&end, n * LINEARISED_OF_COMMAND);
+    self->shrinkage = hsep_take(&end, n * LINEARISED_OF_COMMAND);
     self->velocity = hsep_take(&end, preview + LINEARISED_BEFORE);
     self->position = hsep_take(&end, preview + LINEARISED_BEFORE);
     self->base = hsep_take(&end, preview);
@@ -78,14 +78,14 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
 
 HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parameters *parameters)
 {
-    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     hsep_linearised got;
     return HSEP_LAID_OUT(got, block, linearised_lay_out(&got, parameters)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
 }
 
 /* Index of a disturbance's first weight among the weights of an expert. */
-static hsep_word linearised_first(const hsep_linearised *self, const hsep_trusted *model)
+static hsep_int linearised_first(const hsep_linearised *self, const hsep_averaged *model)
 {
     return model->n_static - 2 * self->count;
 }
@@ -95,19 +95,19 @@ static hsep_word linearised_first(const hsep_linearised *self, const hsep_truste
 static void linearised_gains(const hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[])
 {
     const hsep_real *slopes = hsep_at_const(self, self->slopes);
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     hsep_real *now = gains, *before = gains + n, *x_now = gains + 2 * n, *x_before = gains + 3 * n;
     hsep_real *x_earlier = gains + 4 * n, last[3] = {0.0}; /* of the differences, at the sample before */
-    for (hsep_word k = 0; k < n; k++, slopes += self->count) {
+    for (hsep_int k = 0; k < n; k++, slopes += self->count) {
         hsep_real given[2][3];
-        for (hsep_word part = 0; part < 2; part++) {
+        for (hsep_int part = 0; part < 2; part++) {
             const hsep_real *w = weights + part * self->count;
             hsep_real friction = 0.0;
             hsep_real of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
-            for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
+            for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
                 friction += slopes[i] * w[i];
             }
-            for (hsep_word i = HSEP_FEATURES_N_LASTING; i < self->count; i++) {
+            for (hsep_int i = HSEP_FEATURES_N_LASTING; i < self->count; i++) {
                 of_position += w[i] * slopes[i];
             }
             given[part][0] = friction;
@@ -126,13 +126,13 @@ static void linearised_gains(const hsep_linearised *self, const hsep_real weight
 
 /* Response of the features of x_pb, x_pb itself and its differences, to a change behind G_pb. */
 static void linearised_pass(
-    const hsep_real weights[], hsep_word count, const hsep_real passed[], hsep_word n, hsep_real to[])
+    const hsep_real weights[], hsep_int count, const hsep_real passed[], hsep_int n, hsep_real to[])
 {
     hsep_real d[LINEARISED_DIFFERENCES] = {0.0}; /* of the sample before */
-    for (hsep_word k = 0; k < n; k++) {
+    for (hsep_int k = 0; k < n; k++) {
         hsep_real difference = passed[k];
         to[k] = 0.0;
-        for (hsep_word i = 0; i < count; i++) {
+        for (hsep_int i = 0; i < count; i++) {
             const hsep_real before = d[i];
             to[k] += weights[i] * difference;
             d[i] = difference;
@@ -142,7 +142,7 @@ static void linearised_pass(
 }
 
 /* A change after the dead time, at sample u. */
-static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_word u, hsep_word dead_time)
+static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_int u, hsep_int dead_time)
 {
     return u >= dead_time && u - dead_time < change->n ? change->commands[u - dead_time] : 0.0;
 }
@@ -151,7 +151,7 @@ static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_wor
 static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, hsep_real T_s)
 {
     hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE, last = 0.0;
-    for (hsep_word u = 0; u < self->preview; u++) {
+    for (hsep_int u = 0; u < self->preview; u++) {
         const hsep_real now = u < change->n ? change->commands[u] : 0.0;
         velocity[u] = (now - last) / T_s;
         last = now;
@@ -162,34 +162,35 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
 }
 
 /* What shrinking and bounds leave of an expert's recursion at place j. */
-static hsep_real linearised_left(const hsep_expert *expert, hsep_word j)
+static hsep_real linearised_left(const hsep_expert *expert, hsep_int j)
 {
     const hsep_real unshrunk = hsep_at_const(expert, expert->unshrunk)[j];
-    return unshrunk == 0.0 ? hsep_at_const(expert, expert->kept)[j] : hsep_at_const(expert, expert->e_h)[j] / unshrunk;
+    return unshrunk == 0.0 ? hsep_at_const(expert, expert->shrinkage)[j]
+                           : hsep_at_const(expert, expert->e_h)[j] / unshrunk;
 }
 
 /* Share of an expert in the stack, sample after sample, after shrinking and bounds. */
 static void linearised_shrink(
-    const hsep_linearised *self, hsep_trusted *model, hsep_word place, hsep_real weight, hsep_real shrink[])
+    const hsep_linearised *self, hsep_averaged *model, hsep_int place, hsep_real weight, hsep_real shrink[])
 {
-    const hsep_expert *expert = hsep_trusted_expert(model, place);
-    for (hsep_word k = 0; weight > 0.0 && k < self->n; k++) {
+    const hsep_expert *expert = hsep_averaged_expert(model, place);
+    for (hsep_int k = 0; weight > 0.0 && k < self->n; k++) {
         shrink[k] = weight * linearised_left(expert, self->n - 1 - k);
     }
 }
 
 /* Response of an expert of the command to the increments of a change, from rest, (preview,). */
 static void linearised_of_increments(
-    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_word dead_time,
+    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_int dead_time,
     hsep_real to[])
 {
     const hsep_real *weights = hsep_expert_weights(expert), *lag_weights = weights + expert->n_static;
     hsep_real *run = hsep_at(self, self->run);
-    for (hsep_word u = 0; u < self->preview; u++) {
-        const hsep_word end = dead_time + change->n; /* the command changes in samples dead_time ... end */
+    for (hsep_int u = 0; u < self->preview; u++) {
+        const hsep_int end = dead_time + change->n; /* the command changes in samples dead_time ... end */
         hsep_real drive = 0.0;
-        for (hsep_word i = u + 1 > end ? u + 1 - end : 1; i < expert->n_static && i + dead_time <= u + 1; i++) {
-            const hsep_word at = u + 1 - i;
+        for (hsep_int i = u + 1 > end ? u + 1 - end : 1; i < expert->n_static && i + dead_time <= u + 1; i++) {
+            const hsep_int at = u + 1 - i;
             const hsep_real before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
             drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
         }
@@ -201,19 +202,19 @@ static void linearised_of_increments(
 
 /* Part of a change that is neither friction nor stiffness: the change behind G_pb and after the dead time, and the
  * response of the experts of the command to it. */
-static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
+static void linearised_command(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
-    const hsep_word dead_time = hsep_trusted_command(model)->dead_time;
+    const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
     hsep_real *base = hsep_at(self, self->base);
     memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
-    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_word place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, HSEP_OF_COMMAND);
+    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
+        const hsep_int place = linearised_of_command[i];
+        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
         if (weight > 0.0) {
             linearised_of_increments(
-                self, hsep_trusted_expert(model, place), change, dead_time,
+                self, hsep_averaged_expert(model, place), change, dead_time,
                 hsep_at(self, self->of_command) + i * self->preview);
-            for (hsep_word u = 0; u < self->preview; u++) {
+            for (hsep_int u = 0; u < self->preview; u++) {
                 base[u] += weight * (linearised_acted(change, u, dead_time) - change->passed[u]);
             }
         }
@@ -223,19 +224,19 @@ static void linearised_command(hsep_linearised *self, hsep_trusted *model, const
 /* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of the stiffness with
  * the position, m, of the damping with its velocity, m/s, and of what repeats with the position, 1/m. */
 HSEP_API void hsep_linearised_slopes(
-    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
+    hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
-    const hsep_disturbances *disturbances = hsep_trusted_disturbances(model);
+    const hsep_disturbances *disturbances = hsep_averaged_disturbances(model);
     const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
     hsep_real spread[HSEP_FEATURES_N_FRICTION];
-    for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
+    for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
         spread[i] = hsep_disturbances_sign_velocity(scale, i);
     }
-    for (hsep_word j = self->n; j-- > 0; slopes += self->count) {
+    for (hsep_int j = self->n; j-- > 0; slopes += self->count) {
         const hsep_real v_d = (x_d[j] - last) / disturbances->T_s;
         last = x_d[j];
-        for (hsep_word i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
+        for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
             if (half > 0.0) {
                 slopes[i] = (hsep_tanh((v_d + half) / spread[i]) - hsep_tanh((v_d - half) / spread[i])) / (2.0 * half);
             } else {
@@ -255,14 +256,14 @@ HSEP_API void hsep_linearised_slopes(
     }
 }
 
-HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
+HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
-    const hsep_word first = linearised_first(self, model);
-    linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
+    const hsep_int first = linearised_first(self, model);
+    linearised_signals(self, change, hsep_averaged_disturbances(model)->T_s);
     linearised_command(self, model, change);
-    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (hsep_trusted_kind_of(model, linearised_experts[i]) != HSEP_OF_COMMAND) {
-            const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
+    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        if (hsep_averaged_kind_of(model, linearised_experts[i]) != HSEP_COMMAND_RESIDUAL) {
+            const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
             linearised_pass(
                 hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
                 hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
@@ -270,36 +271,36 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_trusted *model, 
     }
 }
 
-HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_trusted *model)
+HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_averaged *model)
 {
-    const hsep_word n = self->n, first = linearised_first(self, model);
-    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_word place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, HSEP_OF_COMMAND);
-        linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * n);
+    const hsep_int n = self->n, first = linearised_first(self, model);
+    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
+        const hsep_int place = linearised_of_command[i];
+        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
+        linearised_shrink(self, model, place, weight, hsep_at(self, self->shrinkage) + i * n);
     }
-    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (hsep_trusted_kind_of(model, linearised_experts[i]) != HSEP_OF_COMMAND) {
-            const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-            const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_OF_PHYSICS);
+    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        if (hsep_averaged_kind_of(model, linearised_experts[i]) != HSEP_COMMAND_RESIDUAL) {
+            const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
+            const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_MODEL_RESIDUAL);
             linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
             linearised_gains(
-                self, hsep_expert_weights(expert) + first, hsep_trusted_disturbances(model)->T_s,
+                self, hsep_expert_weights(expert) + first, hsep_averaged_disturbances(model)->T_s,
                 hsep_at(self, self->gains) + i * LINEARISED_GAINS * n);
         }
     }
 }
 
 /* Disturbances in expert i by a change that begins at sample first, as column c of the columns abreast. */
-static void linearised_disturbance(hsep_linearised *self, hsep_word i, hsep_word first, hsep_word c)
+static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
 {
-    const hsep_word n = self->n, count = self->preview - first, moves = self->moves < count ? self->moves : count;
+    const hsep_int n = self->n, count = self->preview - first, moves = self->moves < count ? self->moves : count;
     const hsep_real *gains = hsep_at(self, self->gains) + i * LINEARISED_GAINS * n + (n - count);
     const hsep_real *x_2 = hsep_at(self, self->position), *x_1 = x_2 + 1, *x = x_1 + 1; /* the samples before, now */
     const hsep_real *v_1 = hsep_at(self, self->velocity) + 1, *v_d = v_1 + 1;
     const hsep_real *g0 = gains + 2 * n, *g1 = gains + 3 * n, *g2 = gains + 4 * n;
     hsep_real *to = hsep_at(self, self->disturbance) + c;
-    hsep_word u = 0;
+    hsep_int u = 0;
     for (; u + HSEP_LANES <= count; u += HSEP_LANES) {
         hsep_lanes_spread(
             to + HSEP_PHYSICS_ABREAST * u, HSEP_PHYSICS_ABREAST,
@@ -316,11 +317,11 @@ static void linearised_disturbance(hsep_linearised *self, hsep_word i, hsep_word
 }
 
 /* The disturbances of columns abreast behind G_pb, from rest. */
-static void linearised_filter(hsep_linearised *self, hsep_word count)
+static void linearised_filter(hsep_linearised *self, hsep_int count)
 {
-    const hsep_word words = self->filters - self->physics;
+    const hsep_int words = self->filters - self->physics;
     hsep_physics *filters[HSEP_PHYSICS_ABREAST];
-    for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
+    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
         hsep_real *filter = hsep_at(self, self->filters + c * words);
         memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
         filters[c] = (hsep_physics *)filter;
@@ -334,7 +335,7 @@ static void linearised_take_lags(hsep_linearised *self, const hsep_expert *exper
 {
     const hsep_real *weights = hsep_expert_weights(expert) + expert->n_static;
     hsep_real *lags = hsep_at(self, self->lags);
-    for (hsep_word i = 0; i < expert->p + LINEARISED_TOGETHER - 1; i++) {
+    for (hsep_int i = 0; i < expert->p + LINEARISED_TOGETHER - 1; i++) {
         for (int l = 0; l < HSEP_LANES; l++) {
             *lags++ = i < expert->p ? weights[i] : 0.0;
         }
@@ -345,23 +346,23 @@ static void linearised_take_lags(hsep_linearised *self, const hsep_expert *exper
  * some samples together, so that earlier samples are loaded once for all of them. e, drive: (count,
  * HSEP_PHYSICS_ABREAST); own: (count,), the part by the features of x_pb. */
 static void linearised_run(
-    const hsep_real lags[], hsep_word p, const hsep_real drive[], const hsep_real own[], hsep_real e[], hsep_word count)
+    const hsep_real lags[], hsep_int p, const hsep_real drive[], const hsep_real own[], hsep_real e[], hsep_int count)
 {
     const hsep_lanes *w = hsep_lanes_const(lags);
-    for (hsep_word u = 0; u < count; u += LINEARISED_TOGETHER) {
+    for (hsep_int u = 0; u < count; u += LINEARISED_TOGETHER) {
         const hsep_lanes *from = hsep_lanes_const(drive + HSEP_PHYSICS_ABREAST * u);
-        const hsep_word before = u < p ? u : p;
+        const hsep_int before = u < p ? u : p;
         hsep_lanes *now = hsep_lanes_at(e + HSEP_PHYSICS_ABREAST * u), sums[LINEARISED_TOGETHER][HSEP_OF_FOUR];
         for (int s = 0; s < LINEARISED_TOGETHER; s++) {
             for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                sums[s][l] = from[s * HSEP_OF_FOUR + l] + own[u + (hsep_word)s];
+                sums[s][l] = from[s * HSEP_OF_FOUR + l] + own[u + (hsep_int)s];
             }
         }
-        for (hsep_word i = 0; i < before; i++) {
+        for (hsep_int i = 0; i < before; i++) {
             const hsep_lanes *past = now - HSEP_OF_FOUR * (i + 1);
             for (int s = 0; s < LINEARISED_TOGETHER; s++) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    sums[s][l] += w[i + (hsep_word)s] * past[l];
+                    sums[s][l] += w[i + (hsep_int)s] * past[l];
                 }
             }
         }
@@ -378,32 +379,32 @@ static void linearised_run(
 
 /* Part of a change that does not pass through the disturbances; the change begins at sample first. */
 static void linearised_begin_column(
-    const hsep_linearised *self, const hsep_trusted *model, hsep_word first, hsep_real column[])
+    const hsep_linearised *self, const hsep_averaged *model, hsep_int first, hsep_real column[])
 {
-    const hsep_word count = self->preview - first;
+    const hsep_int count = self->preview - first;
     const hsep_real *of_command = hsep_at_const(self, self->of_command);
-    const hsep_real *kept = hsep_at_const(self, self->kept) + (self->n - count);
+    const hsep_real *shrinkage = hsep_at_const(self, self->shrinkage) + (self->n - count);
     memcpy(column, hsep_at_const(self, self->base), (size_t)count * sizeof(hsep_real));
-    for (hsep_word i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
-        const int counts = linearised_weight(model, linearised_of_command[i], HSEP_OF_COMMAND) > 0.0;
-        for (hsep_word u = 0; counts && u < count; u++) {
-            column[u] += kept[u] * of_command[u];
+    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++, shrinkage += self->n, of_command += self->preview) {
+        const int counts = linearised_weight(model, linearised_of_command[i], HSEP_COMMAND_RESIDUAL) > 0.0;
+        for (hsep_int u = 0; counts && u < count; u++) {
+            column[u] += shrinkage[u] * of_command[u];
         }
     }
 }
 
 /* Add what an expert, by its place in linearised_experts, makes of the change. */
 static void linearised_add(
-    hsep_linearised *self, hsep_trusted *model, hsep_word i, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_linearised *self, hsep_averaged *model, hsep_int i, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
-    const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
-    const hsep_word padded = linearised_padded(self->preview - first);
+    const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
+    const hsep_int padded = linearised_padded(self->preview - first);
     hsep_real *run = hsep_at(self, self->run);
-    for (hsep_word c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
-        const hsep_word begin = c < count ? first + c * spacing : self->preview;
+    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
+        const hsep_int begin = c < count ? first + c * spacing : self->preview;
         linearised_disturbance(self, i, begin, c);
-        for (hsep_word u = self->preview - begin; u < padded; u++) {
+        for (hsep_int u = self->preview - begin; u < padded; u++) {
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
     }
@@ -412,24 +413,24 @@ static void linearised_add(
     linearised_run(
         hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),
         hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1), run, padded);
-    for (hsep_word c = 0; c < count; c++) {
-        const hsep_word length = self->preview - first - c * spacing;
+    for (hsep_int c = 0; c < count; c++) {
+        const hsep_int length = self->preview - first - c * spacing;
         const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
-        for (hsep_word u = 0; u < length; u++) {
+        for (hsep_int u = 0; u < length; u++) {
             columns[c][u] += shrink[u] * run[HSEP_PHYSICS_ABREAST * u + c];
         }
     }
 }
 
 HSEP_API int hsep_linearised_columns(
-    hsep_linearised *self, hsep_trusted *model, hsep_word part, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_linearised *self, hsep_averaged *model, hsep_int part, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
-    hsep_word before = 0;
-    for (hsep_word c = 0; part == 0 && c < count; c++) {
+    hsep_int before = 0;
+    for (hsep_int c = 0; part == 0 && c < count; c++) {
         linearised_begin_column(self, model, first + c * spacing, columns[c]);
     }
-    for (hsep_word i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         if (hsep_linearised_counts(model, linearised_experts[i]) && before++ == part) {
             linearised_add(self, model, i, first, spacing, count, columns);
         }

@@ -1,4 +1,4 @@
-/* Linearisation of the residual model with trust (online model averaging) in the commands, over a preview.
+/* Linearisation of the residual model with averaging (online model averaging) in the commands, over a preview.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
  * for friction and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,
@@ -21,28 +21,28 @@
 #define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
 
 typedef struct {
-    hsep_word n;       /* samples of a prediction, */
-    hsep_word preview; /* and its last ones, which a change may reach: all but what is late */
-    hsep_word count;   /* disturbances */
-    hsep_word moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
+    hsep_int n;       /* samples of a prediction, */
+    hsep_int preview; /* and its last ones, which a change may reach: all but what is late */
+    hsep_int count;   /* disturbances */
+    hsep_int moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
     /* Offsets in words from the beginning of the struct; oldest first; of experts: of the three experts of the physics
      * model's residual, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
-    hsep_word slopes;      /* (n, count) slopes of the disturbances, sample after sample */
-    hsep_word gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
+    hsep_int slopes;      /* (n, count) slopes of the disturbances, sample after sample */
+    hsep_int gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
                            * before, from x now and in the two samples before */
-    hsep_word shrink;      /* (n,) of experts: share of each one in the stack, */
-    hsep_word kept;        /* (2, n) and share of each expert of the command */
-    hsep_word velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
-    hsep_word position;    /* (2 + preview,) and it behind G_pb */
-    hsep_word base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    hsep_word of_command;  /* (2, preview) and the response of the experts of the command to it */
-    hsep_word passed;      /* (preview + 3,) of experts: the response of the features of x_pb to it */
-    hsep_word run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
-    hsep_word lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
-    hsep_word disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
-    hsep_word drive;       /* and these behind G_pb */
-    hsep_word physics;     /* G_pb at rest, */
-    hsep_word filters;     /* and of each column */
+    hsep_int shrink;      /* (n,) of experts: share of each one in the stack, */
+    hsep_int shrinkage;   /* (2, n) and share of each expert of the command */
+    hsep_int velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
+    hsep_int position;    /* (2 + preview,) and it behind G_pb */
+    hsep_int base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
+    hsep_int of_command;  /* (2, preview) and the response of the experts of the command to it */
+    hsep_int passed;      /* (preview + 3,) of experts: the response of the features of x_pb to it */
+    hsep_int run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
+    hsep_int lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
+    hsep_int disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
+    hsep_int drive;       /* and these behind G_pb */
+    hsep_int physics;     /* G_pb at rest, */
+    hsep_int filters;     /* and of each column */
 } hsep_linearised;
 
 HSEP_ASSERT_WORDS(hsep_linearised, 19);
@@ -54,32 +54,32 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parame
 /* A change of the commands that begins at sample 0 of the preview. */
 typedef struct {
     const hsep_real *commands; /* (n,) m, oldest first, and nothing behind them */
-    hsep_word n;
+    hsep_int n;
     const hsep_real *passed; /* (preview,) m, the same behind G_pb */
 } hsep_linearised_change;
 
 /* Begin to linearise a model that has learned, for a change that may begin at any sample of the preview: what does not
  * depend on the commands. Cost: p multiply-adds a sample for each expert of the command. */
-HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change);
+HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change);
 
 /* Slopes of the disturbances at commands x_d that the model was last tried with, with the response x_pb, both (n,), m,
  * newest first. reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity
  * scale; 0: the tangent. Cost: 12 tanh a sample. */
 HSEP_API void hsep_linearised_slopes(
-    hsep_linearised *self, hsep_trusted *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
+    hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
 
 /* Linearise there, with these slopes. */
-HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_trusted *model);
+HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_averaged *model);
 
 /* Whether columns take work for an expert: it counts, and predicts the residual of the physics model. */
-HSEP_API int hsep_linearised_counts(const hsep_trusted *model, hsep_word expert);
+HSEP_API int hsep_linearised_counts(const hsep_averaged *model, hsep_int expert);
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
  * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). They are computed in parts, one for
  * each expert of hsep_linearised_counts, which begin with part 0; return whether there are more.
  * Cost of a part: HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a sample. */
 HSEP_API int hsep_linearised_columns(
-    hsep_linearised *self, hsep_trusted *model, hsep_word part, hsep_word first, hsep_word spacing, hsep_word count,
+    hsep_linearised *self, hsep_averaged *model, hsep_int part, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST]);
 
 #endif

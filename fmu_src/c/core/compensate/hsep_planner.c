@@ -9,9 +9,9 @@
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
-HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
+HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
-    const hsep_word half = parameters->Np / 2;
+    const hsep_int half = parameters->Np / 2;
     return (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
 }
 
@@ -19,7 +19,7 @@ HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *paramete
 static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
 {
     const hsep_real preview = (hsep_real)parameters->preview;
-    const hsep_word n = hsep_splines_count(parameters->preview, parameters->spacing);
+    const hsep_int n = hsep_splines_count(parameters->preview, parameters->spacing);
     hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
     self->n_pinned = hsep_planner_n_pinned(parameters);
@@ -67,23 +67,23 @@ HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max
     hsep_splines_limit((hsep_splines *)hsep_at(self, self->splines), 0, change_max);
 }
 
-HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self)
+HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
 {
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k)
+HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_int k)
 {
     return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_N_DECIDED, k);
 }
 
 /* The third differences of the first count splines of delta. */
-static void planner_third(hsep_planner *self, hsep_word count)
+static void planner_third(hsep_planner *self, hsep_int count)
 {
     hsep_real *third = hsep_at(self, self->third);
-    const hsep_word preview = hsep_planner_splines(self)->preview;
+    const hsep_int preview = hsep_planner_splines(self)->preview;
     hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
-    for (hsep_word k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         d[3] = hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), count, k);
         third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
         d[0] = d[1], d[1] = d[2], d[2] = d[3];
@@ -94,7 +94,7 @@ HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_
 
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
 
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_word first)
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
 {
     return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
 }
@@ -117,18 +117,18 @@ HSEP_API void hsep_planner_let_turn(hsep_planner *self)
 
 HSEP_API void hsep_planner_decide_pinned(hsep_planner *self) { planner_third(self, HSEP_N_DECIDED + self->n_pinned); }
 
-HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first)
+HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_int first)
 {
-    const hsep_word n = hsep_planner_splines(self)->n - first;
+    const hsep_int n = hsep_planner_splines(self)->n - first;
     hsep_real *P = hsep_planner_quadratic(self, first);
     hsep_real largest = 0.0;
-    hsep_word place = 0;
-    for (hsep_word i = 0; i < n; i++) {
+    hsep_int place = 0;
+    for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, P[place]);
         place += n - i;
     }
     place = 0;
-    for (hsep_word i = 0; i < n; i++) {
+    for (hsep_int i = 0; i < n; i++) {
         P[place] += HSEP_SPLINES_RIDGE * largest;
         place += n - i;
     }
@@ -147,17 +147,17 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
 
 HSEP_API void hsep_planner_pin(hsep_planner *self)
 {
-    const hsep_word n = hsep_planner_splines(self)->n, first = self->n_pinned;
+    const hsep_int n = hsep_planner_splines(self)->n, first = self->n_pinned;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_at(self, self->P);
     hsep_real *v = hsep_planner_linear(self);
     /* v := v_2 - P_21 pinned */
-    for (hsep_word i = 0; i < first; i++) {
-        for (hsep_word j = first; j < n; j++) {
+    for (hsep_int i = 0; i < first; i++) {
+        for (hsep_int j = first; j < n; j++) {
             v[j] -= P[j - i] * rest[i];
         }
         P += n - i;
     }
-    for (hsep_word j = first; j < n; j++) {
+    for (hsep_int j = first; j < n; j++) {
         v[j - first] = v[j];
     }
 }
@@ -167,12 +167,12 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
 static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real margin)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_word first = self->n_pinned, preview = splines->preview;
+    const hsep_int first = self->n_pinned, preview = splines->preview;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *total = hsep_at(self, self->total);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     hsep_real *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
-    for (hsep_word r = 0; r < HSEP_ORDERS * preview; r++) {
+    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
         hsep_constraints_range(self, r, &least, &most);
@@ -184,7 +184,7 @@ static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real
 
 HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
 {
-    const hsep_word first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
+    const hsep_int first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
     hsep_real *factor = hsep_at(self, self->factor);
     memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
     return hsep_cholesky_factor(factor, n, NULL);
@@ -193,7 +193,7 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_word first = pinned ? self->n_pinned : 0, n = splines->n - first;
+    const hsep_int first = pinned ? self->n_pinned : 0, n = splines->n - first;
     hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + first;
     const hsep_real *row = hsep_planner_quadratic(self, first), *factor = hsep_at(self, self->factor);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
@@ -202,7 +202,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
     hsep_real cost = 0.0, finite = 0.0;
-    for (hsep_word j = 0; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         cost += v[j] * free_minimum[j];
         finite += hsep_fabs(free_minimum[j]);
         free_minimum[j] -= rest[j]; /* the way there */
@@ -212,14 +212,14 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     }
     hsep_splines_rows(splines, free_minimum, first, rows);
     if (hsep_constraints_allow(self, rows)) {
-        for (hsep_word j = 0; j < n; j++) {
+        for (hsep_int j = 0; j < n; j++) {
             rest[j] += free_minimum[j];
         }
         return HSEP_PLAN_DONE;
     }
-    for (hsep_word i = 0; i < n; i++) { /* cost += rest' P rest */
+    for (hsep_int i = 0; i < n; i++) { /* cost += rest' P rest */
         hsep_real sum = 0.5 * row[0] * rest[i];
-        for (hsep_word j = 1; j < n - i; j++) {
+        for (hsep_int j = 1; j < n - i; j++) {
             sum += row[j] * rest[i + j];
         }
         cost += 2.0 * rest[i] * sum;
@@ -239,12 +239,12 @@ HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start
     hsep_interior_again(planner_interior(self), hsep_planner_splines(self), hsep_at(self, self->P), tolerance);
 }
 
-HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self)
+HSEP_API hsep_int hsep_planner_steps(const hsep_planner *self)
 {
     return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
 }
 
-HSEP_API hsep_word hsep_planner_part(const hsep_planner *self)
+HSEP_API hsep_int hsep_planner_part(const hsep_planner *self)
 {
     return ((const hsep_interior *)hsep_at_const(self, self->interior))->part;
 }
@@ -260,9 +260,9 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high;
     hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + self->n_pinned;
     const hsep_real *inner = problem.inner != NULL ? problem.inner : rest;
-    const hsep_word n = splines->n - self->n_pinned;
+    const hsep_int n = splines->n - self->n_pinned;
     hsep_real finite = 0.0;
-    for (hsep_word j = 0; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         at[j] = inner[j] - rest[j];
         way[j] -= inner[j];
         finite += hsep_fabs(way[j]);
@@ -271,7 +271,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
         hsep_splines_rows(splines, way, self->n_pinned, rows);
         hsep_splines_rows(splines, at, self->n_pinned, from);
         const hsep_real share = hsep_constraints_share(self, from, rows);
-        for (hsep_word j = 0; j < n; j++) {
+        for (hsep_int j = 0; j < n; j++) {
             rest[j] += at[j] + share * way[j];
         }
     }
@@ -282,7 +282,7 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *c = hsep_at(self, self->c);
-    for (hsep_word k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
+    for (hsep_int k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
         for (int i = 0; i < 2; i++) {
             self->delta_before[i] = self->delta_before[i + 1];
             self->x_d_before[i] = self->x_d_before[i + 1];
@@ -290,8 +290,8 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
         self->delta_before[2] = hsep_planner_delta(self, k);
         self->x_d_before[2] = x_d[k];
     }
-    const hsep_word kept = self->Np / splines->spacing, n = HSEP_N_DECIDED + splines->n;
-    for (hsep_word i = 0; i < n; i++) {
+    const hsep_int kept = self->Np / splines->spacing, n = HSEP_N_DECIDED + splines->n;
+    for (hsep_int i = 0; i < n; i++) {
         c[i] = i + kept < n ? c[i + kept] : 0.0;
     }
 }

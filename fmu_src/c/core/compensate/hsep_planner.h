@@ -18,13 +18,13 @@
 #include "hsep_splines.h"
 
 typedef struct {
-    hsep_word Np;                 /* samples of a window */
-    hsep_word preview;            /* samples of a plan, at least Np + 4 spacing + 3 */
-    hsep_word spacing;            /* samples between knots, a divisor of Np */
+    hsep_int Np;                  /* samples of a window */
+    hsep_int preview;             /* samples of a plan, at least Np + 4 spacing + 3 */
+    hsep_int spacing;             /* samples between knots, a divisor of Np */
     hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
-    hsep_word pinned;             /* samples that follow the last plan, or Np / 2 if less */
+    hsep_int pinned;              /* samples that follow the last plan, or Np / 2 if less */
 } hsep_planner_parameters;
 
 typedef enum {
@@ -38,7 +38,7 @@ HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
 /* Splines that a bounded plan leaves as they are. */
-HSEP_API hsep_word hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
+HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
@@ -47,10 +47,10 @@ HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters
 HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
-HSEP_API hsep_word hsep_planner_pinned(const hsep_planner *self);
+HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self);
 
 /* The part of delta at sample k that is decided before a plan is made, m. */
-HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_word k);
+HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_int k);
 
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
@@ -72,9 +72,9 @@ HSEP_API void hsep_planner_pin(hsep_planner *self);
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
  * first rows, and v, (n - first,), m; hsep_planner_regularise makes P positive definite. hsep_planner_third: the third
  * differences of the decided part of delta, (preview,), m. */
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_word first);
+HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first);
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
-HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_word first);
+HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_int first);
 HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
 
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
@@ -96,8 +96,8 @@ HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
 /* Steps that the last bounded plan took so far; the part of one that comes next. */
-HSEP_API hsep_word hsep_planner_steps(const hsep_planner *self);
-HSEP_API hsep_word hsep_planner_part(const hsep_planner *self);
+HSEP_API hsep_int hsep_planner_steps(const hsep_planner *self);
+HSEP_API hsep_int hsep_planner_part(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);

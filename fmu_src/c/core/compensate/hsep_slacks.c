@@ -16,7 +16,7 @@ HSEP_API void hsep_slacks_begin(const hsep_slacks *self, hsep_real cost, int aga
     const hsep_real least = again ? HSEP_QP_SLACK_AGAIN : HSEP_QP_FIRST_SLACK;
     const hsep_real mu = (again ? HSEP_QP_MU_AGAIN : HSEP_QP_FIRST_MU) * cost;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (hsep_word r = self->range[order].begin; r < self->range[order].end; r++) {
+        for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
             for (int i = 0; i < 2; i++) {
                 const hsep_side *side = &self->side[i];
                 side->s[r] = hsep_fmax(slacks_distance(i, self->Ax[r], side->b[r]), least);
@@ -52,7 +52,7 @@ static hsep_real slacks_largest(const slacks_values *values)
 
 /* ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z), of the rows of a vector and of one. */
 static inline void slacks_steps(
-    const hsep_slacks *self, int i, hsep_word r, hsep_lanes *restrict ds, hsep_lanes *restrict dz)
+    const hsep_slacks *self, int i, hsep_int r, hsep_lanes *restrict ds, hsep_lanes *restrict dz)
 {
     const hsep_side *side = &self->side[i];
     const hsep_lanes to = slacks_sign[i] * *hsep_lanes_const(self->Adx + r) + *hsep_lanes_const(side->r_p + r);
@@ -60,7 +60,7 @@ static inline void slacks_steps(
     *ds = to + self->rho * *dz;
 }
 
-static inline void slacks_step(const hsep_slacks *self, int i, hsep_word r, hsep_real *ds, hsep_real *dz)
+static inline void slacks_step(const hsep_slacks *self, int i, hsep_int r, hsep_real *ds, hsep_real *dz)
 {
     const hsep_side *side = &self->side[i];
     const hsep_real to = slacks_sign[i] * self->Adx[r] + side->r_p[r];
@@ -72,7 +72,7 @@ HSEP_API void hsep_slacks_push(const hsep_slacks *self)
 {
     const hsep_side *low = &self->side[0], *high = &self->side[1];
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_word r = self->range[order].begin;
+        hsep_int r = self->range[order].begin;
         for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
             *hsep_lanes_at(self->work + r) =
                 (*hsep_lanes_const(low->r_c + r) - *hsep_lanes_const(low->z + r) * *hsep_lanes_const(low->inverse + r) *
@@ -98,10 +98,10 @@ static hsep_lengths slacks_lengths(const hsep_slacks *self)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            hsep_word r = self->range[order].begin;
+            hsep_int r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
+                    const hsep_int at = r + (hsep_int)(HSEP_LANES * l);
                     hsep_lanes ds, dz;
                     slacks_steps(self, i, at, &ds, &dz);
                     *hsep_lanes_at(side->ds + at) = ds;
@@ -136,10 +136,10 @@ HSEP_API hsep_real hsep_slacks_residuals(const hsep_slacks *self, hsep_real *pri
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            hsep_word r = self->range[order].begin;
+            hsep_int r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
+                    const hsep_int at = r + (hsep_int)(HSEP_LANES * l);
                     const hsep_lanes s = *hsep_lanes_const(side->s + at), z = *hsep_lanes_const(side->z + at);
                     const hsep_lanes inverse = *hsep_lanes_const(side->inverse + at), product = s * z;
                     const hsep_lanes distance =
@@ -185,10 +185,10 @@ HSEP_API hsep_real hsep_slacks_predicted(const hsep_slacks *self)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            hsep_word r = self->range[order].begin;
+            hsep_int r = self->range[order].begin;
             for (; r + 4 <= self->range[order].end; r += 4) {
                 for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    const hsep_word at = r + (hsep_word)(HSEP_LANES * l);
+                    const hsep_int at = r + (hsep_int)(HSEP_LANES * l);
                     const hsep_lanes ds = *hsep_lanes_const(side->ds + at), dz = *hsep_lanes_const(side->dz + at);
                     sum.of_four[l] += (*hsep_lanes_const(side->s + at) + alpha.primal * ds) *
                                       (*hsep_lanes_const(side->z + at) + alpha.dual * dz);
@@ -208,7 +208,7 @@ HSEP_API void hsep_slacks_correct(const hsep_slacks *self, hsep_real sigma_mu)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            hsep_word r = self->range[order].begin;
+            hsep_int r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
                 const hsep_lanes ds = *hsep_lanes_const(side->ds + r), dz = *hsep_lanes_const(side->dz + r);
                 *hsep_lanes_at(side->r_c + r) =
@@ -231,7 +231,7 @@ HSEP_API hsep_real hsep_slacks_move(const hsep_slacks *self)
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (int i = 0; i < 2; i++) {
             const hsep_side *side = &self->side[i];
-            hsep_word r = self->range[order].begin;
+            hsep_int r = self->range[order].begin;
             for (; r + HSEP_LANES <= self->range[order].end; r += HSEP_LANES) {
                 const hsep_lanes ds = *hsep_lanes_const(side->ds + r), dz = *hsep_lanes_const(side->dz + r);
                 const hsep_lanes s = *hsep_lanes_const(side->s + r) + primal * ds;

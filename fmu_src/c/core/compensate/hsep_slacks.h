@@ -28,7 +28,7 @@ typedef struct {
     hsep_real *work;     /* a row's value of both sides together */
     hsep_side side[2];   /* low and high */
     struct {
-        hsep_word begin, end;
+        hsep_int begin, end;
     } range[HSEP_ORDERS]; /* the rows of an order that x touches, begin ... end - 1 */
 } hsep_slacks;
 

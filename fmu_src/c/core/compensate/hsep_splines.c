@@ -12,15 +12,15 @@ static const hsep_real *splines_differences(const hsep_splines *self, unsigned o
     return hsep_at_const(self, self->differences[order]);
 }
 
-static hsep_word splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
+static hsep_int splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
 
-HSEP_API hsep_word hsep_splines_count(hsep_word preview, hsep_word spacing)
+HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
 {
     return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real splines_lay_out(hsep_splines *self, hsep_word preview, hsep_word spacing)
+static hsep_real splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
 {
     hsep_real end = HSEP_WORDS(hsep_splines);
     self->preview = preview;
@@ -33,12 +33,12 @@ static hsep_real splines_lay_out(hsep_splines *self, hsep_word preview, hsep_wor
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_splines_size(hsep_word preview, hsep_word spacing)
+HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing)
 {
     return splines_lay_out(&(hsep_splines){0}, preview, spacing);
 }
 
-HSEP_API int hsep_splines_valid(const void *block, hsep_word preview, hsep_word spacing)
+HSEP_API int hsep_splines_valid(const void *block, hsep_int preview, hsep_int spacing)
 {
     hsep_splines got;
     memcpy(&got, block, sizeof got);
@@ -56,12 +56,12 @@ static hsep_real splines_b(hsep_real u)
 }
 
 HSEP_API void hsep_splines_init(
-    hsep_splines *self, hsep_word preview, hsep_word spacing, const hsep_real limit[HSEP_ORDERS])
+    hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
 {
     (void)splines_lay_out(self, preview, spacing);
-    const hsep_word width = 4 * spacing;
+    const hsep_int width = 4 * spacing;
     hsep_real *b = hsep_at(self, self->shape);
-    for (hsep_word k = 0; k < width; k++) {
+    for (hsep_int k = 0; k < width; k++) {
         b[k] = splines_b((hsep_real)k / (hsep_real)spacing);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
@@ -71,11 +71,11 @@ HSEP_API void hsep_splines_init(
 
 HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit)
 {
-    const hsep_word width = 4 * self->spacing;
+    const hsep_int width = 4 * self->spacing;
     const hsep_real *b = hsep_splines_shape(self);
     hsep_real *e = hsep_at(self, self->differences[order]);
     self->share[order] = 1.0 / limit;
-    for (hsep_word k = 0; k < width + 3; k++) {
+    for (hsep_int k = 0; k < width + 3; k++) {
         const hsep_real at[HSEP_ORDERS] = {
             k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0, k >= 2 && k - 2 < width ? b[k - 2] : 0.0,
             k >= 3 ? b[k - 3] : 0.0};
@@ -86,35 +86,35 @@ HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real l
     }
 }
 
-HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_word count, hsep_word k)
+HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
 {
     const hsep_real *b = hsep_splines_shape(self);
-    const hsep_word place = k / self->spacing, within = k % self->spacing;
+    const hsep_int place = k / self->spacing, within = k % self->spacing;
     hsep_real sum = 0.0;
-    for (hsep_word i = 0; i <= HSEP_N_DECIDED && place + i < count; i++) {
+    for (hsep_int i = 0; i <= HSEP_N_DECIDED && place + i < count; i++) {
         sum += c[place + i] * b[within + (HSEP_N_DECIDED - i) * self->spacing];
     }
     return sum;
 }
 
 /* delta, (preview,), of the splines first ... n - 1 with coefficients c, (n - first,). */
-static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_word first, hsep_real delta[])
+static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real delta[])
 {
     const hsep_real *b = hsep_splines_shape(self);
-    const hsep_word spacing = self->spacing, count = self->n - first;
-    hsep_word k = first * spacing;
+    const hsep_int spacing = self->spacing, count = self->n - first;
+    hsep_int k = first * spacing;
     memset(delta, 0, (size_t)k * sizeof(hsep_real));
-    for (hsep_word place = 0; k < self->preview; place++) { /* between two knots */
-        const hsep_word end = k + spacing < self->preview ? k + spacing : self->preview;
+    for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
+        const hsep_int end = k + spacing < self->preview ? k + spacing : self->preview;
         if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
             for (const hsep_real *at = b; k < end; k++, at++) {
                 delta[k] = ((c0 * at[0] + c1 * at[spacing]) + c2 * at[2 * spacing]) + c3 * at[3 * spacing];
             }
         }
-        for (hsep_word within = 0; k < end; k++, within++) { /* not all four are there */
+        for (hsep_int within = 0; k < end; k++, within++) { /* not all four are there */
             delta[k] = 0.0;
-            for (hsep_word i = 0; i <= HSEP_N_DECIDED && i <= place; i++) {
+            for (hsep_int i = 0; i <= HSEP_N_DECIDED && i <= place; i++) {
                 if (place - i < count) {
                     delta[k] += c[place - i] * b[within + i * spacing];
                 }
@@ -123,14 +123,14 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_w
     }
 }
 
-HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_word first, hsep_real rows[])
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[])
 {
-    const hsep_word preview = self->preview;
+    const hsep_int preview = self->preview;
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
         const hsep_real *of = rows + (order - 1) * preview;
         hsep_real *to = rows + order * preview;
-        hsep_word k = 1;
+        hsep_int k = 1;
         to[0] = of[0];
         for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
             *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
@@ -142,7 +142,7 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
         const hsep_real share = self->share[order];
-        hsep_word k = 0;
+        hsep_int k = 0;
         for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
             *hsep_lanes_at(row + k) *= share;
         }
@@ -153,28 +153,28 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
 }
 
 HSEP_API void hsep_splines_touched(
-    const hsep_splines *self, hsep_word first, unsigned order, hsep_word *begin, hsep_word *end)
+    const hsep_splines *self, hsep_int first, unsigned order, hsep_int *begin, hsep_int *end)
 {
     *begin = first * self->spacing + 1; /* a spline begins with 0 */
     *end = (self->n - 1) * self->spacing + splines_length(self, order);
 }
 
-HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_word first, hsep_real g[])
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[])
 {
     const hsep_real *b = hsep_splines_shape(self);
-    const hsep_word preview = self->preview, spacing = self->spacing;
+    const hsep_int preview = self->preview, spacing = self->spacing;
     const hsep_real s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
     const hsep_real *r1 = rows + preview, *r2 = rows + 2 * preview, *r3 = rows + 3 * preview;
     /* A' = B' (s_0 + D' (s_1 + D' (s_2 + D' s_3))) with the differences D: what later samples say comes first. */
-    const hsep_word begin = first * spacing + 1, end = self->n * spacing + 3 * spacing; /* of the change itself */
+    const hsep_int begin = first * spacing + 1, end = self->n * spacing + 3 * spacing; /* of the change itself */
     const hsep_real a3 = s3 * r3[end + 2], b3 = s3 * r3[end + 1], a2 = s2 * r2[end + 1] + (b3 - a3);
     hsep_real u3 = s3 * r3[end], u2 = s2 * r2[end] + (u3 - b3), u1 = s1 * r1[end] + (u2 - a2);
-    for (hsep_word k = end; k-- > begin;) {
+    for (hsep_int k = end; k-- > begin;) {
         const hsep_real v3 = s3 * r3[k], v2 = s2 * r2[k] + (v3 - u3), v1 = s1 * r1[k] + (v2 - u2);
         rows[k] = s0 * rows[k] + (v1 - u1);
         u1 = v1, u2 = v2, u3 = v3;
     }
-    for (hsep_word j = first; j < self->n; j++) {
+    for (hsep_int j = first; j < self->n; j++) {
         g[j - first] += hsep_dot(b + 1, rows + j * spacing + 1, 4 * spacing - 1);
     }
 }
@@ -182,8 +182,8 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
 /* Sort the weights of the rows of an order, (preview,): samples that are spacing apart become neighbours. */
 static void splines_sort(const hsep_splines *self, const hsep_real weights[], hsep_real sorted[])
 {
-    for (hsep_word phase = 0; phase < self->spacing; phase++) {
-        for (hsep_word k = phase; k < self->preview; k += self->spacing) {
+    for (hsep_int phase = 0; phase < self->spacing; phase++) {
+        for (hsep_int k = phase; k < self->preview; k += self->spacing) {
             *sorted++ = weights[k];
         }
     }
@@ -194,19 +194,19 @@ static void splines_sort(const hsep_splines *self, const hsep_real weights[], hs
 /* sums, (count,), count <= SPLINES_TOGETHER: products of splines i ... i + count - 1, each with the spline d behind it.
  * sorted: (4, preview). */
 static void splines_products(
-    const hsep_splines *self, const hsep_real sorted[], hsep_word i, hsep_word count, hsep_word d, hsep_real sums[])
+    const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int count, hsep_int d, hsep_real sums[])
 {
-    const hsep_word spacing = self->spacing;
+    const hsep_int spacing = self->spacing;
     hsep_lanes acc[SPLINES_TOGETHER / HSEP_LANES];
     memset(sums, 0, SPLINES_TOGETHER * sizeof *sums);
     memcpy(acc, sums, sizeof acc);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_real *e = splines_differences(self, order);
-        const hsep_word length = splines_length(self, order);
-        hsep_word begin = order * self->preview; /* of a phase */
-        for (hsep_word phase = 0; phase < spacing; phase++) {
+        const hsep_int length = splines_length(self, order);
+        hsep_int begin = order * self->preview; /* of a phase */
+        for (hsep_int phase = 0; phase < spacing; phase++) {
             const hsep_real *weight = sorted + begin + i;
-            for (hsep_word k = phase, m = 0; k < length; k += spacing, m++) {
+            for (hsep_int k = phase, m = 0; k < length; k += spacing, m++) {
                 if (k < d * spacing + 1) {
                     continue;
                 }
@@ -216,7 +216,7 @@ static void splines_products(
                         acc[l] += product * hsep_lanes_const(weight + m)[l];
                     }
                 } else {
-                    for (hsep_word l = 0; l < count; l++) {
+                    for (hsep_int l = 0; l < count; l++) {
                         sums[l] += product * weight[m + l];
                     }
                 }
@@ -230,19 +230,19 @@ static void splines_products(
 }
 
 HSEP_API void hsep_splines_gram(
-    const hsep_splines *self, const hsep_real weights[], hsep_word first, hsep_real triangle[], hsep_real work[])
+    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[])
 {
-    const hsep_word n = self->n - first;
+    const hsep_int n = self->n - first;
     hsep_real sums[SPLINES_TOGETHER];
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         splines_sort(self, weights + order * self->preview, work + order * self->preview);
     }
-    for (hsep_word d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
+    for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
         hsep_real *entry = triangle + d;
-        for (hsep_word i = 0; i + d < n; i += SPLINES_TOGETHER) {
-            const hsep_word left = n - d - i, count = left < SPLINES_TOGETHER ? left : SPLINES_TOGETHER;
+        for (hsep_int i = 0; i + d < n; i += SPLINES_TOGETHER) {
+            const hsep_int left = n - d - i, count = left < SPLINES_TOGETHER ? left : SPLINES_TOGETHER;
             splines_products(self, work, first + i, count, d, sums);
-            for (hsep_word l = 0; l < count; l++) {
+            for (hsep_int l = 0; l < count; l++) {
                 *entry += sums[l];
                 entry += n - (i + l);
             }
@@ -261,19 +261,19 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self)
 }
 
 /* Entry (i, j), i <= j, of a triangle of n rows. */
-static hsep_real *splines_entry(hsep_real triangle[], hsep_word n, hsep_word i, hsep_word j)
+static hsep_real *splines_entry(hsep_real triangle[], hsep_int n, hsep_int i, hsep_int j)
 {
     return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
 }
 
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
 {
-    const hsep_word n = self->n, spacing = self->spacing;
-    for (hsep_word d = 0; d < n; d++) {
+    const hsep_int n = self->n, spacing = self->spacing;
+    for (hsep_int d = 0; d < n; d++) {
         /* Columns j - d and j: sum over u of s(u + d spacing) s(u), up to where column j is cut off */
         hsep_real sum = 0.0;
-        hsep_word u = 0;
-        for (hsep_word j = n; j-- > d;) {
+        hsep_int u = 0;
+        for (hsep_int j = n; j-- > d;) {
             for (; u + j * spacing < self->preview; u++) {
                 sum += filtered[u + d * spacing] * filtered[u];
             }
@@ -283,41 +283,41 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
 }
 
 /* Sum over k of the differences of an order, m, of a spline and of the one d splines later. */
-static hsep_real splines_overlap(const hsep_splines *self, unsigned order, hsep_word d)
+static hsep_real splines_overlap(const hsep_splines *self, unsigned order, hsep_int d)
 {
     const hsep_real *e = splines_differences(self, order);
     const hsep_real unit = 1.0 / self->share[order];
     hsep_real sum = 0.0;
-    for (hsep_word k = d * self->spacing + 1; k < splines_length(self, order); k++) {
+    for (hsep_int k = d * self->spacing + 1; k < splines_length(self, order); k++) {
         sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
     }
     return sum;
 }
 
 /* Splines behind one of n that overlap it in the differences of an order, and it itself. */
-static hsep_word splines_neighbours(const hsep_splines *self, unsigned order, hsep_word n)
+static hsep_int splines_neighbours(const hsep_splines *self, unsigned order, hsep_int n)
 {
-    const hsep_word count = (splines_length(self, order) - 2) / self->spacing + 1;
+    const hsep_int count = (splines_length(self, order) - 2) / self->spacing + 1;
     return count < n ? count : n;
 }
 
 HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[])
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_int n, hsep_real triangle[])
 {
-    for (hsep_word d = 0; d < splines_neighbours(self, order, n); d++) {
+    for (hsep_int d = 0; d < splines_neighbours(self, order, n); d++) {
         const hsep_real sum = splines_overlap(self, order, d);
-        for (hsep_word i = 0; i + d < n; i++) {
+        for (hsep_int i = 0; i + d < n; i++) {
             *splines_entry(triangle, n, i, i + d) += weight * sum;
         }
     }
 }
 
 HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_word first, hsep_real v[])
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real v[])
 {
     const hsep_real *e = splines_differences(self, 3);
     const hsep_real unit = weight / self->share[3];
-    for (hsep_word j = first; j < self->n; j++) {
+    for (hsep_int j = first; j < self->n; j++) {
         v[j - first] -= unit * hsep_dot(e + 1, third + j * self->spacing + 1, splines_length(self, 3) - 1);
     }
 }
@@ -326,7 +326,7 @@ HSEP_API void hsep_splines_project(
     const hsep_splines *self, const hsep_real filtered[], const hsep_real target[], hsep_real weight,
     const hsep_real third[], hsep_real v[])
 {
-    for (hsep_word j = 0; j < self->n; j++) {
+    for (hsep_int j = 0; j < self->n; j++) {
         v[j] = hsep_dot(filtered, target + j * self->spacing, self->preview - j * self->spacing);
     }
     hsep_splines_project_jerk(self, weight, third, 0, v);

@@ -18,49 +18,49 @@
 #define HSEP_ORDERS 4 /* orders of difference: 0, the change itself, to 3, its jerk */
 
 typedef struct {
-    hsep_word preview, spacing;
-    hsep_word n;                  /* splines that begin in a plan */
+    hsep_int preview, spacing;
+    hsep_int n;                   /* splines that begin in a plan */
     hsep_real share[HSEP_ORDERS]; /* 1 / limit of an order, 1/m */
     /* Offsets in words from the beginning of the struct */
-    hsep_word shape;                    /* (4 spacing,) b */
-    hsep_word differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
+    hsep_int shape;                    /* (4 spacing,) b */
+    hsep_int differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
 } hsep_splines;
 
 HSEP_ASSERT_WORDS(hsep_splines, 12);
 
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
-HSEP_API hsep_word hsep_splines_count(hsep_word preview, hsep_word spacing);
+HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing);
 
 /* Bytes of the block, counted as a number. */
-HSEP_API hsep_real hsep_splines_size(hsep_word preview, hsep_word spacing);
+HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing);
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 HSEP_API void hsep_splines_init(
-    hsep_splines *self, hsep_word preview, hsep_word spacing, const hsep_real limit[HSEP_ORDERS]);
+    hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS]);
 
 /* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
 HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit);
 
-HSEP_API int hsep_splines_valid(const void *block, hsep_word preview, hsep_word spacing);
+HSEP_API int hsep_splines_valid(const void *block, hsep_int preview, hsep_int spacing);
 
 /* Sum of the first count splines at sample k, with coefficients c, (count,), which begin with splines -3, -2, -1. 4
  * multiply-adds. */
-HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_word count, hsep_word k);
+HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k);
 
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
-HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_word first, hsep_real rows[]);
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[]);
 
 /* Row samples that the splines first ... n - 1 touch, of an order: *begin ... *end - 1. */
 HSEP_API void hsep_splines_touched(
-    const hsep_splines *self, hsep_word first, unsigned order, hsep_word *begin, hsep_word *end);
+    const hsep_splines *self, hsep_int first, unsigned order, hsep_int *begin, hsep_int *end);
 
 /* g, (n - first,), += A' rows: the transpose of hsep_splines_rows, whose matrix is A. The rows are
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
-HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_word first, hsep_real g[]);
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
 
 /* The triangle of n - first rows += A' diag(weights) A, A being the matrix of hsep_splines_rows. work: (4 preview,).
  * Cost: 40 spacing multiply-adds for each of these splines. */
 HSEP_API void hsep_splines_gram(
-    const hsep_splines *self, const hsep_real weights[], hsep_word first, hsep_real triangle[], hsep_real work[]);
+    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[]);
 
 /* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
 HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
@@ -71,7 +71,7 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
 
 /* The triangle of n rows += weight D' D with the differences D of an order of n splines behind each other, m. */
 HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_word n, hsep_real triangle[]);
+    const hsep_splines *self, unsigned order, hsep_real weight, hsep_int n, hsep_real triangle[]);
 
 /* v, (n,), := W' target - weight D' third with the third differences D, target and third (preview,). */
 HSEP_API void hsep_splines_project(
@@ -80,7 +80,7 @@ HSEP_API void hsep_splines_project(
 
 /* v, (n - first,), -= weight D' third, of the splines first ... n - 1. */
 HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_word first, hsep_real v[]);
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real v[]);
 
 /* The spline itself, b, (4 spacing,). */
 HSEP_API const hsep_real *hsep_splines_shape(const hsep_splines *self);

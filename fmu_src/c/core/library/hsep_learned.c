@@ -73,12 +73,12 @@ static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model
 }
 
 /* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
-static int learned_take_factor(hsep_learned_source *source, hsep_residual_model *model, hsep_word factor)
+static int learned_take_factor(hsep_learned_source *source, hsep_residual_model *model, hsep_int factor)
 {
-    const hsep_word n = hsep_residual_n_features(model, factor);
+    const hsep_int n = hsep_residual_n_features(model, factor);
     hsep_real n_rows = 0.0;
     int taken = hsep_learned_numbers(source, &n_rows, 1);
-    for (hsep_word i = 0; taken && i <= n; i++) {
+    for (hsep_int i = 0; taken && i <= n; i++) {
         taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) &&
                 hsep_residual_load(model, factor, i, n_rows);
     }
@@ -89,7 +89,7 @@ static int learned_take_factor(hsep_learned_source *source, hsep_residual_model 
 static double learned_size(const hsep_learned_head *head, hsep_residual_model *model)
 {
     double words = 4 * (double)head->n_settings + (double)head->n_learned + 1;
-    for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
+    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
         const double n = (double)hsep_residual_n_features(model, i);
         words += 1 + (n + 1) * (n + 2) / 2;
     }
@@ -104,7 +104,7 @@ HSEP_API int hsep_learned_take(
         !learned_take_numbers(source, model, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
-    for (hsep_word i = 0; i < hsep_residual_n_factors(model); i++) {
+    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
         if (!learned_take_factor(source, model, i)) {
             return 0;
         }
@@ -151,9 +151,9 @@ static int learned_agrees(const hsep_learned_setting *setting, const hsep_parame
 #undef SAME
 #define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
     if (learned && strcmp(setting->name, #own) == 0) { \
-        return (hsep_real)parameters->trust.own == (hsep_real)setting->value; \
+        return (hsep_real)parameters->averaging.own == (hsep_real)setting->value; \
     }
-    HSEP_TRUST_RANGES(SAME)
+    HSEP_AVERAGING_RANGES(SAME)
 #undef SAME
     return 0;
 }
@@ -162,7 +162,7 @@ static int learned_agrees(const hsep_learned_setting *setting, const hsep_parame
 static uint64_t learned_n_settings(const hsep_parameters *parameters)
 {
 #define COUNT(type, own, usual, least, most, nonzero, automatic, learned) +(learned)
-    const uint64_t n = 0 HSEP_PREDICTOR_RANGES(COUNT) HSEP_TRUST_RANGES(COUNT);
+    const uint64_t n = 0 HSEP_PREDICTOR_RANGES(COUNT) HSEP_AVERAGING_RANGES(COUNT);
     const uint64_t n_mode = 0 HSEP_MODE_RANGES(COUNT);
 #undef COUNT
     return n + n_mode * parameters->n_modes;

@@ -28,7 +28,7 @@ HSEP_API hsep_began hsep_compensator_init(
     return began;
 }
 
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_word k)
+HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k)
 {
     const size_t expected = hsep_compensator_size(parameters);
     if (expected == 0 || size != expected) {

@@ -6,7 +6,7 @@
 #include <string.h>
 
 static const hsep_real parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
-static const hsep_real parameters_warm_up = 0.3;            /* s, where it is automatic, without trust */
+static const hsep_real parameters_warm_up = 0.3;            /* s, where it is automatic, without averaging */
 
 HSEP_API void hsep_defaults(hsep_parameters *parameters)
 {
@@ -14,8 +14,8 @@ HSEP_API void hsep_defaults(hsep_parameters *parameters)
 #define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->predictor.name = (type)usual;
     HSEP_PREDICTOR_RANGES(USUAL)
 #undef USUAL
-#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->trust.name = (type)usual;
-    HSEP_TRUST_RANGES(USUAL)
+#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->averaging.name = (type)usual;
+    HSEP_AVERAGING_RANGES(USUAL)
 #undef USUAL
 #define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->compensator.name = (type)usual;
     HSEP_COMPENSATOR_RANGES(USUAL)
@@ -58,13 +58,13 @@ HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters)
     HSEP_PREDICTOR_RANGES(CHECK)
 #undef CHECK
 #define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters_check(&refused, #name, (hsep_real)parameters->trust.name, least, most, nonzero, automatic);
-    HSEP_TRUST_RANGES(CHECK)
+    parameters_check(&refused, #name, (hsep_real)parameters->averaging.name, least, most, nonzero, automatic);
+    HSEP_AVERAGING_RANGES(CHECK)
 #undef CHECK
     if (refused == NULL && (parameters->n_modes < 1 || parameters->modes == NULL)) {
         refused = "modes";
     }
-    for (hsep_word i = 0; refused == NULL && i < parameters->n_modes; i++) {
+    for (hsep_int i = 0; refused == NULL && i < parameters->n_modes; i++) {
         refused = parameters_mode_refused(&parameters->modes[i]);
     }
     if (refused != NULL) {
@@ -91,13 +91,13 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
     if (settings->preview < predictor->Np + 4 * settings->spacing + HSEP_SPLINES_END) {
         return "preview";
     }
-    return predictor->measurement_delay > 0 && !parameters->trust.trust ? "measurement_delay" : NULL;
+    return predictor->measurement_delay > 0 && !parameters->averaging.averaging ? "measurement_delay" : NULL;
 }
 
 /* Warm-up, s. */
 static hsep_real parameters_t_init(const hsep_parameters *parameters)
 {
-    const hsep_real automatic = parameters->trust.trust ? 0.0 : parameters_warm_up;
+    const hsep_real automatic = parameters->averaging.averaging ? 0.0 : parameters_warm_up;
     return parameters->predictor.t_init < 0.0 ? automatic : parameters->predictor.t_init;
 }
 
@@ -112,7 +112,7 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
     const hsep_predictor_settings *settings = &parameters->predictor;
     return (hsep_predictor_parameters){
         .settings = *settings,
-        .trust = parameters->trust,
+        .averaging = parameters->averaging,
         .preview = settings->Np,
         /* The warm-up counts from the end of the first fill. */
         .n_init = (hsep_real)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
@@ -141,9 +141,9 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
             {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
              settings->j_max * (T_s * T_s * T_s)},
         .no_reversal = settings->no_reversal != 0,
-        .pinned = parameters->trust.trust ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER};
+        .pinned = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER};
     derived.compensate = (hsep_sep_state)settings->compensate;
-    derived.n_lost = (hsep_word)parameters_samples(settings->measurement_timeout, T_s);
+    derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     return derived;
 }
 

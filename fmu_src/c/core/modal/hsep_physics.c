@@ -88,7 +88,7 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
 #define PHYSICS_TOGETHER 64 /* samples whose response is computed mode by mode */
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real physics_lay_out(hsep_physics *self, hsep_word n_modes, hsep_word dead_time)
+static hsep_real physics_lay_out(hsep_physics *self, hsep_int n_modes, hsep_int dead_time)
 {
     hsep_real end = HSEP_WORDS(hsep_physics);
     self->n_modes = n_modes;
@@ -103,12 +103,12 @@ static hsep_discrete_mode *physics_modes(hsep_physics *self)
     return (hsep_discrete_mode *)hsep_at(self, self->modes);
 }
 
-HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time)
+HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time)
 {
     return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
 }
 
-HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time)
+HSEP_API int hsep_physics_valid(const void *block, hsep_int n_modes, hsep_int dead_time)
 {
     hsep_physics got;
     return HSEP_LAID_OUT(got, block, physics_lay_out(&got, n_modes, dead_time)) &&
@@ -116,11 +116,11 @@ HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word 
 }
 
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold)
+    hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold)
 {
     (void)physics_lay_out(self, n_modes, dead_time);
     self->oldest = 0;
-    for (hsep_word i = 0; i < n_modes; i++) {
+    for (hsep_int i = 0; i < n_modes; i++) {
         hsep_discretise(&physics_modes(self)[i], &modes[i], T_s, hold);
     }
     memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(hsep_real));
@@ -129,7 +129,7 @@ HSEP_API void hsep_physics_init(
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])
 {
     self->oldest = 0;
-    for (hsep_word i = 0; i < 2 * self->n_modes; i++) {
+    for (hsep_int i = 0; i < 2 * self->n_modes; i++) {
         physics_modes(self)[i / 2].s[i % 2] = state[i];
     }
     memcpy(hsep_at(self, self->ring), state + 2 * self->n_modes, (size_t)self->dead_time * sizeof(hsep_real));
@@ -139,11 +139,11 @@ HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
 {
     const hsep_discrete_mode *modes = (const hsep_discrete_mode *)hsep_at_const(other, other->modes);
     const hsep_real *ring = hsep_at_const(other, other->ring);
-    for (hsep_word i = 0; i < self->n_modes; i++) {
+    for (hsep_int i = 0; i < self->n_modes; i++) {
         physics_modes(self)[i].s[0] += modes[i].s[0];
         physics_modes(self)[i].s[1] += modes[i].s[1];
     }
-    for (hsep_word i = 0; i < self->dead_time; i++) {
+    for (hsep_int i = 0; i < self->dead_time; i++) {
         hsep_at(self, self->ring)[(self->oldest + i) % self->dead_time] += ring[(other->oldest + i) % self->dead_time];
     }
 }
@@ -185,7 +185,7 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x
             u[k] = self->dead_time > 0 ? physics_delay(self, x_d[first + k]) : x_d[first + k];
         }
         memset(x_pb + first, 0, count * sizeof(hsep_real));
-        for (hsep_word i = 0; i < self->n_modes; i++) {
+        for (hsep_int i = 0; i < self->n_modes; i++) {
             physics_respond(&physics_modes(self)[i], u, x_pb + first, count);
         }
     }
@@ -193,7 +193,7 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x
 
 /* Add the responses of one mode of count models to n samples of the signals u, their states in registers. */
 static void physics_respond_abreast(
-    hsep_physics *const models[], size_t count, hsep_word mode, const hsep_real *restrict u, hsep_real *restrict x,
+    hsep_physics *const models[], size_t count, hsep_int mode, const hsep_real *restrict u, hsep_real *restrict x,
     size_t n)
 {
     const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
@@ -227,7 +227,7 @@ HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, h
         }
     }
     memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(hsep_real));
-    for (hsep_word mode = 0; mode < models[0]->n_modes; mode++) {
+    for (hsep_int mode = 0; mode < models[0]->n_modes; mode++) {
         physics_respond_abreast(models, count, mode, u, x, n);
     }
 }

@@ -21,12 +21,12 @@ typedef struct {
 } hsep_discrete_mode;
 
 typedef struct {
-    hsep_word n_modes;
-    hsep_word dead_time; /* whole samples by which the command is delayed */
-    hsep_word oldest;    /* index of the next command to leave the dead time's ring */
+    hsep_int n_modes;
+    hsep_int dead_time; /* whole samples by which the command is delayed */
+    hsep_int oldest;    /* index of the next command to leave the dead time's ring */
     /* Offsets in words from the beginning of the struct */
-    hsep_word modes; /* hsep_discrete_mode[n_modes] */
-    hsep_word ring;  /* (dead_time,) m, commands within the dead time */
+    hsep_int modes; /* hsep_discrete_mode[n_modes] */
+    hsep_int ring;  /* (dead_time,) m, commands within the dead time */
 } hsep_physics;
 
 HSEP_ASSERT_WORDS(hsep_mode, 4);
@@ -37,11 +37,11 @@ HSEP_ASSERT_WORDS(hsep_physics, 5);
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times T_s. */
 HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold);
 
-HSEP_API hsep_real hsep_physics_size(hsep_word n_modes, hsep_word dead_time);
+HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time);
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], hsep_word n_modes, hsep_word dead_time, hsep_real T_s, hsep_hold hold);
-HSEP_API int hsep_physics_valid(const void *block, hsep_word n_modes, hsep_word dead_time);
+    hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold);
+HSEP_API int hsep_physics_valid(const void *block, hsep_int n_modes, hsep_int dead_time);
 
 /* Begin with a state, (2 n_modes + dead_time,), m: the modes', then the commands within the dead time, oldest first. */
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);

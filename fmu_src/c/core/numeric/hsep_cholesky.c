@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 /* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. */
-static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *least)
+static int cholesky_pivot(hsep_real row[], hsep_int length, const hsep_real *least)
 {
     if (least != NULL && !(row[0] >= *least)) {
         row[0] = *least;
@@ -16,7 +16,7 @@ static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *le
     }
     const hsep_real root = hsep_sqrt(row[0]), inverse = 1.0 / root;
     row[0] = root;
-    for (hsep_word j = 1; j < length; j++) {
+    for (hsep_int j = 1; j < length; j++) {
         row[j] *= inverse;
     }
     return 1;
@@ -25,12 +25,12 @@ static int cholesky_pivot(hsep_real row[], hsep_word length, const hsep_real *le
 /* Finish count rows, from row k of n on, from which the rows above have been subtracted; return whether they have
  * pivots. */
 static int cholesky_panel(
-    hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word length, const hsep_real least[])
+    hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_int count, hsep_int length, const hsep_real least[])
 {
-    for (hsep_word r = 0; r < count; r++) {
+    for (hsep_int r = 0; r < count; r++) {
         hsep_real a[HSEP_CHOLESKY_PANEL];
         const hsep_real *x[HSEP_CHOLESKY_PANEL];
-        for (hsep_word above = 0; above < r; above++) {
+        for (hsep_int above = 0; above < r; above++) {
             x[above] = rows[above] + (r - above);
             a[above] = *x[above];
         }
@@ -38,7 +38,7 @@ static int cholesky_panel(
             hsep_take_four(rows[r], a, x, length - r);
         }
         if (r % 4 > 0) {
-            const hsep_word few = r - r % 4;
+            const hsep_int few = r - r % 4;
             hsep_take_few(rows[r], a + few, x + few, r % 4, length - r);
         }
         if (!cholesky_pivot(rows[r], length - r, least != NULL ? least + r : NULL)) {
@@ -50,17 +50,17 @@ static int cholesky_panel(
 
 /* Subtract from row i what the rows of a panel, count of them, leave of it; length: of row i. */
 static inline void cholesky_take(
-    hsep_real row[], hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_word count, hsep_word i, hsep_word length)
+    hsep_real row[], hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_int count, hsep_int i, hsep_int length)
 {
     if (count < HSEP_CHOLESKY_PANEL) {
-        for (hsep_word r = 0; r < count; r++) {
+        for (hsep_int r = 0; r < count; r++) {
             hsep_axpy(row, -rows[r][i - r], rows[r] + (i - r), length);
         }
         return;
     }
     hsep_real a[HSEP_CHOLESKY_PANEL];
     const hsep_real *x[HSEP_CHOLESKY_PANEL];
-    for (hsep_word r = 0; r < HSEP_CHOLESKY_PANEL; r++) { /* of known length: registers */
+    for (hsep_int r = 0; r < HSEP_CHOLESKY_PANEL; r++) { /* of known length: registers */
         x[r] = rows[r] + (i - r);
         a[r] = *x[r];
     }
@@ -68,14 +68,14 @@ static inline void cholesky_take(
 }
 
 HSEP_API int hsep_cholesky_rows(
-    hsep_real triangle[], hsep_word n, hsep_word first, hsep_word last, const hsep_real least[])
+    hsep_real triangle[], hsep_int n, hsep_int first, hsep_int last, const hsep_real least[])
 {
-    hsep_real *row = triangle + (hsep_word)(hsep_triangle(n) - hsep_triangle(n - first));
-    for (hsep_word k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
-        const hsep_word length = n - k, left = last - k;
-        const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+    hsep_real *row = triangle + (hsep_int)(hsep_triangle(n) - hsep_triangle(n - first));
+    for (hsep_int k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
+        const hsep_int length = n - k, left = last - k;
+        const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
         hsep_real *rows[HSEP_CHOLESKY_PANEL];
-        for (hsep_word r = 0; r < count; r++) {
+        for (hsep_int r = 0; r < count; r++) {
             rows[r] = row;
             row += length - r;
         }
@@ -83,7 +83,7 @@ HSEP_API int hsep_cholesky_rows(
             return 0;
         }
         hsep_real *y = row;
-        for (hsep_word i = count; i < length; i++) { /* what they leave of the rows below */
+        for (hsep_int i = count; i < length; i++) { /* what they leave of the rows below */
             cholesky_take(y, rows, count, i, length - i);
             y += length - i;
         }
@@ -91,7 +91,7 @@ HSEP_API int hsep_cholesky_rows(
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_word n, const hsep_real least[])
+HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_int n, const hsep_real least[])
 {
     return hsep_cholesky_rows(triangle, n, 0, n, least);
 }
@@ -101,34 +101,34 @@ typedef struct {
     hsep_real norm, v[4], tau;
 } cholesky_reflection;
 
-static cholesky_reflection cholesky_reflect(hsep_real pivot, const hsep_real x[], hsep_word stride, hsep_word count)
+static cholesky_reflection cholesky_reflect(hsep_real pivot, const hsep_real x[], hsep_int stride, hsep_int count)
 {
     cholesky_reflection self = {0.0, {0.0}, 0.0};
     hsep_real square = pivot * pivot;
-    for (hsep_word i = 0; i < count; i++) {
+    for (hsep_int i = 0; i < count; i++) {
         square += x[stride * i] * x[stride * i];
     }
     self.norm = hsep_sqrt(square);
     const hsep_real sum = pivot + self.norm;
-    for (hsep_word i = 0; i < count; i++) {
+    for (hsep_int i = 0; i < count; i++) {
         self.v[i] = x[stride * i] / sum;
     }
     self.tau = sum / self.norm;
     return self;
 }
 
-HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[])
+HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_int n, hsep_int head, hsep_real x[])
 {
     hsep_real *row = triangle;
-    for (hsep_word k = 0; k < n; k++) {
-        const hsep_word length = n - k;
+    for (hsep_int k = 0; k < n; k++) {
+        const hsep_int length = n - k;
         if (k >= head) {
             hsep_axpy(row, x[k], x + k, length);
         } else {
             const cholesky_reflection h = cholesky_reflect(row[0], x + k, 0, 1);
             const hsep_real v = h.v[0], tau = h.tau;
             hsep_real *restrict r = row, *restrict y = x + k;
-            hsep_word j = 1;
+            hsep_int j = 1;
             for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
                 hsep_lanes *to = hsep_lanes_at(r + j), *from = hsep_lanes_at(y + j);
                 const hsep_lanes w = tau * (*to + v * *from);
@@ -146,11 +146,11 @@ HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_word n, hsep_wor
     }
 }
 
-HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_word head, hsep_real x[])
+HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_int n, hsep_int head, hsep_real x[])
 {
     hsep_real *row = triangle;
-    for (hsep_word k = 0; k < n; k++) {
-        const hsep_word length = n - k;
+    for (hsep_int k = 0; k < n; k++) {
+        const hsep_int length = n - k;
         hsep_real *x0 = x + k, *x1 = x0 + n, *x2 = x1 + n, *x3 = x2 + n;
         if (k >= head) {
             const hsep_real a[4] = {-x0[0], -x1[0], -x2[0], -x3[0]};
@@ -159,7 +159,7 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_wo
         } else {
             const cholesky_reflection h = cholesky_reflect(row[0], x0, n, 4);
             const hsep_real v0 = h.v[0], v1 = h.v[1], v2 = h.v[2], v3 = h.v[3], tau = h.tau;
-            hsep_word j = 1;
+            hsep_int j = 1;
             for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
                 hsep_lanes *to = hsep_lanes_at(row + j), *y0 = hsep_lanes_at(x0 + j), *y1 = hsep_lanes_at(x1 + j);
                 hsep_lanes *y2 = hsep_lanes_at(x2 + j), *y3 = hsep_lanes_at(x3 + j);
@@ -182,7 +182,7 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_word n, hsep_wo
 }
 
 /* Solve with count rows from the diagonal on for as many entries y, one after the other. */
-static inline void cholesky_forward_rows(const hsep_real *const rows[], hsep_word count, hsep_real y[])
+static inline void cholesky_forward_rows(const hsep_real *const rows[], hsep_int count, hsep_real y[])
 {
     if (count == 4) { /* of known length: registers */
         const hsep_real *r0 = rows[0], *r1 = rows[1], *r2 = rows[2];
@@ -192,23 +192,23 @@ static inline void cholesky_forward_rows(const hsep_real *const rows[], hsep_wor
         y[0] = y0, y[1] = y1, y[2] = y2;
         return;
     }
-    for (hsep_word r = 0; r < count; r++) {
+    for (hsep_int r = 0; r < count; r++) {
         y[r] /= rows[r][0];
-        for (hsep_word j = 1; r + j < count; j++) {
+        for (hsep_int j = 1; r + j < count; j++) {
             y[r + j] -= y[r] * rows[r][j];
         }
     }
 }
 
-HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[])
+HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep_int count, hsep_real b[])
 {
     const hsep_real *row = triangle;
-    for (hsep_word first = 0; first < count; first += HSEP_CHOLESKY_PANEL) {
-        const hsep_word left = count - first, height = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        const hsep_word upper = height < 4 ? height : 4, behind = n - first - height;
+    for (hsep_int first = 0; first < count; first += HSEP_CHOLESKY_PANEL) {
+        const hsep_int left = count - first, height = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+        const hsep_int upper = height < 4 ? height : 4, behind = n - first - height;
         const hsep_real *rows[HSEP_CHOLESKY_PANEL], *x[HSEP_CHOLESKY_PANEL];
         hsep_real *y = b + first;
-        for (hsep_word r = 0; r < height; r++) {
+        for (hsep_int r = 0; r < height; r++) {
             rows[r] = row;
             x[r] = row + (height - r); /* behind the panel */
             row += n - first - r;
@@ -223,18 +223,18 @@ HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_word n, hse
             hsep_take_eight(y + height, y, x, behind);
             continue;
         }
-        for (hsep_word r = 0; r < height; r++) {
+        for (hsep_int r = 0; r < height; r++) {
             hsep_axpy(y + height, -y[r], x[r], behind);
         }
     }
 }
 
-HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_word n, hsep_word count, hsep_real b[])
+HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_int n, hsep_int count, hsep_real b[])
 {
-    const hsep_real *row = triangle + (hsep_word)(hsep_triangle(n) - hsep_triangle(n - count));
-    hsep_word last = count;
+    const hsep_real *row = triangle + (hsep_int)(hsep_triangle(n) - hsep_triangle(n - count));
+    hsep_int last = count;
     for (; last >= 4; last -= 4) { /* four rows share what is behind them */
-        const hsep_word beyond = n - last;
+        const hsep_int beyond = n - last;
         const hsep_real *r3 = row - (beyond + 1), *r2 = r3 - (beyond + 2), *r1 = r2 - (beyond + 3);
         const hsep_real *r0 = r1 - (beyond + 4), *const x[4] = {r0 + 4, r1 + 3, r2 + 2, r3 + 1};
         hsep_real sums[4], *y = b + (last - 4);
@@ -251,7 +251,7 @@ HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_word n, hs
     }
 }
 
-HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_word n, hsep_real b[])
+HSEP_API void hsep_cholesky_solve(const hsep_real triangle[], hsep_int n, hsep_real b[])
 {
     hsep_cholesky_forward(triangle, n, n, b);
     hsep_cholesky_backward(triangle, n, n, b);

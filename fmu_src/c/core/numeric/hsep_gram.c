@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static hsep_real gram_lay_out(hsep_gram *self, hsep_word n)
+static hsep_real gram_lay_out(hsep_gram *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_gram);
     self->n = n;
@@ -19,15 +19,15 @@ static hsep_real gram_lay_out(hsep_gram *self, hsep_word n)
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_gram_size(hsep_word n) { return gram_lay_out(&(hsep_gram){0}, n); }
+HSEP_API hsep_real hsep_gram_size(hsep_int n) { return gram_lay_out(&(hsep_gram){0}, n); }
 
-HSEP_API void hsep_gram_init(hsep_gram *self, hsep_word n)
+HSEP_API void hsep_gram_init(hsep_gram *self, hsep_int n)
 {
     memset(self, 0, (size_t)hsep_gram_size(n));
     (void)gram_lay_out(self, n);
 }
 
-HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
+HSEP_API int hsep_gram_valid(const void *block, hsep_int n)
 {
     hsep_gram got;
     memcpy(&got, block, sizeof got);
@@ -40,10 +40,10 @@ HSEP_API int hsep_gram_valid(const void *block, hsep_word n)
  * carries and added back next time (Kahan 1965). */
 static void gram_add_row(
     hsep_real *restrict sums, hsep_real *restrict carries, const hsep_real a[4], const hsep_real *restrict x0,
-    const hsep_real *restrict x1, const hsep_real *restrict x2, const hsep_real *restrict x3, hsep_word n)
+    const hsep_real *restrict x1, const hsep_real *restrict x2, const hsep_real *restrict x3, hsep_int n)
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-    hsep_word j = 0;
+    hsep_int j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
         hsep_lanes *sum = hsep_lanes_at(sums + j), *carry = hsep_lanes_at(carries + j);
         const hsep_lanes before = *sum;
@@ -66,7 +66,7 @@ static void gram_add_row(
 /* Add the rows that wait. */
 static void gram_add_waiting(hsep_gram *self)
 {
-    const hsep_word width = self->n + 1;
+    const hsep_int width = self->n + 1;
     hsep_real *x = hsep_at(self, self->rows), *sums = hsep_at(self, self->sums),
               *carries = hsep_at(self, self->carries);
     if (self->waiting == 0) {
@@ -74,8 +74,8 @@ static void gram_add_waiting(hsep_gram *self)
     }
     memset(x + width * self->waiting, 0, (size_t)(width * (HSEP_GRAM_TOGETHER - self->waiting)) * sizeof(hsep_real));
     self->waiting = 0;
-    for (hsep_word i = 0; i < width; i++, x++) {
-        const hsep_word length = width - i;
+    for (hsep_int i = 0; i < width; i++, x++) {
+        const hsep_int length = width - i;
         const hsep_real a[4] = {x[0], x[width], x[2 * width], x[3 * width]};
         gram_add_row(sums, carries, a, x, x + width, x + 2 * width, x + 3 * width, length);
         sums += length;
@@ -98,11 +98,11 @@ HSEP_API void hsep_gram_fold(hsep_gram *self)
     self->waiting++;
 }
 
-HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i)
+HSEP_API int hsep_gram_load(hsep_gram *self, hsep_int i)
 {
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     hsep_real *row = hsep_gram_row(self);
-    for (hsep_word j = 0; j <= n - i; j++) {
+    for (hsep_int j = 0; j <= n - i; j++) {
         if (!isfinite(row[j])) {
             return 0;
         }
@@ -121,7 +121,7 @@ HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i)
 
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)
 {
-    const hsep_word count = (hsep_word)hsep_triangle(self->n + 1);
+    const hsep_int count = (hsep_int)hsep_triangle(self->n + 1);
     gram_add_waiting(self);
     gram_add_waiting(other);
     self->n_rows += weight * other->n_rows;
@@ -134,7 +134,7 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
     hsep_real *sums = hsep_at(self, self->sums);
     gram_add_waiting(self);
     self->n_rows *= weight;
-    for (hsep_word i = 0; i < 2 * (hsep_word)hsep_triangle(self->n + 1); i++) { /* carries are behind the sums */
+    for (hsep_int i = 0; i < 2 * (hsep_int)hsep_triangle(self->n + 1); i++) { /* carries are behind the sums */
         sums[i] *= weight;
     }
 }
@@ -143,10 +143,10 @@ HSEP_API void hsep_gram_settle(hsep_gram *self) { gram_add_waiting(self); }
 
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self)
 {
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     const hsep_real *target = hsep_at_const(self, self->rows) + n;
-    hsep_real square = hsep_at_const(self, self->sums)[(hsep_word)hsep_triangle(n + 1) - 1];
-    for (hsep_word b = 0; b < self->waiting; b++, target += n + 1) {
+    hsep_real square = hsep_at_const(self, self->sums)[(hsep_int)hsep_triangle(n + 1) - 1];
+    for (hsep_int b = 0; b < self->waiting; b++, target += n + 1) {
         square += *target * *target;
     }
     return square;

@@ -15,22 +15,22 @@
 #define HSEP_GRAM_TOGETHER 4 /* rows that are added in one go */
 
 typedef struct {
-    hsep_word n;       /* features */
-    hsep_word waiting; /* rows that are not added yet */
-    hsep_real n_rows;  /* rows so far, weighted */
+    hsep_int n;       /* features */
+    hsep_int waiting; /* rows that are not added yet */
+    hsep_real n_rows; /* rows so far, weighted */
     /* Offsets in words from the beginning of the struct */
-    hsep_word rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
-    hsep_word sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
-    hsep_word carries; /* and what rounding took from them */
+    hsep_int rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
+    hsep_int sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
+    hsep_int carries; /* and what rounding took from them */
 } hsep_gram;
 
 HSEP_ASSERT_WORDS(hsep_gram, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
-HSEP_API hsep_real hsep_gram_size(hsep_word n);
+HSEP_API hsep_real hsep_gram_size(hsep_int n);
 /* Fill the block for n >= 1 features, without rows. */
-HSEP_API void hsep_gram_init(hsep_gram *self, hsep_word n);
-HSEP_API int hsep_gram_valid(const void *block, hsep_word n);
+HSEP_API void hsep_gram_init(hsep_gram *self, hsep_int n);
+HSEP_API int hsep_gram_valid(const void *block, hsep_int n);
 
 /* Where the next row goes, (n + 1,): phi, then its target; what is there before does not matter. */
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
@@ -42,7 +42,7 @@ HSEP_API void hsep_gram_fold(hsep_gram *self);
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
  * rows of a factor stand for the rows that it was made from, whose number the caller sets. Fails, and returns 0, if an
  * entry is not finite or a diagonal entry of R is 0. Cost: as hsep_gram_fold. */
-HSEP_API int hsep_gram_load(hsep_gram *self, hsep_word i);
+HSEP_API int hsep_gram_load(hsep_gram *self, hsep_int i);
 
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);

@@ -26,28 +26,28 @@
 
 /* Take count words at the cursor; return their offset. Counted as a number, so that no size can overflow: an offset of
  * HSEP_EXACT or more is 0, in a block whose size is refused. */
-static inline hsep_word hsep_take(hsep_real *end, hsep_real count)
+static inline hsep_int hsep_take(hsep_real *end, hsep_real count)
 {
     const hsep_real offset = *end;
     *end += count;
-    return offset < HSEP_EXACT ? (hsep_word)offset : 0;
+    return offset < HSEP_EXACT ? (hsep_int)offset : 0;
 }
 
 /* Take a block of this many bytes. */
-static inline hsep_word hsep_take_block(hsep_real *end, hsep_real bytes)
+static inline hsep_int hsep_take_block(hsep_real *end, hsep_real bytes)
 {
     return hsep_take(end, bytes / sizeof(hsep_real));
 }
 
 /* The array, or the block, at an offset of a block. */
-static inline hsep_real *hsep_at(void *block, hsep_word offset) { return (hsep_real *)block + offset; }
-static inline const hsep_real *hsep_at_const(const void *block, hsep_word offset)
+static inline hsep_real *hsep_at(void *block, hsep_int offset) { return (hsep_real *)block + offset; }
+static inline const hsep_real *hsep_at_const(const void *block, hsep_int offset)
 {
     return (const hsep_real *)block + offset;
 }
 
 /* The same in bytes of any alignment, to be read by memcpy. */
-static inline const void *hsep_at_bytes(const void *bytes, hsep_word offset)
+static inline const void *hsep_at_bytes(const void *bytes, hsep_int offset)
 {
     return (const char *)bytes + offset * sizeof(hsep_real);
 }

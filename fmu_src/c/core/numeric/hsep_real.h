@@ -12,14 +12,14 @@
 
 #ifdef HSEP_FLOAT32
 typedef float hsep_real;
-typedef uint32_t hsep_word;
+typedef uint32_t hsep_int;
 typedef int32_t hsep_signed;
 #define HSEP_EXACT 16777216.0F
 #define HSEP_TINY(number) 1e-36F
 #define HSEP_HUGE(number) 1e15F
 #else
 typedef double hsep_real;
-typedef uint64_t hsep_word;
+typedef uint64_t hsep_int;
 typedef int64_t hsep_signed;
 #define HSEP_EXACT 9007199254740992.0
 #define HSEP_TINY(number) (number)

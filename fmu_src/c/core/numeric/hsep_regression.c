@@ -9,7 +9,7 @@
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static hsep_real regression_lay_out(hsep_regression *self, hsep_word n)
+static hsep_real regression_lay_out(hsep_regression *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_regression);
     self->n = n;
@@ -21,9 +21,9 @@ static hsep_real regression_lay_out(hsep_regression *self, hsep_word n)
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_regression_size(hsep_word n) { return regression_lay_out(&(hsep_regression){0}, n); }
+HSEP_API hsep_real hsep_regression_size(hsep_int n) { return regression_lay_out(&(hsep_regression){0}, n); }
 
-HSEP_API int hsep_regression_valid(const void *block, hsep_word n)
+HSEP_API int hsep_regression_valid(const void *block, hsep_int n)
 {
     hsep_regression got;
     memcpy(&got, block, sizeof got);
@@ -31,11 +31,11 @@ HSEP_API int hsep_regression_valid(const void *block, hsep_word n)
     return memcmp(&got, block, sizeof got) == 0;
 }
 
-HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real lambda)
+HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real lambda)
 {
     memset(self, 0, (size_t)hsep_regression_size(n));
     (void)regression_lay_out(self, n);
-    for (hsep_word i = 0; i < n; i++) {
+    for (hsep_int i = 0; i < n; i++) {
         hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
         *hsep_regression_entry(self, i, i) = 1.0;
     }
@@ -69,11 +69,11 @@ static inline void regression_four(hsep_real *restrict u, hsep_real *restrict x,
 
 /* Rotate the row x, (4 n,), with 4 rows of U in n tiles. */
 static inline void regression_sweep(
-    hsep_real *restrict tile, hsep_real *restrict x, hsep_word n, const hsep_real pivot[4], const hsep_real gain[4])
+    hsep_real *restrict tile, hsep_real *restrict x, hsep_int n, const hsep_real pivot[4], const hsep_real gain[4])
 {
     const hsep_real p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
     const hsep_real g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
-    for (hsep_word t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+    for (hsep_int t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         hsep_real y[4] = {x[0], x[1], x[2], x[3]};
         regression_four(tile, y, p0, g0);
         regression_four(tile + 4, y, p1, g1);
@@ -86,10 +86,10 @@ static inline void regression_sweep(
 /* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: that loses nothing when keep is
  * small. */
 static void regression_sweep_large(
-    hsep_real *restrict tile, hsep_real *restrict x, hsep_word n, const hsep_real pivot[4], const hsep_real gain[4],
+    hsep_real *restrict tile, hsep_real *restrict x, hsep_int n, const hsep_real pivot[4], const hsep_real gain[4],
     const hsep_real keep[4], const int large[4])
 {
-    for (hsep_word t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+    for (hsep_int t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         for (int r = 0; r < 4; r++) {
             hsep_real *restrict u = tile + 4 * r;
             if (!large[r]) {
@@ -131,8 +131,8 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
      * The last form is the cheapest and its rounding error is a Givens rotation's divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     hsep_real v = 1.0;
-    hsep_word rows = self->n;
-    for (hsep_word left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
+    hsep_int rows = self->n;
+    for (hsep_int left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
         const unsigned height = rows < HSEP_TILE ? (unsigned)rows : HSEP_TILE;
         rows -= height;
         hsep_real pivot[4], gain[4], keep[4];
@@ -165,27 +165,27 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
 
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
-    const hsep_word n = self->n, n_tiles = self->n_tiles;
+    const hsep_int n = self->n, n_tiles = self->n_tiles;
     const hsep_real *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
-    for (hsep_word band = n_tiles; band-- > 0;) {
-        const hsep_word first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
+    for (hsep_int band = n_tiles; band-- > 0;) {
+        const hsep_int first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
         tile -= HSEP_TILE_STRIDE * (n_tiles - band);
         hsep_real sum[4] = {0.0, 0.0, 0.0, 0.0};
         const hsep_real *t = tile + HSEP_TILE_STRIDE;
-        for (hsep_word j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
+        for (hsep_int j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
             for (int r = 0; r < 4; r++) {
                 sum[r] += t[4 * r] * w[j] + t[4 * r + 1] * w[j + 1] + t[4 * r + 2] * w[j + 2] + t[4 * r + 3] * w[j + 3];
             }
         }
-        for (hsep_word r = height; r-- > 0;) {
+        for (hsep_int r = height; r-- > 0;) {
             /* w_r = z_r - sum_j>r u_rj w_j: the target's tile has the last features and z, and may be this one. */
             const hsep_real *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
             hsep_real w_r = last[n % HSEP_TILE] - sum[r];
-            for (hsep_word c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
+            for (hsep_int c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
                 w_r -= last[c] * w[n - n % HSEP_TILE + c];
             }
-            for (hsep_word c = r + 1; c < height; c++) {
+            for (hsep_int c = r + 1; c < height; c++) {
                 w_r -= tile[4 * r + c] * w[first + c];
             }
             w[first + r] = w_r;
@@ -193,11 +193,11 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
     }
 }
 
-HSEP_API int hsep_regression_load(hsep_regression *self, hsep_word i)
+HSEP_API int hsep_regression_load(hsep_regression *self, hsep_int i)
 {
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     const hsep_real *row = hsep_regression_row(self);
-    for (hsep_word j = i; j <= n; j++) {
+    for (hsep_int j = i; j <= n; j++) {
         if (!isfinite(row[j - i])) {
             return 0;
         }
@@ -210,7 +210,7 @@ HSEP_API int hsep_regression_load(hsep_regression *self, hsep_word i)
         return 0;
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / hsep_fmax(row[0] * row[0], regression_lambda_min);
-    for (hsep_word j = i + 1; j <= n; j++) {
+    for (hsep_int j = i + 1; j <= n; j++) {
         hsep_real *entry = hsep_regression_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
         entry[HSEP_TILE_ENTRIES] = 0.0;

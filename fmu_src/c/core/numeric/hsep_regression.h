@@ -19,24 +19,24 @@
 #include "hsep_tiles.h"
 
 typedef struct {
-    hsep_word n;            /* features */
-    hsep_word n_tiles;      /* tiles of 4 columns that n features and the target need */
+    hsep_int n;             /* features */
+    hsep_int n_tiles;       /* tiles of 4 columns that n features and the target need */
     hsep_real n_rows;       /* rows so far */
     hsep_real residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
     /* Offsets in words from the beginning of the struct */
-    hsep_word inverse_d; /* (4 n_tiles,) 1/D */
-    hsep_word row;       /* (4 n_tiles,) the row that comes next */
-    hsep_word tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
+    hsep_int inverse_d; /* (4 n_tiles,) 1/D */
+    hsep_int row;       /* (4 n_tiles,) the row that comes next */
+    hsep_int tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
 } hsep_regression;
 
 HSEP_ASSERT_WORDS(hsep_regression, 7);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
-HSEP_API hsep_real hsep_regression_size(hsep_word n);
+HSEP_API hsep_real hsep_regression_size(hsep_int n);
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
-HSEP_API void hsep_regression_init(hsep_regression *self, hsep_word n, hsep_real lambda);
-HSEP_API int hsep_regression_valid(const void *block, hsep_word n);
+HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real lambda);
+HSEP_API int hsep_regression_valid(const void *block, hsep_int n);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self);
@@ -52,15 +52,15 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
  * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
-HSEP_API int hsep_regression_load(hsep_regression *self, hsep_word i);
+HSEP_API int hsep_regression_load(hsep_regression *self, hsep_int i);
 
 /* Entry (i, j), i <= j, of [U z]. */
-static inline const hsep_real *hsep_regression_entry_const(const hsep_regression *self, hsep_word i, hsep_word j)
+static inline const hsep_real *hsep_regression_entry_const(const hsep_regression *self, hsep_int i, hsep_int j)
 {
     return hsep_at_const(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
 }
 
-static inline hsep_real *hsep_regression_entry(hsep_regression *self, hsep_word i, hsep_word j)
+static inline hsep_real *hsep_regression_entry(hsep_regression *self, hsep_int i, hsep_int j)
 {
     return hsep_at(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
 }

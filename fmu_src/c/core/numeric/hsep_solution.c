@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real solution_lay_out(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room)
+static hsep_real solution_lay_out(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room)
 {
     const hsep_real n = (hsep_real)n_head + (hsep_real)n_tail;
     hsep_real end = HSEP_WORDS(hsep_solution);
@@ -27,18 +27,18 @@ static hsep_real solution_lay_out(hsep_solution *self, hsep_word n_head, hsep_wo
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_solution_size(hsep_word n_head, hsep_word n_tail, hsep_word room)
+HSEP_API hsep_real hsep_solution_size(hsep_int n_head, hsep_int n_tail, hsep_int room)
 {
     return solution_lay_out(&(hsep_solution){0}, n_head, n_tail, room);
 }
 
-HSEP_API void hsep_solution_init(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room)
+HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room)
 {
     memset(self, 0, (size_t)hsep_solution_size(n_head, n_tail, room));
     (void)solution_lay_out(self, n_head, n_tail, room);
 }
 
-HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word n_tail, hsep_word room)
+HSEP_API int hsep_solution_valid(const void *block, hsep_int n_head, hsep_int n_tail, hsep_int room)
 {
     hsep_solution got;
     return HSEP_LAID_OUT(got, block, solution_lay_out(&got, n_head, n_tail, room)) && got.factored <= got.n_head &&
@@ -49,18 +49,18 @@ HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word 
 static hsep_real *solution_tail(hsep_solution *self)
 {
     const hsep_real before = hsep_triangle(self->n_head + self->n_tail + 1) - hsep_triangle(self->n_tail + 1);
-    return hsep_at(self, self->factor) + (hsep_word)before;
+    return hsep_at(self, self->factor) + (hsep_int)before;
 }
 
 /* Add the rows of a Gram matrix that do not wait to the factor's triangle, in its order. */
 static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real weight)
 {
-    const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = gram->n;
+    const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = gram->n;
     const hsep_real *row = hsep_at_const(gram, gram->sums); /* row i of the triangle, from its diagonal on */
     hsep_real *factor = hsep_at(self, self->factor), *tail = solution_tail(self);
-    for (hsep_word i = 0; i < n_tail; i++, row += n + 1 - (i - 1)) {
+    for (hsep_int i = 0; i < n_tail; i++, row += n + 1 - (i - 1)) {
         hsep_real *to = factor + n_head + i;
-        for (hsep_word j = 0; j < n_head; j++) {
+        for (hsep_int j = 0; j < n_head; j++) {
             *to += weight * row[n_tail + (n_head - 1 - j) - i];
             to += n_head + n_tail - j;
         }
@@ -68,20 +68,20 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
         tail[n_tail - i] += weight * row[n - i];
         tail += n_tail + 1 - i;
     }
-    for (hsep_word i = 0; i < n_head; i++) { /* a row of the Gram matrix is a column of the factor, upwards */
+    for (hsep_int i = 0; i < n_head; i++) { /* a row of the Gram matrix is a column of the factor, upwards */
         hsep_real *to = factor + (n_head - 1 - i);
-        for (hsep_word j = 0; j < n_head - i; j++) {
+        for (hsep_int j = 0; j < n_head - i; j++) {
             *to += weight * row[n_head - i - 1 - j];
             to += n_head + n_tail - j;
         }
         to = factor + n_head + n_tail;
-        for (hsep_word j = 0; j < n_head - 1 - i; j++) {
+        for (hsep_int j = 0; j < n_head - 1 - i; j++) {
             to += n_head + n_tail - j;
         }
         *to += weight * row[n - n_tail - i];
         row += n - n_tail + 1 - i;
     }
-    const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_word)hsep_triangle(n + 1) - 1];
+    const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_int)hsep_triangle(n + 1) - 1];
     *tail += weight * square;
     self->square += weight * square;
 }
@@ -93,7 +93,7 @@ HSEP_API void hsep_solution_reset(hsep_solution *self)
 
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight)
 {
-    const hsep_word n_head = self->n_head, n = n_head + self->n_tail;
+    const hsep_int n_head = self->n_head, n = n_head + self->n_tail;
     const hsep_real *penalties = hsep_at(self, self->penalties) + self->n_tail;
     hsep_real *diagonal = hsep_at(self, self->factor), *least = hsep_at(self, self->least);
     hsep_solution_reset(self);
@@ -104,13 +104,13 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
     if (other != NULL) {
         solution_add(self, other, weight);
     }
-    for (hsep_word i = 0; i < n_head; i++) {
+    for (hsep_int i = 0; i < n_head; i++) {
         const hsep_real penalty = penalties[n_head - 1 - i];
         *diagonal += penalty;
         diagonal += n + 1 - i;
         least[i] = penalty > HSEP_SOLUTION_LEAST ? penalty : HSEP_SOLUTION_LEAST;
     }
-    for (hsep_word b = 0; b < gram->waiting; b++) {
+    for (hsep_int b = 0; b < gram->waiting; b++) {
         const hsep_real *row = hsep_at_const(gram, gram->rows) + b * (gram->n + 1);
         hsep_solution_row(self, row, row[gram->n]);
     }
@@ -118,12 +118,12 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
 
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target)
 {
-    const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
+    const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
     hsep_real *to = hsep_at(self, self->rows) + self->waiting * (n + 1);
     if (self->waiting == self->room) { /* of a state that was changed on purpose */
         return;
     }
-    for (hsep_word i = 0; i < n_head; i++) {
+    for (hsep_int i = 0; i < n_head; i++) {
         to[i] = row[n_tail + n_head - 1 - i];
     }
     memcpy(to + n_head, row, (size_t)n_tail * sizeof(hsep_real));
@@ -133,13 +133,13 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
 }
 
 /* Multiply-adds of a row that is taken in where so many rows of the head are factored. */
-static hsep_real solution_of_row(const hsep_solution *self, hsep_word factored)
+static hsep_real solution_of_row(const hsep_solution *self, hsep_int factored)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1), left = all - (hsep_real)factored;
     return all * all - 0.5 * left * left;
 }
 
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word to_come, int tail)
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come, int tail)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
     const hsep_real behind = tail ? 0.0 : (hsep_real)self->n_tail + 1.0;
@@ -148,9 +148,9 @@ HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word to_co
 }
 
 /* Take in the last count rows that wait: up to four, with rows of 0 in their place if there are fewer, or one. */
-static void solution_take_in(hsep_solution *self, hsep_word count)
+static void solution_take_in(hsep_solution *self, hsep_int count)
 {
-    const hsep_word width = self->n_head + self->n_tail + 1;
+    const hsep_int width = self->n_head + self->n_tail + 1;
     hsep_real *work = hsep_at(self, self->work);
     self->waiting -= count;
     memcpy(work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
@@ -164,16 +164,16 @@ static void solution_take_in(hsep_solution *self, hsep_word count)
 
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)
 {
-    const hsep_word width = self->n_head + self->n_tail + 1;
+    const hsep_int width = self->n_head + self->n_tail + 1;
     while (all || amount > 0.0) {
-        const hsep_word left = self->n_head - self->factored, waiting = self->waiting;
+        const hsep_int left = self->n_head - self->factored, waiting = self->waiting;
         if (waiting >= HSEP_SOLUTION_ABREAST || (all && left == 0 && waiting > 0)) {
-            const hsep_word count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
+            const hsep_int count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
             amount -= (hsep_real)count * solution_of_row(self, self->factored);
             solution_take_in(self, count);
         } else if (left > 0) {
-            const hsep_word count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-            const hsep_word last = self->factored + count;
+            const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+            const hsep_int last = self->factored + count;
             const hsep_real height = (hsep_real)(width - self->factored);
             (void)hsep_cholesky_rows( /* no pivot is 0 */
                 hsep_at(self, self->factor), width, self->factored, last, hsep_at(self, self->least));
@@ -188,7 +188,7 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
 
 HSEP_API void hsep_solution_complete(hsep_solution *self)
 {
-    const hsep_word n_head = self->n_head, n_tail = self->n_tail;
+    const hsep_int n_head = self->n_head, n_tail = self->n_tail;
     const size_t size = (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real);
     const hsep_real *penalties = hsep_at(self, self->penalties);
     hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *diagonal = tail;
@@ -199,7 +199,7 @@ HSEP_API void hsep_solution_complete(hsep_solution *self)
     } else {
         memcpy(tail, left, size);
     }
-    for (hsep_word i = 0; i < n_tail; i++) {
+    for (hsep_int i = 0; i < n_tail; i++) {
         *diagonal += penalties[i];
         diagonal += n_tail + 1 - i;
         least[i] = penalties[i] > HSEP_SOLUTION_LEAST ? penalties[i] : HSEP_SOLUTION_LEAST;
@@ -212,10 +212,10 @@ HSEP_API void hsep_solution_complete(hsep_solution *self)
 /* Complete the factor without the last row that waits, which becomes the only one. */
 static void solution_complete_but_last(hsep_solution *self)
 {
-    const hsep_word width = self->n_head + self->n_tail + 1;
+    const hsep_int width = self->n_head + self->n_tail + 1;
     hsep_real *rows = hsep_at(self, self->rows);
     self->waiting--;
-    const hsep_word last = self->waiting;
+    const hsep_int last = self->waiting;
     hsep_solution_complete(self);
     memmove(rows, rows + width * last, (size_t)width * sizeof(hsep_real));
     self->waiting = 1;
@@ -224,7 +224,7 @@ static void solution_complete_but_last(hsep_solution *self)
 /* u of the last row, if there is one, and what the weights without it leave of its target. */
 static void solution_last(hsep_solution *self)
 {
-    const hsep_word n = self->n_head + self->n_tail;
+    const hsep_int n = self->n_head + self->n_tail;
     hsep_real *u = hsep_at(self, self->last);
     self->last_square = 0.0;
     if (self->waiting > 0) {
@@ -236,7 +236,7 @@ static void solution_last(hsep_solution *self)
 
 HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
 {
-    const hsep_word n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
+    const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
     const hsep_real *penalties = hsep_at(self, self->penalties), *u = hsep_at(self, self->last);
     hsep_real *w = hsep_at(self, self->weights), *x = hsep_at(self, self->work);
     if (!self->completed && apart && !self->finished && self->waiting > 0) {
@@ -248,17 +248,17 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
     const int is_one = self->waiting > 0; /* R x = z + u (target - u' z) / (1 + u' u) */
     const hsep_real innovation = is_one ? u[n] : 0.0, gain = innovation / (1.0 + self->last_square);
     const hsep_real *row = hsep_at(self, self->factor);
-    for (hsep_word i = 0; i < n; i++) {
+    for (hsep_int i = 0; i < n; i++) {
         x[i] = row[n - i] + (is_one ? gain * u[i] : 0.0);
         row += n + 1 - i;
     }
     hsep_real sum = *row * *row + gain * innovation;
     hsep_cholesky_backward(hsep_at(self, self->factor), n + 1, n, x);
     memcpy(w, x + n_head, (size_t)n_tail * sizeof(hsep_real));
-    for (hsep_word i = 0; i < n_head; i++) {
+    for (hsep_int i = 0; i < n_head; i++) {
         w[n_tail + i] = x[n_head - 1 - i];
     }
-    for (hsep_word i = 0; i < n; i++) { /* sum of the squares, and of the penalties */
+    for (hsep_int i = 0; i < n; i++) { /* sum of the squares, and of the penalties */
         sum -= penalties[i] * w[i] * w[i];
     }
     self->completed = 0;
@@ -269,19 +269,19 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
 /* R'^-1 of four rows side by side, which are changed in place; to the bit as hsep_cholesky_forward has each. */
 static void solution_forward_abreast(hsep_solution *self)
 {
-    const hsep_word m = self->n_head + self->n_tail;
+    const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *row = hsep_at(self, self->factor);
     hsep_lanes *x = hsep_lanes_at(hsep_at(self, self->abreast));
-    for (hsep_word first = 0; first < m; first += 4) {
-        const hsep_word left = m - first, height = left < 4 ? left : 4;
+    for (hsep_int first = 0; first < m; first += 4) {
+        const hsep_int left = m - first, height = left < 4 ? left : 4;
         const hsep_real *r[4] = {NULL};
         hsep_lanes *y = x + HSEP_OF_FOUR * first;
-        for (hsep_word i = 0; i < height; i++) {
-            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        for (hsep_int i = 0; i < height; i++) {
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
                 y[HSEP_OF_FOUR * i + l] /= row[0];
             }
-            for (hsep_word j = 1; i + j < height; j++) {
-                for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+            for (hsep_int j = 1; i + j < height; j++) {
+                for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
                     y[HSEP_OF_FOUR * (i + j) + l] -= row[j] * y[HSEP_OF_FOUR * i + l];
                 }
             }
@@ -292,8 +292,8 @@ static void solution_forward_abreast(hsep_solution *self)
             const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
             hsep_lanes at[4 * HSEP_OF_FOUR], *to = y + 4 * HSEP_OF_FOUR;
             memcpy(at, y, sizeof at);
-            for (hsep_word j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
-                for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+            for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
+                for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
                     to[l] =
                         (((to[l] - r0[j] * at[l]) - r1[j] * at[HSEP_OF_FOUR + l]) - r2[j] * at[2 * HSEP_OF_FOUR + l]) -
                         r3[j] * at[3 * HSEP_OF_FOUR + l];
@@ -304,56 +304,56 @@ static void solution_forward_abreast(hsep_solution *self)
 }
 
 /* Sums of u_i x_i, or of x_i x_i without u, over four rows side by side; to the bit as hsep_dot has each. */
-static void solution_dot_abreast(const hsep_real *u, const hsep_lanes x[], hsep_word m, hsep_lanes sums[HSEP_OF_FOUR])
+static void solution_dot_abreast(const hsep_real *u, const hsep_lanes x[], hsep_int m, hsep_lanes sums[HSEP_OF_FOUR])
 {
     hsep_lanes of[4][HSEP_OF_FOUR];
-    hsep_word i = 0;
+    hsep_int i = 0;
     memset(of, 0, sizeof of);
     for (; i + 4 <= m; i += 4) {
-        for (hsep_word r = 0; r < 4; r++, x += HSEP_OF_FOUR) {
-            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        for (hsep_int r = 0; r < 4; r++, x += HSEP_OF_FOUR) {
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
                 of[r][l] += (u != NULL ? u[i + r] * x[l] : x[l] * x[l]);
             }
         }
     }
     for (; i < m; i++, x += HSEP_OF_FOUR) {
-        for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
             of[0][l] += (u != NULL ? u[i] * x[l] : x[l] * x[l]);
         }
     }
-    for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
         sums[l] = (of[0][l] + of[1][l]) + (of[2][l] + of[3][l]);
     }
 }
 
 /* The leverages of four rows side by side. */
-static void solution_leverages_abreast(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
-    const hsep_word m = self->n_head + self->n_tail;
+    const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *u = hsep_at(self, self->last), square = self->last_square, *rows = hsep_at(self, self->work);
     hsep_real *to = hsep_at(self, self->abreast);
     hsep_lanes along[HSEP_OF_FOUR], sums[HSEP_OF_FOUR], *x = hsep_lanes_at(to);
-    for (hsep_word c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
+    for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
         const hsep_real *row = rows + (m + 1) * (c < count ? c : count - 1);
-        for (hsep_word i = 0; i < m; i++) {
+        for (hsep_int i = 0; i < m; i++) {
             to[HSEP_SOLUTION_ABREAST * i + c] = row[i];
         }
     }
     solution_forward_abreast(self);
     if (square > 0.0) {
         solution_dot_abreast(u, x, m, along);
-        for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
             along[l] /= square;
         }
-        for (hsep_word i = 0; i < m; i++) {
-            for (hsep_word l = 0; l < HSEP_OF_FOUR; l++) {
+        for (hsep_int i = 0; i < m; i++) {
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
                 x[HSEP_OF_FOUR * i + l] -= along[l] * u[i];
             }
         }
     }
     solution_dot_abreast(NULL, x, m, sums);
     const hsep_real left = square / (1.0 + square);
-    for (hsep_word l = 0; square > 0.0 && l < HSEP_OF_FOUR; l++) {
+    for (hsep_int l = 0; square > 0.0 && l < HSEP_OF_FOUR; l++) {
         sums[l] += along[l] * along[l] * left;
     }
     memcpy(leverages, sums, sizeof sums);
@@ -363,7 +363,7 @@ static void solution_leverages_abreast(hsep_solution *self, hsep_word count, hse
 /* The leverage of a row y, (m + 1,), which is used up: along u, and the rest. */
 static hsep_real solution_leverage(hsep_solution *self, hsep_real y[])
 {
-    const hsep_word m = self->n_head + self->n_tail;
+    const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *u = hsep_at(self, self->last), square = self->last_square;
     y[m] = 0.0;
     hsep_cholesky_forward(hsep_at(self, self->factor), m + 1, m, y);
@@ -376,16 +376,16 @@ static hsep_real solution_leverage(hsep_solution *self, hsep_real y[])
     return hsep_dot(y, y, m) + along * along * left;
 }
 
-HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
+HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
-    const hsep_word width = self->n_head + self->n_tail + 1;
+    const hsep_int width = self->n_head + self->n_tail + 1;
 #if HSEP_LANES == 2
     if (count > 1) {
         solution_leverages_abreast(self, count, leverages);
         return;
     }
 #endif
-    for (hsep_word c = 0; c < count; c++) {
+    for (hsep_int c = 0; c < count; c++) {
         leverages[c] = solution_leverage(self, hsep_at(self, self->work) + width * c);
     }
 }

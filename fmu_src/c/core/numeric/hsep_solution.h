@@ -34,33 +34,33 @@
 #define HSEP_SOLUTION_ABREAST 4 /* rows that are taken in together, or whose leverages are computed side by side */
 
 typedef struct {
-    hsep_word n_head, n_tail; /* features */
-    hsep_word room;           /* rows that may wait */
-    hsep_word begun;          /* whether it has */
-    hsep_word factored;       /* rows of the head that are */
-    hsep_word waiting;        /* rows that have come since, and are not in the factor yet */
-    hsep_word finished;       /* whether left is valid, */
-    hsep_word completed;      /* and the tail is factored with its penalties */
-    hsep_real square;         /* sum of the squares of the targets */
-    hsep_real last_square;    /* u' u of the last row */
+    hsep_int n_head, n_tail; /* features */
+    hsep_int room;           /* rows that may wait */
+    hsep_int begun;          /* whether it has */
+    hsep_int factored;       /* rows of the head that are */
+    hsep_int waiting;        /* rows that have come since, and are not in the factor yet */
+    hsep_int finished;       /* whether left is valid, */
+    hsep_int completed;      /* and the tail is factored with its penalties */
+    hsep_real square;        /* sum of the squares of the targets */
+    hsep_real last_square;   /* u' u of the last row */
     /* Offsets in words from the beginning of the struct */
-    hsep_word penalties; /* (n_tail + n_head,) */
-    hsep_word weights;   /* (n_tail + n_head,) */
-    hsep_word factor;    /* triangle [R z; 0 rho] of the head backwards, tail and target, by rows */
-    hsep_word left;      /* triangle of tail and target: what the head leaves of them, without penalties */
-    hsep_word least;     /* (n_head + n_tail + 1,) bounds on the pivots */
-    hsep_word rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
-    hsep_word last;      /* (n_head + n_tail + 1,) u, and what the weights without the last row leave of its target */
-    hsep_word work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
-    hsep_word abreast;   /* the same side by side, where there are vectors */
+    hsep_int penalties; /* (n_tail + n_head,) */
+    hsep_int weights;   /* (n_tail + n_head,) */
+    hsep_int factor;    /* triangle [R z; 0 rho] of the head backwards, tail and target, by rows */
+    hsep_int left;      /* triangle of tail and target: what the head leaves of them, without penalties */
+    hsep_int least;     /* (n_head + n_tail + 1,) bounds on the pivots */
+    hsep_int rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
+    hsep_int last;      /* (n_head + n_tail + 1,) u, and what the weights without the last row leave of its target */
+    hsep_int work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
+    hsep_int abreast;   /* the same side by side, where there are vectors */
 } hsep_solution;
 
 HSEP_ASSERT_WORDS(hsep_solution, 19);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
-HSEP_API hsep_real hsep_solution_size(hsep_word n_head, hsep_word n_tail, hsep_word room);
-HSEP_API void hsep_solution_init(hsep_solution *self, hsep_word n_head, hsep_word n_tail, hsep_word room);
-HSEP_API int hsep_solution_valid(const void *block, hsep_word n_head, hsep_word n_tail, hsep_word room);
+HSEP_API hsep_real hsep_solution_size(hsep_int n_head, hsep_int n_tail, hsep_int room);
+HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room);
+HSEP_API int hsep_solution_valid(const void *block, hsep_int n_head, hsep_int n_tail, hsep_int room);
 
 /* Give up the rows and the factor so far; the next solution has not begun. */
 HSEP_API void hsep_solution_reset(hsep_solution *self);
@@ -75,7 +75,7 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
 
 /* Multiply-adds that it takes at most until the head is factored and has taken in the rows that wait, and as many as
  * are to come; with tail until it is completed. */
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_word to_come, int tail);
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come, int tail);
 
 /* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return
  * what is left of it; the last part may exceed it by up to 4 (n + 1)^2. With all everything is done, whatever the
@@ -95,6 +95,6 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart);
 /* phi' (R' R)^-1 phi, with all rows in R, of the first count of HSEP_SOLUTION_ABREAST rows phi, which are the block's
  * work, in that order, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2
  * multiply-adds for each; where there are vectors two cost as much as four. */
-HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_word count, hsep_real leverages[HSEP_SOLUTION_ABREAST]);
+HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST]);
 
 #endif

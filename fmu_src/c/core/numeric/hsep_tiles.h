@@ -15,10 +15,10 @@
 #define HSEP_TILE_STRIDE 32  /* numbers from tile to tile: the entries, then their carries */
 
 /* Place of entry (i, j), i <= j, of [U z] in tiles for 4 n_tiles columns. */
-static inline hsep_word hsep_tile_place(hsep_word n_tiles, hsep_word i, hsep_word j)
+static inline hsep_int hsep_tile_place(hsep_int n_tiles, hsep_int i, hsep_int j)
 {
-    const hsep_word row = i / HSEP_TILE, column = j / HSEP_TILE;
-    const hsep_word tile = row * n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
+    const hsep_int row = i / HSEP_TILE, column = j / HSEP_TILE;
+    const hsep_int tile = row * n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
     return HSEP_TILE_STRIDE * tile + 4 * (i % HSEP_TILE) + j % HSEP_TILE;
 }
 

@@ -39,7 +39,7 @@ static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
 }
 
 /* Entries of a vector to places stride apart. */
-static inline void hsep_lanes_spread(hsep_real to[], hsep_word stride, hsep_lanes a)
+static inline void hsep_lanes_spread(hsep_real to[], hsep_int stride, hsep_lanes a)
 {
 #if HSEP_LANES == 2
     to[0] = a[0];
@@ -51,11 +51,11 @@ static inline void hsep_lanes_spread(hsep_real to[], hsep_word stride, hsep_lane
 }
 
 /* sum_i a_i b_i, both (n,). */
-static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_word n)
+static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_int n)
 {
     hsep_lanes sums[HSEP_OF_FOUR];
     hsep_real s[4] = {0.0, 0.0, 0.0, 0.0};
-    hsep_word i = 0;
+    hsep_int i = 0;
     memcpy(sums, s, sizeof s);
     for (; i + 4 <= n; i += 4) {
         const hsep_lanes *x = hsep_lanes_const(a + i), *y = hsep_lanes_const(b + i);
@@ -71,10 +71,10 @@ static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_
 }
 
 /* sums_c := sum_i a_i b_c,i of four arrays side by side, all (n,): a is loaded once for all. */
-static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4], hsep_word n, hsep_real sums[4])
+static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4], hsep_int n, hsep_real sums[4])
 {
     const hsep_real *b0 = b[0], *b1 = b[1], *b2 = b[2], *b3 = b[3];
-    hsep_word i = 0;
+    hsep_int i = 0;
 #if HSEP_LANES == 2
     hsep_lanes s0 = {0.0}, s1 = {0.0}, s2 = {0.0}, s3 = {0.0};
     for (; i + 2 <= n; i += 2) {
@@ -103,10 +103,10 @@ static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4
 
 /* start + sum_i w_i e_i, both (n,), e a recursion's own values, newest first: the newest, which are only just computed,
  * come last, and older ones need not wait for them. */
-static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const hsep_real e[], hsep_word n)
+static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const hsep_real e[], hsep_int n)
 {
     if (n < 4) {
-        for (hsep_word i = n; i-- > 0;) {
+        for (hsep_int i = n; i-- > 0;) {
             start += w[i] * e[i];
         }
         return start;
@@ -116,9 +116,9 @@ static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const h
 }
 
 /* y += a x, both (n,). */
-static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real *restrict x, hsep_word n)
+static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real *restrict x, hsep_int n)
 {
-    hsep_word i = 0;
+    hsep_int i = 0;
     for (; i + 4 <= n; i += 4) {
         hsep_lanes *to = hsep_lanes_at(y + i);
         const hsep_lanes *from = hsep_lanes_const(x + i);
@@ -132,11 +132,11 @@ static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real
 }
 
 /* y -= sum_r a_r x_r over 4 or 8 arrays x_r, all (n,), one after the other: y is loaded and stored once for all. */
-static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], const hsep_real *const x[4], hsep_word n)
+static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], const hsep_real *const x[4], hsep_int n)
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
     const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
-    hsep_word j = 0;
+    hsep_int j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
         *hsep_lanes_at(y + j) =
             (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
@@ -150,10 +150,10 @@ static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], c
 
 /* The same over one, two or three arrays. */
 static inline void hsep_take_few(
-    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_word count, hsep_word n)
+    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_int count, hsep_int n)
 {
     const hsep_real a0 = a[0], *x0 = x[0];
-    hsep_word j = 0;
+    hsep_int j = 0;
     if (count == 1) {
         for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
             *hsep_lanes_at(y + j) -= a0 * *hsep_lanes_const(x0 + j);
@@ -174,12 +174,11 @@ static inline void hsep_take_few(
     }
 }
 
-static inline void hsep_take_eight(
-    hsep_real *restrict y, const hsep_real a[8], const hsep_real *const x[8], hsep_word n)
+static inline void hsep_take_eight(hsep_real *restrict y, const hsep_real a[8], const hsep_real *const x[8], hsep_int n)
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
     const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
-    hsep_word j = 0;
+    hsep_int j = 0;
     for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
         const hsep_lanes first =
             (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -

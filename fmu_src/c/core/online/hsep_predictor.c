@@ -27,7 +27,7 @@ static int predictor_settled(hsep_predictor *self)
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured)
 {
     const hsep_real x_meas = self->early ? self->next : measured;
-    const hsep_word i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
+    const hsep_int i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
     self->next = measured;
     /* x_meas was measured late samples ago. */
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
@@ -59,31 +59,31 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
 /* Correct the state at the beginning of the run, if its first residuals tell that it was in motion. */
 static void predictor_start(hsep_predictor *self)
 {
-    const hsep_word Np = self->Np, late = self->late;
+    const hsep_int Np = self->Np, late = self->late;
     hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
     hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
-    hsep_trusted *trusted = hsep_residual_trusted(hsep_predictor_model(self));
+    hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    hsep_real *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
+    hsep_real *e = hsep_at(self, self->past_e) + late, *work = hsep_at(averaged, averaged->x);
     const hsep_real *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
-    for (hsep_word j = 0; j < Np; j++) {
+    for (hsep_int j = 0; j < Np; j++) {
         work[j] = e[j] - e_h[j];
     }
     if (hsep_start_estimate(motion, command, work)) {
-        for (hsep_word j = 0; j < Np; j++) {
+        for (hsep_int j = 0; j < Np; j++) {
             e[j] += past_x[late + j];
         }
         hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
-        for (hsep_word j = 0; j < Np; j++) {
+        for (hsep_int j = 0; j < Np; j++) {
             e[j] -= past_x[late + j];
         }
-        hsep_trusted_begin_in_motion(trusted, command + late, past_x + late);
+        hsep_averaged_begin_in_motion(averaged, command + late, past_x + late);
     }
 }
 
 HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 {
-    const hsep_word n = self->n, late = self->late;
+    const hsep_int n = self->n, late = self->late;
     const hsep_residual_window window = hsep_predictor_window(self);
     hsep_residual_model *model = hsep_predictor_model(self);
     hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
@@ -100,7 +100,7 @@ HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 /* Keep the samples of the window that are not measured yet, before the next one. */
 static void predictor_keep(hsep_predictor *self)
 {
-    const hsep_word late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
+    const hsep_int late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
     memmove(command + self->Np, command, (size_t)late * sizeof(hsep_real));
     memmove(past_x + self->Np, past_x, (size_t)late * sizeof(hsep_real));
@@ -112,7 +112,7 @@ static void predictor_keep(hsep_predictor *self)
 
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
-    const hsep_word n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
+    const hsep_int n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
     const hsep_real *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
     hsep_real *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     predictor_keep(self);
@@ -128,7 +128,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 }
 
 /* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
-static void predictor_bound(hsep_predictor *self, hsep_word first, hsep_word last)
+static void predictor_bound(hsep_predictor *self, hsep_int first, hsep_int last)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
     if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb, last - first, HSEP_PREDICTION_MAX)) {
@@ -138,13 +138,13 @@ static void predictor_bound(hsep_predictor *self, hsep_word first, hsep_word las
     }
 }
 
-HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_word last)
+HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last)
 {
-    const hsep_word Np = self->Np, first = self->n_published;
+    const hsep_int Np = self->Np, first = self->n_published;
     const hsep_real *past_x = hsep_at(self, self->past_x);
     hsep_real *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
     hsep_real *x_hold = hsep_at(self, self->x_hold);
-    for (hsep_word i = first; i < last; i++) {
+    for (hsep_int i = first; i < last; i++) {
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
         x_hold[i] = x_pb[i] + self->held;
@@ -154,16 +154,16 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_word last)
 }
 
 /* Samples within the warm-up, of the window and the late ones before it. */
-static hsep_word predictor_warm_up(const hsep_predictor *self, hsep_word late)
+static hsep_int predictor_warm_up(const hsep_predictor *self, hsep_int late)
 {
     const hsep_real left = self->n_init - (hsep_real)(self->k - self->k % self->Np) + (hsep_real)late;
-    const hsep_word n = self->Np + late;
-    return left >= (hsep_real)n ? n : left > 0.0 ? (hsep_word)left : 0;
+    const hsep_int n = self->Np + late;
+    return left >= (hsep_real)n ? n : left > 0.0 ? (hsep_int)left : 0;
 }
 
-HSEP_API hsep_word hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
+HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
 
-HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, hsep_word last)
+HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last)
 {
     const hsep_uncertainty_signals signals = {
         .x_pb = hsep_at(self, self->past_x),
@@ -178,9 +178,9 @@ HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, 
 /* Take in commands and x_pb of the window that begins as they came, eq. (2), behind the late samples' values. */
 static void predictor_open(hsep_predictor *self)
 {
-    const hsep_word Np = self->Np;
+    const hsep_int Np = self->Np;
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    for (hsep_word i = 0; i < Np; i++) {
+    for (hsep_int i = 0; i < Np; i++) {
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
         past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
     }
@@ -193,10 +193,10 @@ static void predictor_open(hsep_predictor *self)
 /* Predict the next samples of the window; with the first of them also the late samples, which are not measured yet. */
 static void predictor_go_on(hsep_predictor *self)
 {
-    const hsep_word late = self->late, published = self->n_published, left = self->Np - published;
-    const hsep_word part = hsep_residual_part(hsep_predictor_model(self), published);
-    const hsep_word last = published + (left < part ? left : part);
-    const hsep_word first = published > 0 ? late + published : 0;
+    const hsep_int late = self->late, published = self->n_published, left = self->Np - published;
+    const hsep_int part = hsep_residual_part(hsep_predictor_model(self), published);
+    const hsep_int last = published + (left < part ? left : part);
+    const hsep_int first = published > 0 ? late + published : 0;
     const hsep_residual_window window = hsep_predictor_window(self);
     hsep_residual_predict(hsep_predictor_model(self), &window, first, late + last);
     hsep_predictor_publish(self, last);
@@ -206,22 +206,22 @@ static void predictor_go_on(hsep_predictor *self)
 /* Solve ahead of the next window, all of whose commands but the last are known. */
 static void predictor_settle(hsep_predictor *self)
 {
-    hsep_trusted *trusted = hsep_residual_trusted(hsep_predictor_model(self));
+    hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
     const hsep_real *ahead = hsep_at(self, self->ahead);
     hsep_real before = hsep_at(self, self->x_d)[self->Np - 1], peak = 0.0;
-    if (trusted == NULL) {
+    if (averaged == NULL) {
         return;
     }
-    for (hsep_word i = 0; i + 1 < self->Np; i++) {
+    for (hsep_int i = 0; i + 1 < self->Np; i++) {
         peak = hsep_fmax(peak, hsep_fabs(ahead[i] - before));
         before = ahead[i];
     }
-    hsep_trusted_settle(trusted, peak);
+    hsep_averaged_settle(averaged, peak);
 }
 
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
-    const hsep_word Np = self->Np;
+    const hsep_int Np = self->Np;
     const hsep_real relative = x_d_ahead - self->start;
     hsep_real *ahead_pb = hsep_at(self, self->ahead_pb);
     hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
@@ -245,7 +245,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     return 1;
 }
 
-HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_word i)
+HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i)
 {
     const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);
     return hsep_fmax(hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i], uncertainty->least);
@@ -258,7 +258,7 @@ static hsep_real predictor_rms(const hsep_predictor *self, hsep_real sum)
 
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
 {
-    const hsep_word i = self->k % self->Np;
+    const hsep_int i = self->k % self->Np;
     outputs->x_d = hsep_at_const(self, self->x_d)[i];
     outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
     outputs->x_h = hsep_at_const(self, self->x_h)[i];

@@ -14,9 +14,9 @@
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
  * Cost of a sample, with n features: as much as hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end
- * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust a sample
+ * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With averaging a sample
  * costs two hsep_gram_fold, before the end of a window a share of the next solutions (hsep_solution.h), and the end of
- * a window hsep_trusted_learn and hsep_trusted_forecast. The latter leaves most of the window that begins to the next
+ * a window hsep_averaged_learn and hsep_averaged_forecast. The latter leaves most of the window that begins to the next
  * samples: each of them does one hsep_residual_part. At the end of a first window whose commands begin in motion all
  * its rows are folded and the solutions factored at once.
  *
@@ -36,44 +36,44 @@
 
 typedef struct {
     hsep_predictor_settings settings;
-    hsep_trust_settings trust;
-    hsep_word preview;      /* samples from r(k) to the drive, >= Np; Np alone */
+    hsep_averaging_settings averaging;
+    hsep_int preview;       /* samples from r(k) to the drive, >= Np; Np alone */
     hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
-    hsep_word n_modes;      /* >= 1 */
+    hsep_int n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 
 struct hsep_predictor {
-    hsep_word Np, late, n, preview; /* n = Np + late */
-    hsep_word p, q;                 /* lags of e_pb and of x_pb */
+    hsep_int Np, late, n, preview; /* n = Np + late */
+    hsep_int p, q;                 /* lags of e_pb and of x_pb */
     hsep_real n_init;
     hsep_real start;                /* position of rest, m */
-    hsep_word k;                    /* index of the next sample */
-    hsep_word n_published;          /* samples of the window that are predicted */
-    hsep_word n_physics;            /* leading samples of the window where x_h = x_pb */
-    hsep_word n_measured;           /* samples since t_init */
+    hsep_int k;                     /* index of the next sample */
+    hsep_int n_published;           /* samples of the window that are predicted */
+    hsep_int n_physics;             /* leading samples of the window where x_h = x_pb */
+    hsep_int n_measured;            /* samples since t_init */
     hsep_real sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
     hsep_real sum_hold;             /* m2, the same if the last residual measured before each window were held */
-    hsep_real residual;   /* m, of the last sample measured, as published; 0 before any behind the first fill */
-    hsep_real held;       /* m, that before the window */
-    hsep_word early;      /* whether measurements come a sample early */
-    hsep_real next;       /* m, then the measurement of the next sample; NaN if it is missing */
-    hsep_word divergence; /* hsep_divergence of the first window that diverged; latched */
+    hsep_real residual;  /* m, of the last sample measured, as published; 0 before any behind the first fill */
+    hsep_real held;      /* m, that before the window */
+    hsep_int early;      /* whether measurements come a sample early */
+    hsep_real next;      /* m, then the measurement of the next sample; NaN if it is missing */
+    hsep_int divergence; /* hsep_divergence of the first window that diverged; latched */
     /* Offsets in words from the beginning of the struct */
-    hsep_word ahead;    /* (preview,) m, ring of the commands that came last */
-    hsep_word x_d;      /* (preview,) m, commands of the window and what follows it */
-    hsep_word x_pb;     /* (Np,) m, the window: physics-based predictions, */
-    hsep_word x_h;      /* (Np,) m, hybrid predictions, */
-    hsep_word x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
-    hsep_word ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    hsep_word command;  /* (n,) m, commands of the window relative to start, newest first */
-    hsep_word past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
-    hsep_word past_e;   /* (n + p,) m, e_pb likewise, as measured */
-    hsep_word e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
-    hsep_word physics, uncertainty;
-    hsep_word model;  /* the residual model */
-    hsep_word motion; /* the motion before the run; with trust, alone */
+    hsep_int ahead;    /* (preview,) m, ring of the commands that came last */
+    hsep_int x_d;      /* (preview,) m, commands of the window and what follows it */
+    hsep_int x_pb;     /* (Np,) m, the window: physics-based predictions, */
+    hsep_int x_h;      /* (Np,) m, hybrid predictions, */
+    hsep_int x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
+    hsep_int ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
+    hsep_int command;  /* (n,) m, commands of the window relative to start, newest first */
+    hsep_int past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
+    hsep_int past_e;   /* (n + p,) m, e_pb likewise, as measured */
+    hsep_int e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
+    hsep_int physics, uncertainty;
+    hsep_int model;  /* the residual model */
+    hsep_int motion; /* the motion before the run; with averaging, alone */
 };
 
 HSEP_ASSERT_WORDS(hsep_predictor, 35);
@@ -85,7 +85,7 @@ HSEP_API void hsep_predictor_block_init(
 
 /* Whether a block, in any alignment and of hsep_predictor_block_size(parameters) bytes, is a valid state for these
  * parameters at sample k: hsep_predictor_block_init would lay it out so, and every index lies within it. */
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_word k);
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_int k);
 
 /* The residual model, and its parameters. */
 HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
@@ -99,7 +99,7 @@ HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
-/* Finish a window: learn it with trust, and its errors; its residuals become the past of the next one. */
+/* Finish a window: learn it with averaging, and its errors; its residuals become the past of the next one. */
 HSEP_API void hsep_predictor_finish(hsep_predictor *self);
 
 /* Begin a window: commands and weights. */
@@ -109,13 +109,13 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self);
 
 /* Publish the samples of the window up to last - 1, whose x_pb are in past_x and residuals in e_h; eq. (4). */
-HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_word last);
+HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last);
 
 /* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published, their commands
  * being in command. */
-HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_word first, hsep_word last);
+HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last);
 
 /* Leading samples of the window in the warm-up. */
-HSEP_API hsep_word hsep_predictor_warm_up(const hsep_predictor *self);
+HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self);
 
 #endif

@@ -26,23 +26,23 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
 {
     return (hsep_residual_parameters){
         .settings = &parameters->settings,
-        .trust = &parameters->trust,
+        .averaging = &parameters->averaging,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
         .n = parameters->preview + hsep_late(&parameters->settings),
         .planned = parameters->planned};
 }
 
-/* Whether the state at the beginning of the run is corrected: with trust, alone. */
+/* Whether the state at the beginning of the run is corrected: with averaging, alone. */
 static int predictor_corrects_start(const hsep_predictor_parameters *parameters)
 {
-    return parameters->trust.trust && !parameters->planned;
+    return parameters->averaging.averaging && !parameters->planned;
 }
 
 /* Take a signal of the window, this long, and what is before it; return the offset of the window. */
-static hsep_word predictor_take(hsep_real *end, hsep_real late, hsep_real count)
+static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 {
-    return hsep_take(end, late + count) + (hsep_word)late;
+    return hsep_take(end, late + count) + (hsep_int)late;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -89,8 +89,8 @@ HSEP_API void hsep_predictor_block_init(
     memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
     (void)predictor_lay_out(self, parameters);
     self->start = self->next = start;
-    self->n_published = self->n_physics = self->Np;            /* the first fill is not predicted */
-    for (hsep_word i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
+    self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
+    for (hsep_int i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
         hsep_at(self, 0)[i] = start;
     }
     hsep_physics_init(
@@ -98,7 +98,7 @@ HSEP_API void hsep_predictor_block_init(
         parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n,
-        hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->trust.noise_std));
+        hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->averaging.noise_std));
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     hsep_residual_init(hsep_predictor_model(self), &model, start);
     if (self->motion) {
@@ -106,7 +106,7 @@ HSEP_API void hsep_predictor_block_init(
     }
 }
 
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_word k)
+HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_int k)
 {
     hsep_predictor got;
     memcpy(&got, block, sizeof got);
@@ -122,7 +122,7 @@ HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
     const hsep_real residuals[2] = {got.residual, got.held};
-    const int missing = isnan(got.next) && parameters->trust.trust;
+    const int missing = isnan(got.next) && parameters->averaging.averaging;
     sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX) &&
             (missing || hsep_within(&got.next, 1, HSEP_PREDICTION_MAX));
     for (int i = 0; i < 4; i++) {

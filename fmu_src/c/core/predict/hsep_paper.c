@@ -65,17 +65,17 @@ HSEP_API void hsep_paper_begin(hsep_paper *self)
 }
 
 HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last)
+    const hsep_paper *self, const hsep_residual_window *window, hsep_int first, hsep_int last)
 {
     const hsep_recursion recursion = hsep_paper_recursion(self, 1);
     hsep_recursion_run(&recursion, window->x_pb, window->e_h, self->n, first, last); /* Eq. (4) */
 }
 
 HSEP_API void hsep_recursion_run(
-    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_word n, hsep_word first, hsep_word last)
+    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_int n, hsep_int first, hsep_int last)
 {
-    for (hsep_word k = first; k < last; k++) {
-        const hsep_word j = n - 1 - k;
+    for (hsep_int k = first; k < last; k++) {
+        const hsep_int j = n - 1 - k;
         e[j] = self->bias + hsep_dot(self->w_x, x + j, self->q + 1) + hsep_dot(self->w_e, e + j + 1, self->p);
     }
 }

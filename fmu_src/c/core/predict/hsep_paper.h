@@ -15,17 +15,17 @@
 typedef struct {
     const hsep_real *w_x; /* (q + 1,), lags 0 ... q */
     const hsep_real *w_e; /* (p,), lags 1 ... p */
-    hsep_word p, q;
+    hsep_int p, q;
     hsep_real bias; /* m */
 } hsep_recursion;
 
 typedef struct {
-    hsep_word p, q;     /* lags of e_pb and of x_pb */
-    hsep_word n;        /* samples of a prediction, with the late ones */
-    hsep_word features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
+    hsep_int p, q;     /* lags of e_pb and of x_pb */
+    hsep_int n;        /* samples of a prediction, with the late ones */
+    hsep_int features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
     /* Offsets in words from the beginning of the struct */
-    hsep_word weights; /* (features,) w */
-    hsep_word regression;
+    hsep_int weights; /* (features,) w */
+    hsep_int regression;
 } hsep_paper;
 
 HSEP_ASSERT_WORDS(hsep_paper, 6);
@@ -44,7 +44,7 @@ HSEP_API void hsep_paper_begin(hsep_paper *self);
 
 /* Predict the residuals of samples first ... last - 1; eq. (4). */
 HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
+    const hsep_paper *self, const hsep_residual_window *window, hsep_int first, hsep_int last);
 
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias);
@@ -52,6 +52,6 @@ HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bi
 /* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past behind the window.
  * Cost: p + q + 1 multiply-adds a sample. */
 HSEP_API void hsep_recursion_run(
-    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_word n, hsep_word first, hsep_word last);
+    const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_int n, hsep_int first, hsep_int last);
 
 #endif

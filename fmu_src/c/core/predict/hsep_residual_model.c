@@ -5,17 +5,17 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Parts in which the trusted model predicts a window behind its first sample, as variances are dear. */
-static const hsep_word residual_parts = 25;
+/* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
+static const hsep_int residual_parts = 25;
 
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
 {
     return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
 }
 
-HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self)
+HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
 {
-    return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
+    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -26,8 +26,8 @@ static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual
     self->late = hsep_late(parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
-    self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(parameters)) : 0;
+    self->paper = parameters->averaging->averaging ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
+    self->averaged = parameters->averaging->averaging ? hsep_take_block(&end, hsep_averaged_size(parameters)) : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -39,8 +39,8 @@ HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters
 HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
     (void)residual_lay_out(self, parameters);
-    if (self->trusted) {
-        hsep_trusted_init(hsep_residual_trusted(self), parameters, start);
+    if (self->averaged) {
+        hsep_averaged_init(hsep_residual_averaged(self), parameters, start);
     } else {
         hsep_paper_init(hsep_residual_paper(self), parameters->settings);
     }
@@ -50,36 +50,36 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
 {
     hsep_residual_model got;
     return HSEP_LAID_OUT(got, block, residual_lay_out(&got, parameters)) && got.learning <= 1 &&
-           (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), parameters)
-                        : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
+           (got.averaged ? hsep_averaged_valid(hsep_at_bytes(block, got.averaged), parameters)
+                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
 }
 
-/* Gram matrix of a factor of the trusted model. */
-static hsep_gram *residual_gram(hsep_residual_model *self, hsep_word factor)
+/* Gram matrix of a factor of the averaged model. */
+static hsep_gram *residual_gram(hsep_residual_model *self, hsep_int factor)
 {
-    return hsep_evidence_of_run(hsep_trusted_evidence(hsep_residual_trusted(self), factor));
+    return hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(self), factor));
 }
 
-HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self)
+HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self)
 {
-    return self->trusted ? HSEP_N_RESIDUALS : 1;
+    return self->averaged ? HSEP_N_RESIDUALS : 1;
 }
 
-HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor)
+HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor)
 {
-    return self->trusted ? residual_gram(self, factor)->n : hsep_paper_regression(hsep_residual_paper(self))->n;
+    return self->averaged ? residual_gram(self, factor)->n : hsep_paper_regression(hsep_residual_paper(self))->n;
 }
 
-HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor)
+HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_int factor)
 {
-    return self->trusted ? hsep_gram_row(residual_gram(self, factor))
-                         : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
+    return self->averaged ? hsep_gram_row(residual_gram(self, factor))
+                          : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
 }
 
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_real n_rows)
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows)
 {
     int loaded = n_rows >= 0.0 && n_rows <= HSEP_PREDICTION_MAX;
-    if (self->trusted) {
+    if (self->averaged) {
         hsep_gram *gram = residual_gram(self, factor);
         loaded = loaded && hsep_gram_load(gram, i);
         gram->n_rows = n_rows;
@@ -91,42 +91,42 @@ HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hse
     return loaded;
 }
 
-HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self)
+HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
 {
-    return self->trusted ? hsep_trusted_n_learned(hsep_residual_trusted(self)) : 0;
+    return self->averaged ? hsep_averaged_n_learned(hsep_residual_averaged(self)) : 0;
 }
 
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
 {
-    return self->trusted ? &hsep_residual_trusted(self)->learned.velocity_scale : NULL;
+    return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
 }
 
 HSEP_API int hsep_residual_sound(hsep_residual_model *self)
 {
-    return !self->trusted || hsep_trusted_sound(hsep_residual_trusted(self));
+    return !self->averaged || hsep_averaged_sound(hsep_residual_averaged(self));
 }
 
 HSEP_API void hsep_residual_restart(hsep_residual_model *self)
 {
-    if (self->trusted) {
-        hsep_trusted_restart(hsep_residual_trusted(self));
+    if (self->averaged) {
+        hsep_averaged_restart(hsep_residual_averaged(self));
     }
 }
 
-HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->trusted != 0; }
+HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->averaged != 0; }
 
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 {
     self->learning = learning != 0;
-    if (!self->trusted) {
+    if (!self->averaged) {
         hsep_paper_begin(hsep_residual_paper(self));
     }
 }
 
-HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self, hsep_word predicted)
+HSEP_API hsep_int hsep_residual_part(const hsep_residual_model *self, hsep_int predicted)
 {
-    const hsep_word part = (self->Np - 1) / residual_parts + 1;
-    if (!self->trusted) {
+    const hsep_int part = (self->Np - 1) / residual_parts + 1;
+    if (!self->averaged) {
         return self->Np;
     }
     /* The first part comes with the weights; variances of the others side by side. */
@@ -134,32 +134,32 @@ HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self, hsep_word
 }
 
 HSEP_API void hsep_residual_predict(
-    hsep_residual_model *self, const hsep_residual_window *window, hsep_word first, hsep_word last)
+    hsep_residual_model *self, const hsep_residual_window *window, hsep_int first, hsep_int last)
 {
-    if (!self->trusted) {
+    if (!self->averaged) {
         hsep_paper_predict(hsep_residual_paper(self), window, first, last);
     } else if (first == 0) {
-        hsep_trusted_forecast(hsep_residual_trusted(self), window->command, window->x_pb, NULL, 0, window->e_h, last);
+        hsep_averaged_forecast(hsep_residual_averaged(self), window->command, window->x_pb, NULL, 0, window->e_h, last);
     } else {
-        hsep_trusted_go_on(hsep_residual_trusted(self), window->x_pb, window->e_h, first, last, 1);
+        hsep_averaged_go_on(hsep_residual_averaged(self), window->x_pb, window->e_h, first, last, 1);
     }
 }
 
 HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self)
 {
-    hsep_trusted *trusted = hsep_residual_trusted(self);
-    return trusted != NULL ? hsep_at(trusted, trusted->variance) + (trusted->n - self->n) : NULL;
+    hsep_averaged *averaged = hsep_residual_averaged(self);
+    return averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL;
 }
 
 HSEP_API void hsep_residual_take_in(
     hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
 {
-    if (self->trusted) {
-        hsep_trusted *trusted = hsep_residual_trusted(self);
-        hsep_trusted_measure(trusted, sample->i, sample->relative);
+    if (self->averaged) {
+        hsep_averaged *averaged = hsep_residual_averaged(self);
+        hsep_averaged_measure(averaged, sample->i, sample->relative);
         if (self->learning && sample->settled) {
-            hsep_trusted_follow(
-                trusted, window->command + self->late, window->x_pb + self->late, window->e + self->late,
+            hsep_averaged_follow(
+                averaged, window->command + self->late, window->x_pb + self->late, window->e + self->late,
                 sample->i + 1);
         }
     } else if (self->learning) {
@@ -169,10 +169,10 @@ HSEP_API void hsep_residual_take_in(
 
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window)
 {
-    const hsep_word late = self->late;
-    if (self->trusted && (self->learning || self->planned)) {
-        hsep_trusted_learn(
-            hsep_residual_trusted(self), window->command + late, window->x_pb + late, window->e + late,
+    const hsep_int late = self->late;
+    if (self->averaged && (self->learning || self->planned)) {
+        hsep_averaged_learn(
+            hsep_residual_averaged(self), window->command + late, window->x_pb + late, window->e + late,
             self->learning != 0);
     }
     return self->learning != 0;
@@ -180,16 +180,16 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
 
 HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
 {
-    hsep_trusted *trusted = hsep_residual_trusted(self);
-    return trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL;
+    hsep_averaged *averaged = hsep_residual_averaged(self);
+    return averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL;
 }
 
 HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self)
 {
-    return self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->reach.farthest : 0.0;
+    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->reach.farthest : 0.0;
 }
 
-HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self)
+HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
 {
-    return self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->n_rejected : 0;
+    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
 }

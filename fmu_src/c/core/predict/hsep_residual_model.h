@@ -1,9 +1,9 @@
-/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the trusted one (hsep_averaged_model.h); as
+/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the averaged one (hsep_averaged_model.h); as
  * predict/residual_model.py.
  *
  * The block holds one of them, and each function calls its counterpart. For a window: hsep_residual_begin; _predict,
  * which may go on in parts while _take_in takes its samples; _finish. A compensator plans with what hsep_residual_paper
- * or _trusted gives. A block as hsep_layout.h has them.
+ * or _averaged gives. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_RESIDUAL_MODEL_H
 #define HSEP_RESIDUAL_MODEL_H
@@ -12,11 +12,11 @@
 #include "hsep_averaged_model.h"
 
 typedef struct {
-    hsep_word Np, late, n; /* samples of a window, late samples before it, both */
-    hsep_word planned;     /* whether a compensator decides the commands */
-    hsep_word learning;    /* whether the window is learned */
+    hsep_int Np, late, n; /* samples of a window, late samples before it, both */
+    hsep_int planned;     /* whether a compensator decides the commands */
+    hsep_int learning;    /* whether the window is learned */
     /* Offsets in words from the beginning of the struct; one of them is 0 */
-    hsep_word paper, trusted;
+    hsep_int paper, averaged;
 } hsep_residual_model;
 
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
@@ -29,20 +29,20 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
 
 /* The implementation; NULL if it is the other one. */
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
-HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
+HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self);
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
  * one of them. The first one has the rows of the physics model's residual. */
-HSEP_API hsep_word hsep_residual_n_factors(const hsep_residual_model *self);
-HSEP_API hsep_word hsep_residual_n_features(hsep_residual_model *self, hsep_word factor);
+HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self);
+HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor);
 
 /* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_rows: rows that the
  * factor is from, weighted. */
-HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_word factor);
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_word factor, hsep_word i, hsep_real n_rows);
+HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_int factor);
+HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows);
 
-/* Numbers learned besides them, the first of so many, and whether they are in range; none without trust. */
-HSEP_API hsep_word hsep_residual_n_learned(hsep_residual_model *self);
+/* Numbers learned besides them, the first of so many, and whether they are in range; none without averaging. */
+HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self);
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 HSEP_API int hsep_residual_sound(hsep_residual_model *self);
 
@@ -56,11 +56,11 @@ HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
 /* Samples that are predicted in one go, where so many of the window are predicted. Constant cost. */
-HSEP_API hsep_word hsep_residual_part(const hsep_residual_model *self, hsep_word predicted);
+HSEP_API hsep_int hsep_residual_part(const hsep_residual_model *self, hsep_int predicted);
 
 /* Predict the residuals of samples first ... last - 1; first is 0, or where the last call ended. */
 HSEP_API void hsep_residual_predict(
-    hsep_residual_model *self, const hsep_residual_window *window, hsep_word first, hsep_word last);
+    hsep_residual_model *self, const hsep_residual_window *window, hsep_int first, hsep_int last);
 
 /* What the model knows of the errors of a predicted window, (n,) m2, newest first; NULL: nothing. */
 HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self);
@@ -80,6 +80,6 @@ HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self);
 HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self);
 
 /* Measurements of this run that were missing or not plausible. */
-HSEP_API hsep_word hsep_residual_n_rejected(const hsep_residual_model *self);
+HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self);
 
 #endif

@@ -11,7 +11,7 @@ static const hsep_range uncertainty_ranges[] = {HSEP_UNCERTAINTY_RANGES};
 static const hsep_real uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_word Np, hsep_word n)
+static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_uncertainty);
     self->Np = Np;
@@ -22,7 +22,7 @@ static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_word Np, hsep_
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n)
+HSEP_API hsep_real hsep_uncertainty_size(hsep_int Np, hsep_int n)
 {
     return uncertainty_lay_out(&(hsep_uncertainty){0}, Np, n);
 }
@@ -33,7 +33,7 @@ HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real n
                            : hsep_fmin(HSEP_UNCERTAINTY_UNKNOWN_NOISE * lambda, HSEP_PREDICTION_MAX);
 }
 
-HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_word n, hsep_real variance)
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_int n, hsep_real variance)
 {
     memset(self, 0, (size_t)hsep_uncertainty_size(Np, n));
     (void)uncertainty_lay_out(self, Np, n);
@@ -42,7 +42,7 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_w
     self->factor = self->ratio = 1.0;
 }
 
-HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n)
+HSEP_API int hsep_uncertainty_valid(const void *block, hsep_int Np, hsep_int n)
 {
     hsep_uncertainty got;
     return HSEP_LAID_OUT(got, block, uncertainty_lay_out(&got, Np, n)) && hsep_uncertainty_sound(&got) &&
@@ -62,20 +62,20 @@ static hsep_real uncertainty_variance(const hsep_uncertainty *self, const hsep_r
 }
 
 /* Place of sample k in a usual window, from -1/2 at its beginning to 1/2 at its end. */
-static hsep_real uncertainty_from_middle(const hsep_uncertainty *self, hsep_word k)
+static hsep_real uncertainty_from_middle(const hsep_uncertainty *self, hsep_int k)
 {
     return hsep_fmin(((hsep_real)k + 0.5) / (hsep_real)self->Np, 1.0) - 0.5;
 }
 
 /* Components of the variance at place j, as they are at once. */
 static void uncertainty_at(
-    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word j,
+    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int j,
     hsep_real f[HSEP_UNCERTAINTY_N_COMPONENTS])
 {
     const hsep_real *x_pb = signals->x_pb;
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     /* The first sample has the difference of the second. */
-    const hsep_word newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
+    const hsep_int newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
     const int stacked = signals->variance != NULL && n - 1 - j >= signals->n_physics;
     f[0] = 1.0;
     const hsep_real change = hsep_fmin(hsep_fabs(x_pb[newer] - x_pb[older]), HSEP_PREDICTION_MAX);
@@ -84,15 +84,15 @@ static void uncertainty_at(
 }
 
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word first, hsep_word last)
+    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int first, hsep_int last)
 {
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     const hsep_real gain = 1.0 / (1.0 + HSEP_UNCERTAINTY_FELT_FOR * (hsep_real)self->Np);
     hsep_real *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std), *felt = self->felt;
     if (first == 0) {
         memset(felt, 0, sizeof self->felt);
     }
-    for (hsep_word k = first; k < last; k++) { /* in time, from the last measured sample on */
+    for (hsep_int k = first; k < last; k++) { /* in time, from the last measured sample on */
         published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
         hsep_real *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_UNCERTAINTY_N_COMPONENTS;
         uncertainty_at(self, signals, n - 1 - k, f);
@@ -163,12 +163,12 @@ static void uncertainty_step_by(
 
 HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[], const hsep_real accepted[])
 {
-    const hsep_word newest = self->n - self->Np; /* place of the last one that is measured */
+    const hsep_int newest = self->n - self->Np; /* place of the last one that is measured */
     const hsep_real *e_h = hsep_at(self, self->e_h) + newest, *std = hsep_at(self, self->std) + newest;
     const hsep_real *f = hsep_at(self, self->components) + newest * HSEP_UNCERTAINTY_N_COMPONENTS;
     hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS] = {0.0}, total[HSEP_UNCERTAINTY_N_COMPONENTS] = {0.0};
     uncertainty_sums sums = {0};
-    for (hsep_word j = 0; j < self->Np; j++) {
+    for (hsep_int j = 0; j < self->Np; j++) {
         if (accepted == NULL || accepted[j] > 0.0) {
             uncertainty_add(&sums, e[j], e[j] - e_h[j], std[j], uncertainty_from_middle(self, self->Np - 1 - j));
         }
@@ -177,7 +177,7 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[]
         return;
     }
     uncertainty_follow(self, &sums);
-    for (hsep_word j = 0; j < self->Np; j++, f += HSEP_UNCERTAINTY_N_COMPONENTS) {
+    for (hsep_int j = 0; j < self->Np; j++, f += HSEP_UNCERTAINTY_N_COMPONENTS) {
         if (accepted == NULL || accepted[j] > 0.0) {
             const hsep_real variance = uncertainty_variance(self, f);
             const hsep_real error = e[j] - e_h[j],

@@ -15,32 +15,32 @@
 #define HSEP_N_UNCERTAINTY (2 * HSEP_UNCERTAINTY_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 
 typedef struct {
-    hsep_word Np;
+    hsep_int Np;
     hsep_real theta[HSEP_UNCERTAINTY_N_COMPONENTS];    /* variance of the noise, m2; others relative to their causes */
     hsep_real evidence[HSEP_UNCERTAINTY_N_COMPONENTS]; /* windows that each stands on, faded */
     hsep_real factor;                                  /* c in the middle of a window */
     hsep_real ratio;                                   /* c at its end relative to that at its beginning */
     hsep_real recent; /* m2, recent mean square of the residual; 0 before the first window */
-    hsep_word n;      /* samples that are predicted */
+    hsep_int n;       /* samples that are predicted */
     hsep_real least;  /* m, what is published at least: the largest residual, if the last ones were rejected */
     hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, components averaged over time, up to the last sample */
     /* Offsets in words from the beginning of the struct */
-    hsep_word e_h;        /* (n,) m, residual of the window as published */
-    hsep_word components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */
-    hsep_word std;        /* (n,) m, standard deviation of the error */
+    hsep_int e_h;        /* (n,) m, residual of the window as published */
+    hsep_int components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */
+    hsep_int std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
 HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
-HSEP_API hsep_real hsep_uncertainty_size(hsep_word Np, hsep_word n);
+HSEP_API hsep_real hsep_uncertainty_size(hsep_int Np, hsep_int n);
 
 /* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
  * given standard deviation, m, or 0. */
 HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real noise_std);
 
 /* Fill the block. variance: that first one. */
-HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_word Np, hsep_word n, hsep_real variance);
-HSEP_API int hsep_uncertainty_valid(const void *block, hsep_word Np, hsep_word n);
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_int n, hsep_real variance);
+HSEP_API int hsep_uncertainty_valid(const void *block, hsep_int Np, hsep_int n);
 
 /* Whether the numbers learned, (HSEP_N_UNCERTAINTY,) from theta on, are in range. */
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
@@ -49,14 +49,14 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 typedef struct {
     const hsep_real *x_pb;     /* (n,) m, physics-based prediction */
     const hsep_real *e_h;      /* (n,) m, predicted residual */
-    hsep_word n_physics;       /* leading samples where it is not published */
+    hsep_int n_physics;        /* leading samples where it is not published */
     const hsep_real *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
 } hsep_uncertainty_signals;
 
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at
  * least two, or n, as differences are taken. */
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_word first, hsep_word last);
+    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int first, hsep_int last);
 
 /* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
  * all of them. */

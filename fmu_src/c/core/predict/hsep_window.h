@@ -11,10 +11,10 @@
 /* Parameters of a model. */
 typedef struct {
     const hsep_predictor_settings *settings;
-    const hsep_trust_settings *trust;
+    const hsep_averaging_settings *averaging;
     const hsep_mode *modes; /* (n_modes,) */
-    hsep_word n_modes;
-    hsep_word n; /* samples of a prediction: of a window, or a compensator's preview, and before it the late ones */
+    hsep_int n_modes;
+    hsep_int n;  /* samples of a prediction: of a window, or a compensator's preview, and before it the late ones */
     int planned; /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 
@@ -27,7 +27,7 @@ typedef struct {
 
 /* A sample of it whose measurement came. */
 typedef struct {
-    hsep_word i;            /* sample of the window, 0 ... Np - 1 */
+    hsep_int i;             /* sample of the window, 0 ... Np - 1 */
     hsep_real relative;     /* m, measured position relative to the start */
     const hsep_real *x, *e; /* the window's x_pb and e from this sample on, and before it */
     int settled;            /* whether the window's commands and x_pb will not change any more */

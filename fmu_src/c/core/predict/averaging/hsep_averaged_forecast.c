@@ -1,4 +1,4 @@
-/* Prediction by a residual model that can be trusted. */
+/* Prediction by an averaged residual model. */
 #include "hsep_averaged_model.h"
 
 #include "hsep_math.h"
@@ -8,15 +8,15 @@
 
 /* Take the scales of velocity and command; return whether the commanded velocity outgrows what was learned. A
  * compensator begins to move before the path, with a creep: its first scale is the path's. */
-static int trusted_outgrown(hsep_trusted *self, const hsep_real x_d[], const hsep_real path[], hsep_word n_path)
+static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const hsep_real path[], hsep_int n_path)
 {
     const hsep_real before = self->learned.velocity_scale;
-    hsep_real peak = hsep_disturbances_peak_velocity(hsep_trusted_disturbances(self), x_d, self->n);
-    hsep_real most = HSEP_TRUST_OUTGROWN * before;
+    hsep_real peak = hsep_disturbances_peak_velocity(hsep_averaged_disturbances(self), x_d, self->n);
+    hsep_real most = HSEP_AVERAGING_VELOCITY_JUMP * before;
     self->forecast_step = hsep_fmax(self->learned.largest_step, peak * self->T_s);
-    if (path != NULL && hsep_evidence_n_rows(hsep_trusted_evidence(self, HSEP_OF_PHYSICS)) == 0.0) {
+    if (path != NULL && hsep_warm_start_n_rows(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL)) == 0.0) {
         peak = 0.0;
-        for (hsep_word j = 0; j + 1 < n_path; j++) {
+        for (hsep_int j = 0; j + 1 < n_path; j++) {
             peak = hsep_fmax(peak, hsep_fabs(path[j] - path[j + 1]));
         }
         peak = hsep_fmax(peak / self->T_s, before);
@@ -27,20 +27,20 @@ static int trusted_outgrown(hsep_trusted *self, const hsep_real x_d[], const hse
     return outgrown;
 }
 
-/* Take the scales of the features from the samples that come next; return as trusted_outgrown. */
-static int trusted_scale(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path)
+/* Take the scales of the features from the samples that come next; return as averaged_outgrown. */
+static int averaged_scale(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path)
 {
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    const int outgrown = trusted_outgrown(self, x_d, path, n_path);
+    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    const int outgrown = averaged_outgrown(self, x_d, path, n_path);
     hsep_real *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
-    for (hsep_word i = 0; i < self->n_static; i++) {
+    for (hsep_int i = 0; i < self->n_static; i++) {
         largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
     }
-    for (hsep_word k = 0; k < self->n; k++, rows += self->n_static) {
-        for (hsep_word i = 0; i < self->n_static; i++) {
+    for (hsep_int k = 0; k < self->n; k++, rows += self->n_static) {
+        for (hsep_int i = 0; i < self->n_static; i++) {
             const hsep_real size = hsep_fabs(rows[i]);
             largest[i] = size > largest[i] ? size : largest[i];
         }
@@ -50,92 +50,93 @@ static int trusted_scale(
 
 /* Whether the scales of the command's expert are those of one sample before the window: not where nothing has moved
  * before its last command. */
-static int trusted_is_early(const hsep_trusted *self)
+static int averaged_is_early(const hsep_averaged *self)
 {
     return self->settled && self->early_square > 0.0 && (self->early_step > 0.0 || self->forecast_step == 0.0);
 }
 
-HSEP_API void hsep_trusted_priors(hsep_trusted *self, hsep_word expert, hsep_real scales[])
+HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[])
 {
-    const hsep_word kind = hsep_trusted_kind_of(self, expert);
-    const int of_command = kind == HSEP_OF_COMMAND, is_early = of_command && trusted_is_early(self);
+    const hsep_int kind = hsep_averaged_kind_of(self, expert);
+    const int of_command = kind == HSEP_COMMAND_RESIDUAL, is_early = of_command && averaged_is_early(self);
     const hsep_real square = is_early ? self->early_square : self->learned.scales[kind].largest_square;
     const hsep_real step = is_early ? self->early_step : self->forecast_step;
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
-    for (hsep_word i = 0; i < hsep_trusted_expert(self, expert)->n_static; i++) {
+    for (hsep_int i = 0; i < hsep_averaged_expert(self, expert)->n_static; i++) {
         const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];
         const hsep_real largest = !of_command ? of_motion : i > 0 ? step : 1.0;
-        const hsep_real share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
-                                           : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        const hsep_real share = of_command ? hsep_command_share(hsep_averaged_command(self), i)
+                                           : hsep_disturbances_share(hsep_averaged_disturbances(self), i);
         scales[i] = effect * share / hsep_fmax(largest, HSEP_AVERAGING_LEAST);
     }
 }
 
 /* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
-static void trusted_solve(hsep_trusted *self, hsep_word place, hsep_real weight)
+static void averaged_solve(hsep_averaged *self, hsep_int place, hsep_real weight)
 {
-    hsep_evidence *evidence = hsep_trusted_evidence(self, hsep_trusted_kind_of(self, place));
-    const hsep_real n_rows = hsep_evidence_of_run(evidence)->n_rows + weight * hsep_evidence_earlier(evidence)->n_rows;
-    hsep_real scales[HSEP_TRUSTED_MOST];
-    hsep_trusted_priors(self, place, scales);
-    hsep_solution *solution = hsep_trusted_begun(self, place);
-    solution->completed = solution->completed && trusted_is_early(self);
+    hsep_warm_start *evidence = hsep_averaged_evidence(self, hsep_averaged_kind_of(self, place));
+    const hsep_real n_rows =
+        hsep_warm_start_of_run(evidence)->n_rows + weight * hsep_warm_start_earlier(evidence)->n_rows;
+    hsep_real scales[HSEP_AVERAGED_MOST];
+    hsep_averaged_priors(self, place, scales);
+    hsep_solution *solution = hsep_averaged_begun(self, place);
+    solution->completed = solution->completed && averaged_is_early(self);
     /* apart in a predictor: a compensator has more variances to compute */
-    hsep_expert_solve(hsep_trusted_expert(self, place), n_rows, scales, self->settled != 0);
+    hsep_expert_solve(hsep_averaged_expert(self, place), n_rows, scales, self->settled != 0);
 }
 
 /* Solve for the weights of the experts that know something. */
-static void trusted_solved(hsep_trusted *self, int outgrown)
+static void averaged_solved(hsep_averaged *self, int outgrown)
 {
-    hsep_word *predicted = self->predicted, known[HSEP_N_RESIDUALS];
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-        known[i] =
-            hsep_evidence_n_rows(hsep_trusted_evidence(self, i)) > 0.0 && self->learned.scales[i].largest_square > 0.0;
+    hsep_int *predicted = self->predicted, known[HSEP_N_RESIDUALS];
+    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
+        known[i] = hsep_warm_start_n_rows(hsep_averaged_evidence(self, i)) > 0.0 &&
+                   self->learned.scales[i].largest_square > 0.0;
     }
     predicted[HSEP_HOLD] = 1;
-    predicted[HSEP_LAGGED] = predicted[HSEP_STATIC] = known[HSEP_OF_PHYSICS] && !outgrown;
-    predicted[HSEP_COMMAND] = known[HSEP_OF_COMMAND];
-    predicted[HSEP_DOUBTING] = predicted[self->leading] && hsep_trusted_doubts(self);
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        predicted[i] = predicted[i] && hsep_trusted_expert(self, i)->variance > 0.0;
+    predicted[HSEP_ARX_RESIDUAL] = predicted[HSEP_STATIC] = known[HSEP_MODEL_RESIDUAL] && !outgrown;
+    predicted[HSEP_ARX_COMMAND] = known[HSEP_COMMAND_RESIDUAL];
+    predicted[HSEP_FRESH_START] = predicted[self->leading] && hsep_averaged_doubts(self);
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+        predicted[i] = predicted[i] && hsep_averaged_expert(self, i)->variance > 0.0;
         if (predicted[i]) {
-            trusted_solve(self, i, i == HSEP_DOUBTING ? HSEP_TRUST_LESS : 1.0);
+            averaged_solve(self, i, i == HSEP_FRESH_START ? HSEP_AVERAGING_WARM_PRIOR_WEIGHT : 1.0);
         }
     }
 }
 
 /* Largest step of the command relative to that before the window, >= 1, where its expert leads: it is linear in the
  * command, and may predict as much more than anything so far. */
-static hsep_real trusted_growth(const hsep_trusted *self)
+static hsep_real averaged_growth(const hsep_averaged *self)
 {
     const hsep_learned *learned = &self->learned;
-    if (!(learned->largest_step > 0.0 && hsep_stack_leader(&learned->stack) == HSEP_COMMAND)) {
+    if (!(learned->largest_step > 0.0 && hsep_stack_leader(&learned->stack) == HSEP_ARX_COMMAND)) {
         return 1.0;
     }
-    return hsep_fmin(self->forecast_step / learned->largest_step, HSEP_TRUST_GROWTH);
+    return hsep_fmin(self->forecast_step / learned->largest_step, HSEP_AVERAGING_GROWTH);
 }
 
 /* Features without lags of an expert, sample after sample. */
-static const hsep_real *trusted_rows(hsep_trusted *self, hsep_word expert)
+static const hsep_real *averaged_rows(hsep_averaged *self, hsep_int expert)
 {
-    hsep_command *command = hsep_trusted_command(self);
-    return hsep_trusted_kind_of(self, expert) == HSEP_OF_COMMAND ? hsep_at(command, command->rows)
-                                                                 : hsep_at(self, self->rows);
+    hsep_command *command = hsep_averaged_command(self);
+    return hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL ? hsep_at(command, command->rows)
+                                                                        : hsep_at(self, self->rows);
 }
 
 /* Begin the prediction of commands x_d by the experts that know something. past: (p,) m, the last residuals of the
  * physics model. */
-static void trusted_begin(hsep_trusted *self, const hsep_real x_d[], const hsep_real past[])
+static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hsep_real past[])
 {
-    const hsep_residual_scale *of_physics = &self->learned.scales[HSEP_OF_PHYSICS];
-    const hsep_residual_scale *of_command = &self->learned.scales[HSEP_OF_COMMAND];
+    const hsep_residual_scale *of_physics = &self->learned.scales[HSEP_MODEL_RESIDUAL];
+    const hsep_residual_scale *of_command = &self->learned.scales[HSEP_COMMAND_RESIDUAL];
     const hsep_real *past_of_command = hsep_at(self, self->e_0) + self->Np, growth = self->growth;
     const hsep_real most = growth * of_command->largest, square = growth * growth * of_command->largest_square;
-    hsep_command_take(hsep_trusted_command(self), x_d, self->n);
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        hsep_expert *expert = hsep_trusted_expert(self, i);
-        if (self->predicted[i] && hsep_trusted_kind_of(self, i) == HSEP_OF_COMMAND) {
-            hsep_expert_begin(expert, past_of_command, square, HSEP_TRUST_BOUND_OF_COMMAND * most);
+    hsep_command_take(hsep_averaged_command(self), x_d, self->n);
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+        hsep_expert *expert = hsep_averaged_expert(self, i);
+        if (self->predicted[i] && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL) {
+            hsep_expert_begin(expert, past_of_command, square, HSEP_AVERAGING_BOUND_OF_COMMAND * most);
         } else if (self->predicted[i]) {
             hsep_expert_begin(expert, past, of_physics->largest_square, self->bound);
         }
@@ -143,31 +144,31 @@ static void trusted_begin(hsep_trusted *self, const hsep_real x_d[], const hsep_
 }
 
 /* What an expert that has predicted adds to the physics model, m, at places begin ... end - 1. */
-static void trusted_take(hsep_trusted *self, hsep_word place, const hsep_real x_pb[], hsep_word begin, hsep_word end)
+static void averaged_take(hsep_averaged *self, hsep_int place, const hsep_real x_pb[], hsep_int begin, hsep_int end)
 {
-    const hsep_expert *expert = hsep_trusted_expert(self, place);
-    const hsep_real *late = hsep_command_late(hsep_trusted_command(self), self->n);
+    const hsep_expert *expert = hsep_averaged_expert(self, place);
+    const hsep_real *late = hsep_command_late(hsep_averaged_command(self), self->n);
     const hsep_real *e_h = hsep_at_const(expert, expert->e_h), most = self->growth * self->bound;
-    const int of_command = hsep_trusted_kind_of(self, place) == HSEP_OF_COMMAND;
+    const int of_command = hsep_averaged_kind_of(self, place) == HSEP_COMMAND_RESIDUAL;
     hsep_real *stacked = hsep_at(self, self->stacked) + place * self->n;
-    for (hsep_word j = begin; j < end; j++) {
+    for (hsep_int j = begin; j < end; j++) {
         stacked[j] = of_command ? hsep_clip(e_h[j] + late[j] - x_pb[j], most) : e_h[j];
     }
 }
 
 /* e: the stack of the experts, which have predicted the places begin ... end - 1. */
-static void trusted_stack(hsep_trusted *self, hsep_real e[], hsep_word begin, hsep_word end)
+static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, hsep_int end)
 {
     const hsep_real *weights = self->learned.stack.weights, *stacked = hsep_at(self, self->stacked);
     hsep_real *variance = hsep_at(self, self->variance);
-    for (hsep_word j = begin; j < end; j++) {
+    for (hsep_int j = begin; j < end; j++) {
         hsep_real sum = 0.0, square = 0.0;
-        for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
             const hsep_real predicted = stacked[i * self->n + j];
             hsep_real left = 0.0; /* of the variance of the residual */
             if (self->predicted[i] && i != HSEP_HOLD) {
-                const hsep_expert *expert = hsep_trusted_expert(self, i);
-                left = expert->largest_square * (1.0 - hsep_at_const(expert, expert->kept)[j]);
+                const hsep_expert *expert = hsep_averaged_expert(self, i);
+                left = expert->largest_square * (1.0 - hsep_at_const(expert, expert->shrinkage)[j]);
             }
             sum += weights[i] * predicted;
             square += weights[i] * (predicted * predicted + left);
@@ -177,57 +178,57 @@ static void trusted_stack(hsep_trusted *self, hsep_real e[], hsep_word begin, hs
     }
 }
 
-HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word apart)
+HSEP_API void hsep_averaged_go_on(
+    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int apart)
 {
-    const hsep_word begin = self->n - last, end = self->n - first;
+    const hsep_int begin = self->n - last, end = self->n - first;
     hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
-        hsep_expert *at_first = hsep_trusted_expert(self, HSEP_STATIC);
+        hsep_expert *at_first = hsep_averaged_expert(self, HSEP_STATIC);
         hsep_expert_predict(at_first, rows, first, last, apart > 0);
-        for (hsep_word j = begin; j < end; j++) {
+        for (hsep_int j = begin; j < end; j++) {
             x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
         }
-        hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, first, last, rows);
+        hsep_disturbances_motion(hsep_averaged_disturbances(self), x_pb, x, self->n, first, last, rows);
     }
-    if (self->predicted[HSEP_COMMAND]) {
-        hsep_command_fill(hsep_trusted_command(self), self->n, first, last);
+    if (self->predicted[HSEP_ARX_COMMAND]) {
+        hsep_command_fill(hsep_averaged_command(self), self->n, first, last);
     }
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
-            hsep_expert_predict(hsep_trusted_expert(self, i), trusted_rows(self, i), first, last, apart);
-            trusted_take(self, i, x_pb, begin, end);
+            hsep_expert_predict(hsep_averaged_expert(self, i), averaged_rows(self, i), first, last, apart);
+            averaged_take(self, i, x_pb, begin, end);
         }
     }
-    trusted_stack(self, e, begin, end);
+    averaged_stack(self, e, begin, end);
 }
 
-HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
-    hsep_real e[], hsep_word last)
+HSEP_API void hsep_averaged_forecast(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path,
+    hsep_real e[], hsep_int last)
 {
-    const int outgrown = trusted_scale(self, x_d, x_pb, path, n_path);
-    self->bound = HSEP_TRUST_BOUND * self->learned.scales[HSEP_OF_PHYSICS].largest;
-    self->growth = trusted_growth(self);
+    const int outgrown = averaged_scale(self, x_d, x_pb, path, n_path);
+    self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
+    self->growth = averaged_growth(self);
     const hsep_real hold = hsep_clip(e[self->n], self->bound);
-    trusted_solved(self, outgrown);
+    averaged_solved(self, outgrown);
     self->settled = 0;
     hsep_real *stacked = hsep_at(self, self->stacked); /* hold, and what knows nothing */
     memset(stacked, 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
-    for (hsep_word j = 0; j < self->n; j++) {
+    for (hsep_int j = 0; j < self->n; j++) {
         stacked[HSEP_HOLD * self->n + j] = hold;
     }
-    trusted_begin(self, x_d, e + self->n);
-    hsep_trusted_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */
+    averaged_begin(self, x_d, e + self->n);
+    hsep_averaged_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */
 }
 
-HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last, hsep_word apart)
+HSEP_API void hsep_averaged_predict(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart)
 {
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_real *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
-    trusted_begin(self, x_d, e + self->n);
-    hsep_trusted_go_on(self, x_pb, e, 0, last, apart);
+    averaged_begin(self, x_d, e + self->n);
+    hsep_averaged_go_on(self, x_pb, e, 0, last, apart);
 }

@@ -1,4 +1,4 @@
-/* Learning of a residual model that can be trusted. */
+/* Learning of an averaged residual model. */
 #include "hsep_averaged_model.h"
 
 #include "hsep_cholesky.h"
@@ -6,52 +6,52 @@
 
 #include <string.h>
 
-HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[])
+HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[])
 {
-    const hsep_word Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
+    const hsep_int Np = self->Np, dead_time = hsep_averaged_command(self)->dead_time;
     const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
     hsep_real *past = hsep_at(self, self->e_0) + Np;
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
-    hsep_command_begin_in_motion(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
-    for (hsep_word i = 0; i < hsep_trusted_command(self)->p; i++) {
+    hsep_command_begin_in_motion(hsep_averaged_command(self), x_d[Np - 1], x_d[Np - 2]);
+    for (hsep_int i = 0; i < hsep_averaged_command(self)->p; i++) {
         past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
 }
 
-HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x)
+HSEP_API void hsep_averaged_measure(hsep_averaged *self, hsep_int k, hsep_real x)
 {
     hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
 /* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. The
  * rows so far fade if it is learned, fold. */
-static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], int fold)
+static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], int fold)
 {
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_command *command = hsep_trusted_command(self);
+    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    hsep_command *command = hsep_averaged_command(self);
     hsep_learned *learned = &self->learned;
     hsep_real before = disturbances->before.x_pb[0];
     if (self->forecast_scale != learned->velocity_scale) {
-        hsep_evidence_forget(hsep_trusted_evidence(self, HSEP_OF_PHYSICS));
-        hsep_evidence_believe_earlier(hsep_trusted_evidence(self, HSEP_OF_COMMAND));
-        hsep_stack_forget(&learned->stack, HSEP_DOUBTING);
+        hsep_warm_start_forget(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL));
+        hsep_warm_start_believe_earlier(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL));
+        hsep_stack_forget(&learned->stack, HSEP_FRESH_START);
     }
-    for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) { /* of more rows than can be counted, half */
-        hsep_evidence *evidence = hsep_trusted_evidence(self, i);
-        const int countable = hsep_evidence_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
-        hsep_evidence_discount(evidence, countable ? self->kept : 0.5 * self->kept);
+    for (hsep_int i = 0; fold && i < HSEP_N_RESIDUALS; i++) { /* of more rows than can be counted, half */
+        hsep_warm_start *evidence = hsep_averaged_evidence(self, i);
+        const int countable = hsep_warm_start_of_run(evidence)->n_rows < 0.5 * HSEP_EXACT;
+        hsep_warm_start_discount(evidence, countable ? self->forgetting_factor : 0.5 * self->forgetting_factor);
     }
     learned->velocity_scale = self->forecast_scale;
     learned->largest_step = self->forecast_step;
-    for (hsep_word j = self->Np; j-- > 0; before = x_pb[j]) {
+    for (hsep_int j = self->Np; j-- > 0; before = x_pb[j]) {
         learned->fastest = hsep_fmax(learned->fastest, hsep_fabs(x_pb[j] - before));
     }
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
         (size_t)self->n_static * sizeof(hsep_real));
-    hsep_reach_begin(&self->reach, learned->scales[HSEP_OF_PHYSICS].largest, learned->fastest);
+    hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, learned->fastest);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
         hsep_real *rows = hsep_at(self, self->rows);
         hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, learned->velocity_scale, rows);
@@ -63,31 +63,31 @@ static void trusted_begin_window(hsep_trusted *self, const hsep_real x_d[], cons
 
 /* Features of the window up to sample last - 1 as they were measured, and the residual of the command, from known
  * on. */
-static void trusted_take_rows(hsep_trusted *self, const hsep_real x_pb[], const hsep_real e[], hsep_word last)
+static void averaged_take_rows(hsep_averaged *self, const hsep_real x_pb[], const hsep_real e[], hsep_int last)
 {
-    const hsep_word first = self->known, Np = self->Np;
-    const hsep_real *late = hsep_command_late(hsep_trusted_command(self), Np);
+    const hsep_int first = self->known, Np = self->Np;
+    const hsep_real *late = hsep_command_late(hsep_averaged_command(self), Np);
     hsep_real *x = hsep_at(self, self->x), *e_0 = hsep_at(self, self->e_0), *rows = hsep_at(self, self->rows);
-    for (hsep_word j = Np - last; j < Np - first; j++) {
+    for (hsep_int j = Np - last; j < Np - first; j++) {
         x[j] = x_pb[j] + e[j];
         e_0[j] = x[j] - late[j];
     }
     if (first > 0) { /* the velocity at the first of them */
         x[Np - first] = x_pb[Np - first] + e[Np - first];
     }
-    hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, Np, first, last, rows);
+    hsep_disturbances_motion(hsep_averaged_disturbances(self), x_pb, x, Np, first, last, rows);
     self->known = last;
 }
 
 /* Learn the row [features without lags | lags | residual] of sample k. A row with many lags that stand for samples
  * without a measurement is not learned. rows: (Np, n_static); e: (Np + lags,), m. */
-static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const hsep_real rows[], const hsep_real e[])
+static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const hsep_real rows[], const hsep_real e[])
 {
-    hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
-    const hsep_word p = kind == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p, n_static = gram->n - p;
+    hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
+    const hsep_int p = kind == HSEP_COMMAND_RESIDUAL ? hsep_averaged_command(self)->p : self->p, n_static = gram->n - p;
     const hsep_real *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
     hsep_real n_bridged = 0.0, *to = hsep_gram_row(gram);
-    for (hsep_word i = 0; i < p; i++) {
+    for (hsep_int i = 0; i < p; i++) {
         n_bridged += bridged[i];
     }
     if (n_bridged > HSEP_AVERAGING_BRIDGED) {
@@ -96,9 +96,10 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
-    for (hsep_word i = HSEP_LAGGED; k >= self->early && i < HSEP_N_EXPERTS; i++) { /* their solutions may have begun */
-        hsep_solution *solution = hsep_trusted_solution(self, i);
-        if (hsep_trusted_kind_of(self, i) == kind && solution != NULL && solution->begun) {
+    for (hsep_int i = HSEP_ARX_RESIDUAL; k >= self->early && i < HSEP_N_EXPERTS;
+         i++) { /* their solutions may have begun */
+        hsep_solution *solution = hsep_averaged_solution(self, i);
+        if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
             hsep_solution_row(solution, to, lags[-1]);
         }
     }
@@ -106,42 +107,42 @@ static void trusted_fold(hsep_trusted *self, hsep_word kind, hsep_word k, const 
 }
 
 /* Judge the experts by the residuals e of the first n samples of their window, one of which counts at least. */
-static void trusted_judge_experts(
-    hsep_trusted *self, const hsep_real e[], hsep_word n, hsep_residual_scale scales[], hsep_expert_errors errors[])
+static void averaged_judge_experts(
+    hsep_averaged *self, const hsep_real e[], hsep_int n, hsep_residual_scale scales[], hsep_expert_errors errors[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted);
     const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
-    const hsep_word first = self->Np - n;
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    const hsep_int first = self->Np - n;
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
-                hsep_trusted_expert(self, i), &errors[i - HSEP_LAGGED], residuals[hsep_trusted_kind_of(self, i)],
-                accepted, n, self->given_variance);
+                hsep_averaged_expert(self, i), &errors[i - HSEP_ARX_RESIDUAL],
+                residuals[hsep_averaged_kind_of(self, i)], accepted, n, self->given_variance);
         }
     }
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
+    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_residual_scale_follow(&scales[i], residuals[i] + first, accepted + first, n, self->n_accepted);
     }
 }
 
 /* Prepare the solutions for the next window with what is known of this one, whose residuals are e, so far. */
-static void trusted_prepare_next(hsep_trusted *self, const hsep_real e[])
+static void averaged_prepare_next(hsep_averaged *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_JUDGED];
     memcpy(scales, self->learned.scales, sizeof scales);
     memcpy(errors, self->learned.errors, sizeof errors);
     if (self->n_accepted > 0.0) {
-        trusted_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
+        averaged_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
     }
-    hsep_trusted_prepare_solutions(self, scales, errors);
+    hsep_averaged_prepare_solutions(self, scales, errors);
 }
 
 /* Take the size of the command's residual before the last sample. */
-static void trusted_size(hsep_trusted *self)
+static void averaged_size(hsep_averaged *self)
 {
-    hsep_residual_scale scale = self->learned.scales[HSEP_OF_COMMAND];
-    const hsep_word first = self->Np - self->known; /* those behind are not bridged yet */
+    hsep_residual_scale scale = self->learned.scales[HSEP_COMMAND_RESIDUAL];
+    const hsep_int first = self->Np - self->known; /* those behind are not bridged yet */
     if (self->n_accepted > 0.0) {
         const hsep_real *accepted = hsep_at(self, self->accepted) + first, *e_0 = hsep_at(self, self->e_0) + first;
         hsep_residual_scale_follow(&scale, e_0, accepted, self->known, self->n_accepted);
@@ -150,115 +151,115 @@ static void trusted_size(hsep_trusted *self)
 }
 
 /* Multiply-adds as which four rows count that are added to the Gram matrices. */
-static hsep_real trusted_of_rows(hsep_trusted *self)
+static hsep_real averaged_of_rows(hsep_averaged *self)
 {
     hsep_real sum = 0.0;
-    for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-        const hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, i));
-        sum += HSEP_TRUSTED_OF_GRAM * hsep_triangle(gram->n + 1);
+    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
+        const hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, i));
+        sum += HSEP_AVERAGED_OF_GRAM * hsep_triangle(gram->n + 1);
     }
     return sum;
 }
 
 /* Multiply-adds as which the beginning of a solution counts. */
-static hsep_real trusted_of_beginning(const hsep_solution *solution)
+static hsep_real averaged_of_beginning(const hsep_solution *solution)
 {
-    const hsep_word n = solution->n_head + solution->n_tail;
-    return solution->begun ? 0.0 : HSEP_TRUSTED_OF_BEGINNING * hsep_triangle(n + 1);
+    const hsep_int n = solution->n_head + solution->n_tail;
+    return solution->begun ? 0.0 : HSEP_AVERAGED_OF_BEGINNING * hsep_triangle(n + 1);
 }
 
 /* Multiply-adds that the solutions take after this sample, with as many rows to come. */
-static hsep_real trusted_left(hsep_trusted *self, hsep_word to_come)
+static hsep_real averaged_left(hsep_averaged *self, hsep_int to_come)
 {
     hsep_real sum = 0.0;
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        const hsep_solution *solution = hsep_trusted_solution(self, i);
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+        const hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL) {
-            const hsep_word kind = hsep_trusted_kind_of(self, i);
-            const hsep_gram *gram = hsep_evidence_of_run(hsep_trusted_evidence(self, kind));
-            const hsep_word rows = to_come + (solution->begun ? 0 : gram->waiting);
-            sum += trusted_of_beginning(solution) + hsep_solution_left(solution, rows, kind == HSEP_OF_COMMAND);
+            const hsep_int kind = hsep_averaged_kind_of(self, i);
+            const hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
+            const hsep_int rows = to_come + (solution->begun ? 0 : gram->waiting);
+            sum += averaged_of_beginning(solution) + hsep_solution_left(solution, rows, kind == HSEP_COMMAND_RESIDUAL);
         }
     }
     return sum;
 }
 
 /* Go on with them after sample last - 1, in equal shares: before the last row comes all others are in their heads. */
-static void trusted_advance(hsep_trusted *self, hsep_word last)
+static void averaged_advance(hsep_averaged *self, hsep_int last)
 {
-    const hsep_word left = self->Np - last, to_come = left - 1;
-    const hsep_word waiting = hsep_evidence_of_run(hsep_trusted_evidence(self, HSEP_OF_COMMAND))->waiting;
-    const hsep_word adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
-    const hsep_real of_rows = trusted_of_rows(self), added = waiting == 1 ? of_rows : 0.0; /* in this sample */
-    const hsep_real all = added + of_rows * (hsep_real)adds + trusted_left(self, to_come);
+    const hsep_int left = self->Np - last, to_come = left - 1;
+    const hsep_int waiting = hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL))->waiting;
+    const hsep_int adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
+    const hsep_real of_rows = averaged_of_rows(self), added = waiting == 1 ? of_rows : 0.0; /* in this sample */
+    const hsep_real all = added + of_rows * (hsep_real)adds + averaged_left(self, to_come);
     hsep_real amount = all / (hsep_real)left - added;
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        hsep_solution *solution = hsep_trusted_solution(self, i);
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+        hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL && (amount > 0.0 || left == 1)) {
-            amount -= trusted_of_beginning(solution);
-            amount = hsep_solution_advance(hsep_trusted_begun(self, i), amount, left == 1);
+            amount -= averaged_of_beginning(solution);
+            amount = hsep_solution_advance(hsep_averaged_begun(self, i), amount, left == 1);
         }
     }
 }
 
 /* Take in sample k, which is believed, and the samples since the last believed one: their residuals are linear in time
  * between both. fold: whether it is learned. */
-static void trusted_believe(
-    hsep_trusted *self, hsep_word k, const hsep_real x_pb[], hsep_real e[], hsep_real measured, int fold)
+static void averaged_believe(
+    hsep_averaged *self, hsep_int k, const hsep_real x_pb[], hsep_real e[], hsep_real measured, int fold)
 {
-    const hsep_word j = self->Np - 1 - k, known = self->Np - self->known;
+    const hsep_int j = self->Np - 1 - k, known = self->Np - self->known;
     e[j] = measured;
     const hsep_real slope = (e[j] - e[known]) / (hsep_real)(known - j);
-    for (hsep_word i = known - 1; i > j; i--) {
+    for (hsep_int i = known - 1; i > j; i--) {
         e[i] = slope * (hsep_real)(known - i) + e[known];
     }
-    trusted_take_rows(self, x_pb, e, k + 1);
-    for (hsep_word i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
-        const hsep_command *command = hsep_trusted_command(self);
-        if (i == HSEP_OF_COMMAND) {
-            trusted_fold(self, i, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
+    averaged_take_rows(self, x_pb, e, k + 1);
+    for (hsep_int i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
+        const hsep_command *command = hsep_averaged_command(self);
+        if (i == HSEP_COMMAND_RESIDUAL) {
+            averaged_fold(self, i, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
         } else {
-            trusted_fold(self, i, k, hsep_at(self, self->rows), e);
+            averaged_fold(self, i, k, hsep_at(self, self->rows), e);
         }
     }
     self->n_accepted += 1.0;
 }
 
 /* Judge the next sample, and take it in if it is believed. */
-static void trusted_follow_sample(hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], int fold)
+static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const hsep_word k = self->followed++, j = self->Np - 1 - k;
+    const hsep_int k = self->followed++, j = self->Np - 1 - k;
     const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_reach_judge(&self->reach, measured, self->T_s);
+    const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
     if (accepted) {
-        trusted_believe(self, k, x_pb, e, measured, fold);
+        averaged_believe(self, k, x_pb, e, measured, fold);
     }
     if (fold && self->followed == self->early) {
-        trusted_prepare_next(self, e);
+        averaged_prepare_next(self, e);
     }
     if (fold && self->followed + 1 == self->Np) {
-        trusted_size(self);
+        averaged_size(self);
     }
 }
 
-HSEP_API void hsep_trusted_follow(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last)
+HSEP_API void hsep_averaged_follow(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last)
 {
     if (self->followed == 0 && last > 0) {
-        trusted_begin_window(self, x_d, x_pb, 1);
+        averaged_begin_window(self, x_d, x_pb, 1);
     }
     const int begun = self->followed >= self->early;
-    for (hsep_word i = 0; i < HSEP_TRUSTED_PACE && self->followed < last; i++) {
-        trusted_follow_sample(self, x_pb, e, 1);
+    for (hsep_int i = 0; i < HSEP_AVERAGED_PACE && self->followed < last; i++) {
+        averaged_follow_sample(self, x_pb, e, 1);
     }
     if (begun && last < self->Np) {
-        trusted_advance(self, last);
+        averaged_advance(self, last);
     }
 }
 
-HSEP_API void hsep_trusted_settle(hsep_trusted *self, hsep_real peak)
+HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak)
 {
     const hsep_real step = peak / self->T_s * self->T_s; /* as that of the window is computed */
     self->early_step = hsep_fmax(hsep_fmax(self->learned.largest_step, self->forecast_step), step);
@@ -266,31 +267,31 @@ HSEP_API void hsep_trusted_settle(hsep_trusted *self, hsep_real peak)
     if (self->followed + 1 != self->Np || !(self->early_square > 0.0)) {
         return;
     }
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        hsep_solution *solution = hsep_trusted_solution(self, i);
-        hsep_real scales[HSEP_TRUSTED_MOST];
-        if (solution != NULL && hsep_trusted_kind_of(self, i) == HSEP_OF_COMMAND &&
-            hsep_trusted_expert(self, i)->variance > 0.0) {
-            (void)hsep_trusted_begun(self, i);
-            hsep_trusted_priors(self, i, scales);
-            hsep_expert_complete(hsep_trusted_expert(self, i), scales);
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+        hsep_solution *solution = hsep_averaged_solution(self, i);
+        hsep_real scales[HSEP_AVERAGED_MOST];
+        if (solution != NULL && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL &&
+            hsep_averaged_expert(self, i)->variance > 0.0) {
+            (void)hsep_averaged_begun(self, i);
+            hsep_averaged_priors(self, i, scales);
+            hsep_expert_complete(hsep_averaged_expert(self, i), scales);
         }
     }
 }
 
 /* Update the weights of the stack with the accepted samples that were published. */
-static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
+static void averaged_judge_stack(hsep_averaged *self, const hsep_real e[])
 {
     const hsep_real *accepted = hsep_at(self, self->accepted);
     const hsep_real *stacked = hsep_at(self, self->stacked) + (self->n - self->Np);
-    const hsep_word first = self->late < self->Np ? self->late : 0;
+    const hsep_int first = self->late < self->Np ? self->late : 0;
     hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
-    for (hsep_word j = 0; j < self->Np - first; j++) {
+    for (hsep_int j = 0; j < self->Np - first; j++) {
         hsep_real of_sample[HSEP_N_EXPERTS + 1];
         if (!(accepted[j] > 0.0)) {
             continue;
         }
-        for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
             of_sample[i] = stacked[i * self->n + j];
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
@@ -312,48 +313,48 @@ static void trusted_judge_stack(hsep_trusted *self, const hsep_real e[])
 }
 
 /* Judge the experts and their stack by the measurement of their window. */
-static void trusted_judge(hsep_trusted *self, const hsep_real e[])
+static void averaged_judge(hsep_averaged *self, const hsep_real e[])
 {
     hsep_learned *learned = &self->learned;
-    trusted_judge_experts(self, e, self->Np, learned->scales, learned->errors);
-    trusted_judge_stack(self, e);
-    if (hsep_trusted_doubts(self) && learned->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+    averaged_judge_experts(self, e, self->Np, learned->scales, learned->errors);
+    averaged_judge_stack(self, e);
+    if (hsep_averaged_doubts(self) && learned->stack.weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
         /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
         hsep_expert_errors *errors = learned->errors;
-        for (hsep_word i = 0; i < HSEP_N_RESIDUALS; i++) {
-            hsep_evidence_forget_earlier(hsep_trusted_evidence(self, i));
+        for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
+            hsep_warm_start_forget_earlier(hsep_averaged_evidence(self, i));
         }
-        errors[0] = errors[HSEP_STATIC - HSEP_LAGGED] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_LAGGED] = errors[HSEP_DOUBTING - HSEP_LAGGED];
+        errors[0] = errors[HSEP_STATIC - HSEP_ARX_RESIDUAL] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_ARX_RESIDUAL] = errors[HSEP_FRESH_START - HSEP_ARX_RESIDUAL];
         hsep_stack_init(&learned->stack);
-        hsep_trusted_prepare_solutions(self, learned->scales, errors);
+        hsep_averaged_prepare_solutions(self, learned->scales, errors);
     }
 }
 
-HSEP_API void hsep_trusted_learn(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
+HSEP_API void hsep_averaged_learn(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const hsep_word p = self->p, of_command = hsep_trusted_command(self)->p;
+    const hsep_int p = self->p, of_command = hsep_averaged_command(self)->p;
     hsep_real *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     if (self->followed == 0) {
-        trusted_begin_window(self, x_d, x_pb, fold);
+        averaged_begin_window(self, x_d, x_pb, fold);
     }
     while (self->followed < self->Np) {
-        trusted_follow_sample(self, x_pb, e, fold);
+        averaged_follow_sample(self, x_pb, e, fold);
     }
     if (self->known < self->Np) { /* none is believed behind it: its residual stays */
-        const hsep_word known = self->Np - self->known;
-        for (hsep_word j = 0; j < known; j++) {
+        const hsep_int known = self->Np - self->known;
+        for (hsep_int j = 0; j < known; j++) {
             e[j] = e[known];
         }
-        trusted_take_rows(self, x_pb, e, self->Np);
+        averaged_take_rows(self, x_pb, e, self->Np);
     }
-    self->n_rejected += self->Np - (hsep_word)self->n_accepted;
-    hsep_disturbances_end(hsep_trusted_disturbances(self));
+    self->n_rejected += self->Np - (hsep_int)self->n_accepted;
+    hsep_disturbances_end(hsep_averaged_disturbances(self));
     if (fold && self->n_accepted > 0.0) {
-        trusted_judge(self, e);
+        averaged_judge(self, e);
     }
-    hsep_command_end(hsep_trusted_command(self), self->Np);
+    hsep_command_end(hsep_averaged_command(self), self->Np);
     memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(hsep_real));
     memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(hsep_real));
     self->followed = self->known = 0;

@@ -1,8 +1,9 @@
-/* Residual model that can be trusted: experts of e_pb, stacked with physics and hold; as predict/averaging/model.py,
+/* Averaged residual model: experts of e_pb, stacked with physics and hold; as predict/averaging/model.py,
  * which says what they are.
  *
- * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. A compensator,
- * which decides the commands of a window, begins with the rest of its last plan, and calls hsep_trusted_predict for
+ * A window is predicted by hsep_averaged_forecast, and learned by hsep_averaged_learn once it is measured. A
+ * compensator,
+ * which decides the commands of a window, begins with the rest of its last plan, and calls hsep_averaged_predict for
  * other commands that it tries over its preview; the last ones count. Signals are kept newest first: of n samples,
  * sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative to the start. A
  * block as hsep_layout.h has them; a window predicted and not measured yet is part of it.
@@ -18,17 +19,17 @@
 
 /* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
  * was predicted. */
-#define HSEP_TRUSTED_PACE 2
+#define HSEP_AVERAGED_PACE 2
 
 /* Multiply-adds as which an entry of a Gram matrix counts where four rows are added to it, and where a solution begins
  * with it. */
-#define HSEP_TRUSTED_OF_GRAM 5.0
-#define HSEP_TRUSTED_OF_BEGINNING 4.0
+#define HSEP_AVERAGED_OF_GRAM 5.0
+#define HSEP_AVERAGED_OF_BEGINNING 4.0
 
 /* Features without lags of an expert, at most. */
-#define HSEP_TRUSTED_OF_COMMAND (HSEP_TRUST_LAGS_OF_COMMAND + 2)
-#define HSEP_TRUSTED_MOST \
-    (HSEP_TRUSTED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? HSEP_TRUSTED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
+#define HSEP_AVERAGED_OF_COMMAND (HSEP_AVERAGING_LAGS_OF_COMMAND + 2)
+#define HSEP_AVERAGED_MOST \
+    (HSEP_AVERAGED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? HSEP_AVERAGED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
@@ -37,146 +38,145 @@ typedef struct {
     hsep_real largest_step;   /* m, largest change from sample to sample, of the command */
     hsep_real fastest;        /* m, and of the physics model */
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
-    hsep_expert_errors errors[HSEP_N_JUDGED]; /* of the experts from HSEP_LAGGED on */
+    hsep_expert_errors errors[HSEP_N_JUDGED]; /* of the experts from HSEP_ARX_RESIDUAL on */
     hsep_stack stack;
 } hsep_learned;
 
 typedef struct {
-    hsep_word Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
-    hsep_word late;               /* samples by which the measurement is late */
-    hsep_word early;              /* samples of a window after which the next one's solutions may begin */
-    hsep_real T_s;                /* s */
-    hsep_real least_variance;     /* m2, of the noise */
-    hsep_real effect;             /* m, prior standard deviation of a feature's effect; 0: from the residuals */
-    hsep_real given_variance;     /* m2, of the noise; 0: estimated */
-    hsep_real kept;               /* weight of earlier rows, from window to window */
-    hsep_word
-        leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
-    hsep_reach reach;
-    hsep_word n_rejected; /* samples of this run that were not accepted */
+    hsep_int Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
+    hsep_int late;               /* samples by which the measurement is late */
+    hsep_int early;              /* samples of a window after which the next one's solutions may begin */
+    hsep_real T_s;               /* s */
+    hsep_real least_variance;    /* m2, of the noise */
+    hsep_real effect;            /* m, prior standard deviation of a feature's effect; 0: from the residuals */
+    hsep_real given_variance;    /* m2, of the noise; 0: estimated */
+    hsep_real forgetting_factor; /* weight of earlier rows, from window to window */
+    hsep_int leading;            /* expert that led when earlier runs ended, HSEP_ARX_RESIDUAL or HSEP_ARX_COMMAND */
+    hsep_gate reach;
+    hsep_int n_rejected; /* samples of this run that were not accepted */
     /* Of the window that is predicted */
-    hsep_real forecast_scale;            /* m/s, velocity scale with it, */
-    hsep_real forecast_step;             /* m, and largest change of the command, */
-    hsep_word settled;                   /* whether a predictor has taken early_step, */
-    hsep_real early_step;                /* m, the same before the last command of the window came */
-    hsep_real bound;                     /* m, on what is predicted, */
-    hsep_real growth;                    /* how much larger the command's bound may be, as its largest step is */
-    hsep_word predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
+    hsep_real forecast_scale;           /* m/s, velocity scale with it, */
+    hsep_real forecast_step;            /* m, and largest change of the command, */
+    hsep_int settled;                   /* whether a predictor has taken early_step, */
+    hsep_real early_step;               /* m, the same before the last command of the window came */
+    hsep_real bound;                    /* m, on what is predicted, */
+    hsep_real growth;                   /* how much larger the command's bound may be, as its largest step is */
+    hsep_int predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     /* Of the window that is measured */
-    hsep_word followed;     /* samples that were judged and, as far as they are believed, learned */
-    hsep_word known;        /* samples up to the last one that is believed */
+    hsep_int followed;      /* samples that were judged and, as far as they are believed, learned */
+    hsep_int known;         /* samples up to the last one that is believed */
     hsep_real n_accepted;   /* samples that are */
     hsep_real early_square; /* m2, largest mean square of the command's residual, before the last sample; 0: none yet */
     /* Offsets in words from the beginning of the struct */
-    hsep_word forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
-    hsep_word x;                /* (n,) m, position */
-    hsep_word measured;         /* (Np,) m, measured position, NaN where missing */
-    hsep_word accepted;         /* (Np,) whether it is believed */
-    hsep_word bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
-    hsep_word e_0;              /* (Np + p of the command,) m, residual of the command */
-    hsep_word stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
-    hsep_word variance; /* (n,) m2, of the mixture of the experts */
-    hsep_word rows;     /* (n, n_static) features without lags, sample after sample */
-    hsep_word disturbances, command;
-    hsep_word evidence[HSEP_N_RESIDUALS];
-    hsep_word experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
-    hsep_word largest;                 /* (n_static,) largest magnitudes of the features without lags */
+    hsep_int forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
+    hsep_int x;                /* (n,) m, position */
+    hsep_int measured;         /* (Np,) m, measured position, NaN where missing */
+    hsep_int accepted;         /* (Np,) whether it is believed */
+    hsep_int bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
+    hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
+    hsep_int stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
+    hsep_int variance; /* (n,) m2, of the mixture of the experts */
+    hsep_int rows;     /* (n, n_static) features without lags, sample after sample */
+    hsep_int disturbances, command;
+    hsep_int evidence[HSEP_N_RESIDUALS];
+    hsep_int experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
+    hsep_int largest;                 /* (n_static,) largest magnitudes of the features without lags */
     hsep_learned learned;
-} hsep_trusted;
+} hsep_averaged;
 
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
-    hsep_trusted,
-    35 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_reach) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    hsep_averaged,
+    35 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_gate) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
-HSEP_API hsep_real hsep_trusted_size(const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
-HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_residual_parameters *parameters, hsep_real start);
-HSEP_API int hsep_trusted_valid(const void *block, const hsep_residual_parameters *parameters);
+HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start);
+HSEP_API int hsep_averaged_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Parts of the block; of the experts not hold. */
-static inline hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self)
+static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)
 {
     return (hsep_disturbances *)hsep_at(self, self->disturbances);
 }
-static inline hsep_command *hsep_trusted_command(hsep_trusted *self)
+static inline hsep_command *hsep_averaged_command(hsep_averaged *self)
 {
     return (hsep_command *)hsep_at(self, self->command);
 }
-static inline hsep_evidence *hsep_trusted_evidence(hsep_trusted *self, hsep_word kind)
+static inline hsep_warm_start *hsep_averaged_evidence(hsep_averaged *self, hsep_int kind)
 {
-    return (hsep_evidence *)hsep_at(self, self->evidence[kind]);
+    return (hsep_warm_start *)hsep_at(self, self->evidence[kind]);
 }
-static inline hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_word expert)
+static inline hsep_expert *hsep_averaged_expert(hsep_averaged *self, hsep_int expert)
 {
     return (hsep_expert *)hsep_at(self, self->experts[expert]);
 }
 
-/* HSEP_OF_COMMAND if an expert predicts the residual of the command, else HSEP_OF_PHYSICS. */
-HSEP_API hsep_word hsep_trusted_kind_of(const hsep_trusted *self, hsep_word expert);
+/* HSEP_COMMAND_RESIDUAL if an expert predicts the residual of the command, else HSEP_MODEL_RESIDUAL. */
+HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert);
 
 /* Whether this run doubts earlier ones. */
-HSEP_API int hsep_trusted_doubts(hsep_trusted *self);
+HSEP_API int hsep_averaged_doubts(hsep_averaged *self);
 
 /* The solution of an expert; NULL where no rows train it. */
-HSEP_API hsep_solution *hsep_trusted_solution(hsep_trusted *self, hsep_word expert);
+HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int expert);
 
 /* The same, which begins now if it has not yet. */
-HSEP_API hsep_solution *hsep_trusted_begun(hsep_trusted *self, hsep_word expert);
+HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert);
 
-/* Prior standard deviations of the weights of an expert's features without lags, at most HSEP_TRUSTED_MOST. */
-HSEP_API void hsep_trusted_priors(hsep_trusted *self, hsep_word expert, hsep_real scales[]);
+/* Prior standard deviations of the weights of an expert's features without lags, at most HSEP_AVERAGED_MOST. */
+HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[]);
 
 /* Prepare the solutions, with variances of the noise as they are known now. scales: (HSEP_N_RESIDUALS,) of the
- * residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_LAGGED on. */
-HSEP_API void hsep_trusted_prepare_solutions(
-    hsep_trusted *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
+ * residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_ARX_RESIDUAL on. */
+HSEP_API void hsep_averaged_prepare_solutions(
+    hsep_averaged *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
 /* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
-HSEP_API hsep_word hsep_trusted_n_learned(const hsep_trusted *self);
-HSEP_API int hsep_trusted_sound(const hsep_trusted *self);
+HSEP_API hsep_int hsep_averaged_n_learned(const hsep_averaged *self);
+HSEP_API int hsep_averaged_sound(const hsep_averaged *self);
 
 /* Begin a run with what an earlier one has learned, loaded into a fresh block: it is discounted and doubted, as a
  * machine may have changed meanwhile. */
-HSEP_API void hsep_trusted_restart(hsep_trusted *self);
+HSEP_API void hsep_averaged_restart(hsep_averaged *self);
 
 /* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals,
  * as measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path
  * of them, m, of a compensator; or NULL. Cost: for each expert a hsep_solution_finish, last m^2 / 2 multiply-adds
  * with its m features and last n / 2; 6 n tanh. */
-HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_word n_path,
-    hsep_real e[], hsep_word last);
+HSEP_API void hsep_averaged_forecast(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path,
+    hsep_real e[], hsep_int last);
 
 /* Complete the solutions of the command's expert, one sample before a window that a predictor begins: peak is the
  * largest change of its commands, m, as far as they are known. */
-HSEP_API void hsep_trusted_settle(hsep_trusted *self, hsep_real peak);
+HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak);
 
 /* Predict samples first ... last - 1, too, where the last call ended; apart: as hsep_expert_predict's. */
-HSEP_API void hsep_trusted_go_on(
-    hsep_trusted *self, const hsep_real x_pb[], hsep_real e[], hsep_word first, hsep_word last, hsep_word apart);
+HSEP_API void hsep_averaged_go_on(
+    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int apart);
 
-/* Predict other commands with the same scales and weights, in the samples 0 ... last - 1; hsep_trusted_go_on predicts
+/* Predict other commands with the same scales and weights, in the samples 0 ... last - 1; hsep_averaged_go_on predicts
  * more. e: (n + p,), m. */
-HSEP_API void hsep_trusted_predict(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last, hsep_word apart);
+HSEP_API void hsep_averaged_predict(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
-HSEP_API void hsep_trusted_measure(hsep_trusted *self, hsep_word k, hsep_real x);
+HSEP_API void hsep_averaged_measure(hsep_averaged *self, hsep_int k, hsep_real x);
 
 /* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, Np > 1, with the motion before it. */
-HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[]);
+HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[]);
 
-/* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_TRUSTED_PACE of them in a
+/* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A
  * sample costs a hsep_gram_fold for each residual, and behind early samples a share of the next window's solutions. */
-HSEP_API void hsep_trusted_follow(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_word last);
+HSEP_API void hsep_averaged_follow(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);
 
 /* Learn the rest of that window, and judge the experts by it. fold: whether it is learned, as it was followed if so;
  * the next window starts from it in any case. */
-HSEP_API void hsep_trusted_learn(
-    hsep_trusted *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold);
+HSEP_API void hsep_averaged_learn(
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold);
 
 #endif

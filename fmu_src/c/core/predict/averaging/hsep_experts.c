@@ -8,10 +8,10 @@
 #include <stddef.h>
 
 HSEP_API void hsep_residual_scale_follow(
-    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count)
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count)
 {
     hsep_real sum = 0.0;
-    for (hsep_word j = 0; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         const hsep_real residual = accepted[j] * residuals[j];
         sum += residual * residual;
         self->largest = hsep_fabs(residual) > self->largest ? hsep_fabs(residual) : self->largest;
@@ -32,7 +32,7 @@ static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shap
     self->run = hsep_take(&end, window + lags);
     self->unshrunk = hsep_take(&end, window + lags);
     self->e_h = hsep_take(&end, window);
-    self->kept = hsep_take(&end, window);
+    self->shrinkage = hsep_take(&end, window);
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
@@ -47,9 +47,9 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
     memset(self, 0, (size_t)hsep_expert_size(shape));
     (void)expert_lay_out(self, shape);
     hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->room);
-    for (hsep_word i = 0; i < self->p; i++) {
+    for (hsep_int i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
-            hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
+            hsep_sqrt(hsep_pow(HSEP_AVERAGING_LAST_LAG, (hsep_real)i / (hsep_real)self->p));
     }
 }
 
@@ -67,10 +67,10 @@ static hsep_real expert_resolved(hsep_real square)
 }
 
 HSEP_API void hsep_expert_prepare(
-    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
+    hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least)
 {
-    const hsep_gram *of_run = hsep_evidence_of_run(evidence), *earlier = hsep_evidence_earlier(evidence);
+    const hsep_gram *of_run = hsep_warm_start_of_run(evidence), *earlier = hsep_warm_start_earlier(evidence);
     const hsep_real of_earlier = earlier->n_rows > 0.0 ? weight * hsep_gram_square(earlier) : 0.0;
     const hsep_real resolved = expert_resolved(hsep_gram_square(of_run) + of_earlier);
     const hsep_real noise = errors->noise_variance > 0.0 ? errors->noise_variance : first;
@@ -78,24 +78,24 @@ HSEP_API void hsep_expert_prepare(
     hsep_real *penalties = hsep_at(solution, solution->penalties) + self->n_static;
     const hsep_real *scales = hsep_at(self, self->lag_scales);
     self->variance = hsep_fmax(hsep_fmax(noise, least), resolved) * errors->correlation;
-    for (hsep_word i = 0; i < self->p; i++) {
+    for (hsep_int i = 0; i < self->p; i++) {
         penalties[i] = self->variance / (scales[i] * scales[i]);
     }
     hsep_solution_reset(solution);
 }
 
-HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_evidence *evidence, hsep_real weight)
+HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_warm_start *evidence, hsep_real weight)
 {
-    const hsep_gram *earlier = hsep_evidence_earlier(evidence);
+    const hsep_gram *earlier = hsep_warm_start_earlier(evidence);
     hsep_solution_begin(
-        hsep_expert_solution(self), hsep_evidence_of_run(evidence), earlier->n_rows > 0.0 ? earlier : NULL, weight);
+        hsep_expert_solution(self), hsep_warm_start_of_run(evidence), earlier->n_rows > 0.0 ? earlier : NULL, weight);
 }
 
 static void expert_penalise(hsep_expert *self, const hsep_real scales[])
 {
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *penalties = hsep_at(solution, solution->penalties);
-    for (hsep_word i = 0; i < self->n_static; i++) {
+    for (hsep_int i = 0; i < self->n_static; i++) {
         penalties[i] = self->variance / (scales[i] * scales[i]);
     }
 }
@@ -116,27 +116,27 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_
 
 /* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
  * the same within bounds; eq. (4). */
-static void expert_free_run(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last)
+static void expert_free_run(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last)
 {
-    const hsep_word n_static = self->n_static;
+    const hsep_int n_static = self->n_static;
     const hsep_real *weights = hsep_expert_weights(self), *lag_weights = weights + n_static;
     hsep_real *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
     rows += first * n_static;
-    for (hsep_word k = first; k < last; k++, rows += n_static) {
-        const hsep_word j = self->n - 1 - k;
+    for (hsep_int k = first; k < last; k++, rows += n_static) {
+        const hsep_int j = self->n - 1 - k;
         run[j] = hsep_recur(hsep_dot(weights, rows, n_static), lag_weights, run + j + 1, self->p);
         unshrunk[j] = isfinite(run[j]) ? hsep_clip(run[j], HSEP_EXPERTS_LAG_BOUND * self->bound) : 0.0;
     }
 }
 
 /* Squares first ... last - 1 of the recursion's impulse response. */
-static void expert_respond(hsep_expert *self, hsep_word first, hsep_word last)
+static void expert_respond(hsep_expert *self, hsep_int first, hsep_int last)
 {
-    const hsep_word n = self->n;
+    const hsep_int n = self->n;
     const hsep_real *lag_weights = hsep_expert_weights(self) + self->n_static;
     hsep_real *response = hsep_at(self, self->response), *squares = hsep_at(self, self->squares);
-    for (hsep_word k = first; k < last; k++) {
-        const hsep_word j = n - 1 - k;
+    for (hsep_int k = first; k < last; k++) {
+        const hsep_int j = n - 1 - k;
         response[j] = hsep_recur(k == 0 ? 1.0 : 0.0, lag_weights, response + j + 1, self->p);
         const hsep_real within =
             isnan(response[j]) ? HSEP_EXPERTS_DIVERGED : hsep_clip(response[j], HSEP_EXPERTS_DIVERGED);
@@ -148,30 +148,30 @@ static void expert_respond(hsep_expert *self, hsep_word first, hsep_word last)
 static hsep_real expert_most(const hsep_expert *self) { return HSEP_EXPERTS_DIVERGED * self->bound * self->bound; }
 
 /* Variances of rows of samples k ... last - 1, of the first of every apart, at most HSEP_SOLUTION_ABREAST of them. */
-static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_word k, hsep_word last, hsep_word apart)
+static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int k, hsep_int last, hsep_int apart)
 {
-    const hsep_word n_static = self->n_static, p = self->p, left = (last - k + apart - 1) / apart;
-    const hsep_word count = left < HSEP_SOLUTION_ABREAST ? left : HSEP_SOLUTION_ABREAST;
+    const hsep_int n_static = self->n_static, p = self->p, left = (last - k + apart - 1) / apart;
+    const hsep_int count = left < HSEP_SOLUTION_ABREAST ? left : HSEP_SOLUTION_ABREAST;
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
-    for (hsep_word c = 0; c < count; c++, to += p + n_static + 1) {
-        const hsep_word sample = k + apart * c;
+    for (hsep_int c = 0; c < count; c++, to += p + n_static + 1) {
+        const hsep_int sample = k + apart * c;
         const hsep_real *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
-        for (hsep_word i = 0; i < p; i++) {
+        for (hsep_int i = 0; i < p; i++) {
             to[p - 1 - i] = lags[i];
         }
         memcpy(to + p, rows + sample * n_static, (size_t)n_static * sizeof(hsep_real));
     }
     hsep_solution_leverages(solution, count, leverages);
-    for (hsep_word c = 0; c < apart * count && k + c < last; c++) {
+    for (hsep_int c = 0; c < apart * count && k + c < last; c++) {
         hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c / apart];
     }
 }
 
 /* Variance of sample k of a prediction: the rows' variances, carried through the impulse response. */
-static hsep_real expert_variance(const hsep_expert *self, hsep_word k)
+static hsep_real expert_variance(const hsep_expert *self, hsep_int k)
 {
-    const hsep_word j = self->n - 1 - k;
+    const hsep_int j = self->n - 1 - k;
     const hsep_real *variances = hsep_at_const(self, self->variances) + j, most = expert_most(self);
     const hsep_real carried =
         self->p > 0 ? hsep_dot(hsep_at_const(self, self->squares), variances, k + 1) : variances[0];
@@ -179,33 +179,33 @@ static hsep_real expert_variance(const hsep_expert *self, hsep_word k)
 }
 
 /* What a variance, m2, leaves of a prediction. */
-static hsep_real expert_kept(const hsep_expert *self, hsep_real variance)
+static hsep_real expert_shrinkage(const hsep_expert *self, hsep_real variance)
 {
     return self->largest_square / (self->largest_square + variance);
 }
 
 /* Shrink the free run at places begin ... end - 1. */
-static void expert_shrink(hsep_expert *self, hsep_word begin, hsep_word end)
+static void expert_shrink(hsep_expert *self, hsep_int begin, hsep_int end)
 {
-    const hsep_real *unshrunk = hsep_at(self, self->unshrunk), *kept = hsep_at(self, self->kept);
+    const hsep_real *unshrunk = hsep_at(self, self->unshrunk), *shrinkage = hsep_at(self, self->shrinkage);
     hsep_real *e_h = hsep_at(self, self->e_h);
-    for (hsep_word j = begin; j < end; j++) {
-        e_h[j] = hsep_clip(unshrunk[j], self->bound) * kept[j];
+    for (hsep_int j = begin; j < end; j++) {
+        e_h[j] = hsep_clip(unshrunk[j], self->bound) * shrinkage[j];
     }
 }
 
 /* Variances of samples first ... last - 1, and what they leave of the prediction. */
-static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart)
+static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
 {
-    hsep_real *kept = hsep_at(self, self->kept);
+    hsep_real *shrinkage = hsep_at(self, self->shrinkage);
     if (self->p > 0) {
         expert_respond(self, first, last);
     }
-    for (hsep_word k = first; k < last; k += apart * HSEP_SOLUTION_ABREAST) {
+    for (hsep_int k = first; k < last; k += apart * HSEP_SOLUTION_ABREAST) {
         expert_vary_rows(self, rows, k, last, apart);
     }
-    for (hsep_word k = first; k < last; k++) {
-        kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, k));
+    for (hsep_int k = first; k < last; k++) {
+        shrinkage[self->n - 1 - k] = expert_shrinkage(self, expert_variance(self, k));
     }
 }
 
@@ -218,7 +218,7 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
 }
 
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart)
+    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
 {
     expert_free_run(self, rows, first, last);
     if (apart > 0) {
@@ -229,18 +229,18 @@ HSEP_API void hsep_expert_predict(
 
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
-    hsep_word n, hsep_real given)
+    hsep_int n, hsep_real given)
 {
     const hsep_real *unshrunk = hsep_at_const(self, self->unshrunk) + (self->n - self->Np); /* of the window */
     hsep_real sum = 0.0, count = 0.0;
-    for (hsep_word j = self->Np - n; j < self->Np; j++) {
+    for (hsep_int j = self->Np - n; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
         count += accepted[j];
     }
     errors->noise_variance = given > 0.0 ? given : self->rows_variance;
     if (errors->noise_variance > 0.0) {
         const hsep_real seen = hsep_fmin(sum * sum / count / errors->noise_variance, HSEP_EXPERTS_DIVERGED);
-        errors->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - errors->correlation);
-        errors->correlation = hsep_fmin(hsep_fmax(errors->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
+        errors->correlation += HSEP_AVERAGING_CORRELATION_RATE * (seen - errors->correlation);
+        errors->correlation = hsep_fmin(hsep_fmax(errors->correlation, 1.0), HSEP_AVERAGING_CORRELATION_MAX);
     }
 }

@@ -1,4 +1,4 @@
-/* Expert of the residual: a regression on static features and lags with normal priors, trusted as far as its own
+/* Expert of the residual: a regression on static features and lags with normal priors, counted as far as its own
  * variance allows; as predict/averaging/experts.py, which says how.
  *
  * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
@@ -26,27 +26,27 @@ typedef struct {
 } hsep_expert_errors;
 
 typedef struct {
-    hsep_word Np, n;       /* samples of a window, and of a prediction, n >= Np */
-    hsep_word n_static, p; /* features without lags, lags */
-    hsep_word room;        /* rows that may wait in its solution */
+    hsep_int Np, n;       /* samples of a window, and of a prediction, n >= Np */
+    hsep_int n_static, p; /* features without lags, lags */
+    hsep_int room;        /* rows that may wait in its solution */
 } hsep_expert_shape;
 
 typedef struct {
-    hsep_word Np, n, n_static, p;
+    hsep_int Np, n, n_static, p;
     hsep_real variance;       /* m2, of the noise that the penalties come from */
     hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
     hsep_real largest_square; /* m2, largest mean square of a window, and */
     hsep_real bound;          /* m, bound on the prediction, as it was made */
     /* Offsets in words from the beginning of the struct */
-    hsep_word lag_scales; /* (p,) prior standard deviations of the weights of the lags */
-    hsep_word run;        /* (n + p,) m, the recursion, behind it measured residuals */
-    hsep_word unshrunk;   /* (n + p,) m, the same within bounds */
-    hsep_word e_h;        /* (n,) m, shrunk by its variance, and bounded */
-    hsep_word kept;       /* (n,) what the variance leaves of it */
-    hsep_word response;   /* (n + p,) the recursion's impulse response, behind it 0 */
-    hsep_word squares;    /* (n,) its squares, oldest first */
-    hsep_word variances;  /* (n,) m2, of the rows */
-    hsep_word solution;   /* hsep_solution, whose head are the lags */
+    hsep_int lag_scales; /* (p,) prior standard deviations of the weights of the lags */
+    hsep_int run;        /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_int unshrunk;   /* (n + p,) m, the same within bounds */
+    hsep_int e_h;        /* (n,) m, shrunk by its variance, and bounded */
+    hsep_int shrinkage;  /* (n,) what the variance leaves of it */
+    hsep_int response;   /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_int squares;    /* (n,) its squares, oldest first */
+    hsep_int variances;  /* (n,) m2, of the rows */
+    hsep_int solution;   /* hsep_solution, whose head are the lags */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
@@ -56,7 +56,7 @@ HSEP_ASSERT_WORDS(hsep_expert, 17);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
 HSEP_API void hsep_residual_scale_follow(
-    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_word n, hsep_real count);
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count);
 
 HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
@@ -78,11 +78,11 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
  * weight; they begin to be solved for by hsep_expert_begin_solution. first, least: m2, variance of the noise while
  * it is not known, and the least one. */
 HSEP_API void hsep_expert_prepare(
-    hsep_expert *self, hsep_evidence *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
+    hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least);
 
 /* Begin to solve for them from the rows so far, those of earlier runs settled. Cost: n^2 multiply-adds. */
-HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_evidence *evidence, hsep_real weight);
+HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_warm_start *evidence, hsep_real weight);
 
 /* Complete the factor with the penalties of the features without lags, before the last row comes; scales: as below. */
 HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[]);
@@ -99,13 +99,13 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
  * counts for their variances; apart = 0: shrinking stays as in the last prediction. A sample costs n_static + p and,
  * for its variance, last multiply-adds, and each row that counts a quarter of hsep_solution_leverages. */
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_word first, hsep_word last, hsep_word apart);
+    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart);
 
 /* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
  * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the
  * noise, if it is known; else 0. */
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
-    hsep_word n, hsep_real given);
+    hsep_int n, hsep_real given);
 
 #endif

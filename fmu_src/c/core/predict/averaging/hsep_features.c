@@ -7,24 +7,24 @@
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
-HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters)
+HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters)
 {
-    return parameters->trust->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
+    return parameters->averaging->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
 }
 
-HSEP_API hsep_word hsep_disturbances_n(const hsep_residual_parameters *parameters)
+HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters)
 {
-    const hsep_word q = parameters->settings->q, most = HSEP_FEATURES_DIFFERENCES;
+    const hsep_int q = parameters->settings->q, most = HSEP_FEATURES_DIFFERENCES;
     return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
 }
 
-HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature)
+HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_int feature)
 {
-    return feature + self->count < self->n ? 1.0 : HSEP_TRUST_DIFFERENCE_SHARE;
+    return feature + self->count < self->n ? 1.0 : HSEP_AVERAGING_DIFFERENCE_SHARE;
 }
 
 /* Filter i before the window; behind all of these are the filters after the samples that were tried. */
-static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_word i)
+static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
 {
     return (hsep_physics *)hsep_at(self, self->filters + i * self->filter_words);
 }
@@ -33,17 +33,17 @@ static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_word i)
 static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    const hsep_word count = hsep_disturbances_count(parameters);
+    const hsep_int count = hsep_disturbances_count(parameters);
     const hsep_real filter = hsep_physics_size(parameters->n_modes, settings->dead_time);
     hsep_real end = HSEP_WORDS(hsep_disturbances);
     self->count = count;
-    self->period = parameters->trust->period;
+    self->period = parameters->averaging->period;
     self->n = hsep_disturbances_n(parameters);
     self->n_differences = self->n - 2 - 2 * count;
     self->of_motion = parameters->planned != 0;
     self->T_s = settings->T_s;
     self->filters = hsep_take_block(&end, 2.0 * (hsep_real)count * filter);
-    self->filter_words = (hsep_word)(filter / sizeof(hsep_real));
+    self->filter_words = (hsep_int)(filter / sizeof(hsep_real));
     return end * sizeof(hsep_real);
 }
 
@@ -59,7 +59,7 @@ HSEP_API void hsep_disturbances_init(
     memset(self, 0, (size_t)hsep_disturbances_size(parameters));
     (void)disturbances_lay_out(self, parameters);
     self->origin = start;
-    for (hsep_word i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
+    for (hsep_int i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
         hsep_physics_init(
             disturbances_filter(self, i), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
             (hsep_hold)settings->input_hold);
@@ -70,7 +70,7 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
 {
     hsep_disturbances got;
     int sound = HSEP_LAID_OUT(got, block, disturbances_lay_out(&got, parameters));
-    for (hsep_word i = 0; i < 2 * got.count; i++) {
+    for (hsep_int i = 0; i < 2 * got.count; i++) {
         const void *filter = hsep_at_bytes(block, got.filters + i * got.filter_words);
         sound = sound && hsep_physics_valid(filter, parameters->n_modes, parameters->settings->dead_time);
     }
@@ -78,7 +78,7 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
 }
 
 HSEP_API void hsep_disturbances_begin_in_motion(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n)
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n)
 {
     hsep_disturbed *before = &self->before;
     before->x_d = 2.0 * x_d[n - 1] - x_d[n - 2];
@@ -87,10 +87,10 @@ HSEP_API void hsep_disturbances_begin_in_motion(
     }
 }
 
-HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_word n)
+HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n)
 {
     hsep_real largest = 0.0, last = self->before.x_d;
-    for (hsep_word j = n; j-- > 0;) {
+    for (hsep_int j = n; j-- > 0;) {
         largest = hsep_fmax(largest, hsep_fabs(x_d[j] - last));
         last = x_d[j];
     }
@@ -100,17 +100,17 @@ HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self
 /* Filter the disturbances first ... first + count - 1, whose n samples are side by side in u, and put the results and
  * their first differences into the rows. */
 static void disturbances_filter_samples(
-    hsep_disturbances *self, hsep_word first, hsep_word count, hsep_real u[], hsep_word n, hsep_real rows[])
+    hsep_disturbances *self, hsep_int first, hsep_int count, hsep_real u[], hsep_int n, hsep_real rows[])
 {
     hsep_real x[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     hsep_physics *filters[HSEP_PHYSICS_ABREAST] = {NULL};
-    for (hsep_word i = 0; i < count; i++) {
+    for (hsep_int i = 0; i < count; i++) {
         filters[i] = disturbances_filter(self, self->count + first + i);
     }
     hsep_physics_abreast(filters, count, u, x, n);
     hsep_real *entry = rows + 2 + self->n_differences + first, *filtered = self->after.filtered + first;
-    for (hsep_word k = 0; k < n; k++, entry += self->n) {
-        for (hsep_word i = 0; i < count; i++) {
+    for (hsep_int k = 0; k < n; k++, entry += self->n) {
+        for (hsep_int i = 0; i < count; i++) {
             const hsep_real now = x[HSEP_PHYSICS_ABREAST * k + i];
             entry[i] = now;
             entry[self->count + i] = now - filtered[i];
@@ -120,12 +120,12 @@ static void disturbances_filter_samples(
 }
 
 /* Begin with the filters first ... last - 1 as they were before the window. */
-static void disturbances_rewind(hsep_disturbances *self, hsep_word first, hsep_word last)
+static void disturbances_rewind(hsep_disturbances *self, hsep_int first, hsep_int last)
 {
     memcpy(
         disturbances_filter(self, self->count + first), disturbances_filter(self, first),
         (size_t)((last - first) * self->filter_words) * sizeof(hsep_real));
-    for (hsep_word i = first; i < last; i++) {
+    for (hsep_int i = first; i < last; i++) {
         self->after.filtered[i] = self->before.filtered[i];
     }
 }
@@ -136,35 +136,35 @@ static void disturbances_differences(const hsep_disturbances *self, const hsep_r
     hsep_real d[HSEP_FEATURES_DIFFERENCES + 1];
     memcpy(d, x_pb, sizeof d);
     row[0] = 1.0;
-    for (hsep_word i = 0; i <= self->n_differences; i++) {
+    for (hsep_int i = 0; i <= self->n_differences; i++) {
         row[1 + i] = d[0];
-        for (hsep_word j = 0; j + i < HSEP_FEATURES_DIFFERENCES; j++) {
+        for (hsep_int j = 0; j + i < HSEP_FEATURES_DIFFERENCES; j++) {
             d[j] -= d[j + 1];
         }
     }
 }
 
-HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_word i)
+HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i)
 {
-    hsep_real spread = HSEP_TRUST_FRICTION_LEAST;
+    hsep_real spread = HSEP_AVERAGING_FRICTION_LEAST;
     for (; i > 0; i--) {
-        spread *= HSEP_TRUST_FRICTION_RATIO;
+        spread *= HSEP_AVERAGING_FRICTION_RATIO;
     }
     return (velocity_scale > 0.0 ? velocity_scale : 1.0) * spread;
 }
 
 /* Friction of n samples of the velocity v_d, m/s, into the rows. */
 static void disturbances_friction(
-    hsep_disturbances *self, const hsep_real v_d[], hsep_word n, hsep_real velocity_scale, hsep_real rows[])
+    hsep_disturbances *self, const hsep_real v_d[], hsep_int n, hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     memset(u, 0, HSEP_PHYSICS_ABREAST * n * sizeof *u); /* places without a disturbance are filtered, too */
-    for (hsep_word first = 0; first < HSEP_FEATURES_N_FRICTION; first += HSEP_PHYSICS_ABREAST) {
-        const hsep_word left = HSEP_FEATURES_N_FRICTION - first;
-        const hsep_word count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
-        for (hsep_word i = 0; i < count; i++) {
+    for (hsep_int first = 0; first < HSEP_FEATURES_N_FRICTION; first += HSEP_PHYSICS_ABREAST) {
+        const hsep_int left = HSEP_FEATURES_N_FRICTION - first;
+        const hsep_int count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+        for (hsep_int i = 0; i < count; i++) {
             const hsep_real spread = hsep_disturbances_sign_velocity(velocity_scale, first + i);
-            for (hsep_word k = 0; k < n; k++) {
+            for (hsep_int k = 0; k < n; k++) {
                 u[HSEP_PHYSICS_ABREAST * k + i] = hsep_tanh(v_d[k] / spread);
             }
         }
@@ -173,7 +173,7 @@ static void disturbances_friction(
 }
 
 HSEP_API void hsep_disturbances_command(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n, hsep_real velocity_scale,
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale,
     hsep_real rows[])
 {
     hsep_disturbed *now = &self->after;
@@ -181,9 +181,9 @@ HSEP_API void hsep_disturbances_command(
     disturbances_rewind(self, 0, HSEP_FEATURES_N_FRICTION);
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
-    for (hsep_word j = n; j > 0;) {
-        const hsep_word count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
-        for (hsep_word k = 0; k < count; k++) {
+    for (hsep_int j = n; j > 0;) {
+        const hsep_int count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
+        for (hsep_int k = 0; k < count; k++) {
             j--;
             v_d[k] = (x_d[j] - now->x_d) / self->T_s;
             now->x_d = x_d[j];
@@ -199,7 +199,7 @@ HSEP_API void hsep_disturbances_command(
 }
 
 HSEP_API hsep_real hsep_disturbances_damped_velocity(
-    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word j)
+    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j)
 {
     const int is_first = j + 1 == n;
     hsep_real step = x_pb[j] - (is_first ? self->before.x_pb[0] : x_pb[j + 1]);
@@ -215,20 +215,20 @@ HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_r
 }
 
 HSEP_API void hsep_disturbances_motion(
-    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
+    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int first, hsep_int last,
     hsep_real rows[])
 {
     const hsep_real s = hsep_sin(hsep_disturbances_angle(self, 0.0)), c = hsep_cos(hsep_disturbances_angle(self, 0.0));
     hsep_real disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
-    const hsep_word most = last - first < DISTURBANCES_TOGETHER ? last - first : DISTURBANCES_TOGETHER;
+    const hsep_int most = last - first < DISTURBANCES_TOGETHER ? last - first : DISTURBANCES_TOGETHER;
     memset(disturbances, 0, HSEP_PHYSICS_ABREAST * most * sizeof *disturbances); /* as with friction */
     if (first == 0) {
         disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
     }
     rows += first * self->n;
-    for (hsep_word j = n - first; j > n - last;) {
-        const hsep_word left = j - (n - last), count = left < DISTURBANCES_TOGETHER ? left : DISTURBANCES_TOGETHER;
-        for (hsep_word k = 0; k < count; k++) {
+    for (hsep_int j = n - first; j > n - last;) {
+        const hsep_int left = j - (n - last), count = left < DISTURBANCES_TOGETHER ? left : DISTURBANCES_TOGETHER;
+        for (hsep_int k = 0; k < count; k++) {
             hsep_real *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
             j--;
             const hsep_real v = hsep_disturbances_damped_velocity(self, x_pb, x, n, j);
@@ -258,11 +258,11 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
 static hsep_real command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    const hsep_word n = parameters->n;
+    const hsep_int n = parameters->n;
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
-    self->p = HSEP_TRUST_LAGS_OF_COMMAND;
+    self->p = HSEP_AVERAGING_LAGS_OF_COMMAND;
     self->count = self->p + 2;
     self->n_before = settings->dead_time + self->p + 1;
     self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)settings->dead_time + (hsep_real)self->p + 1.0);
@@ -280,9 +280,9 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_paramete
 {
     memset(self, 0, (size_t)hsep_command_size(parameters));
     (void)command_lay_out(self, parameters);
-    for (hsep_word i = 0; i < self->count; i++) {
+    for (hsep_int i = 0; i < self->count; i++) {
         const hsep_real age = i > 0 ? (hsep_real)(i - 1) / (hsep_real)self->p : 0.0;
-        hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_TRUST_LAST_LAG, age));
+        hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_AVERAGING_LAST_LAG, age));
     }
 }
 
@@ -292,35 +292,35 @@ HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameter
     return HSEP_LAID_OUT(got, block, command_lay_out(&got, parameters));
 }
 
-HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature)
+HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature)
 {
     return hsep_at_const(self, self->shares)[feature];
 }
 
-HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m)
+HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)
 {
     memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_command_fill(hsep_command *self, hsep_word m, hsep_word first, hsep_word last)
+HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last)
 {
     const hsep_real *commands = hsep_at(self, self->commands) + (self->n - m);
     hsep_real *row = hsep_at(self, self->rows) + first * self->count;
-    for (hsep_word k = first; k < last; k++, row += self->count) {
+    for (hsep_int k = first; k < last; k++, row += self->count) {
         const hsep_real *late = commands + (m - 1 - k) + self->dead_time;
         row[0] = 1.0;
-        for (hsep_word i = 1; i < self->count; i++) {
+        for (hsep_int i = 1; i < self->count; i++) {
             row[i] = late[i - 1] - late[i];
         }
     }
 }
 
-HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_word m)
+HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m)
 {
     return hsep_at_const(self, self->commands) + (self->n - m) + self->dead_time;
 }
 
-HSEP_API void hsep_command_end(hsep_command *self, hsep_word m)
+HSEP_API void hsep_command_end(hsep_command *self, hsep_int m)
 {
     hsep_real *before = hsep_at(self, self->commands) + self->n;
     memmove(before, before - m, (size_t)self->n_before * sizeof(hsep_real));
@@ -329,7 +329,7 @@ HSEP_API void hsep_command_end(hsep_command *self, hsep_word m)
 HSEP_API void hsep_command_begin_in_motion(hsep_command *self, hsep_real first, hsep_real second)
 {
     hsep_real *before = hsep_at(self, self->commands) + self->n;
-    for (hsep_word i = 0; i < self->n_before; i++) {
+    for (hsep_int i = 0; i < self->n_before; i++) {
         before[i] = first - (second - first) * (hsep_real)(i + 1);
     }
 }

@@ -30,18 +30,18 @@ typedef struct {
 } hsep_disturbed;
 
 typedef struct {
-    hsep_word n_differences; /* of x_pb, at most 3 */
-    hsep_word count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
-    hsep_word n;             /* features */
-    hsep_real period;        /* m, of a disturbance that repeats with the position; 0: none */
-    hsep_real origin;        /* m, the start: what repeats does not know of it */
-    hsep_word of_motion;     /* whether the position's own velocity is damped; else the velocity of x_pb, which
+    hsep_int n_differences; /* of x_pb, at most 3 */
+    hsep_int count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
+    hsep_int n;             /* features */
+    hsep_real period;       /* m, of a disturbance that repeats with the position; 0: none */
+    hsep_real origin;       /* m, the start: what repeats does not know of it */
+    hsep_int of_motion;     /* whether the position's own velocity is damped; else the velocity of x_pb, which
                               * behind a compensator turns with every change of the command, far from the motion */
-    hsep_real T_s;           /* s */
-    hsep_disturbed before;   /* the window that comes next */
-    hsep_disturbed after;    /* the samples that were tried last */
-    hsep_word filter_words;  /* words of a filter */
-    hsep_word filters;       /* offset of the hsep_physics of each disturbance before the window, and behind them after
+    hsep_real T_s;          /* s */
+    hsep_disturbed before;  /* the window that comes next */
+    hsep_disturbed after;   /* the samples that were tried last */
+    hsep_int filter_words;  /* words of a filter */
+    hsep_int filters;       /* offset of the hsep_physics of each disturbance before the window, and behind them after
                               * the samples that were tried last */
 } hsep_disturbances;
 
@@ -49,11 +49,11 @@ HSEP_ASSERT_WORDS(hsep_disturbed, 15);
 HSEP_ASSERT_WORDS(hsep_disturbances, 39);
 
 /* Disturbances, and features. */
-HSEP_API hsep_word hsep_disturbances_count(const hsep_residual_parameters *parameters);
-HSEP_API hsep_word hsep_disturbances_n(const hsep_residual_parameters *parameters);
+HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters);
+HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest. */
-HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_word feature);
+HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_int feature);
 
 HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m. */
@@ -63,22 +63,22 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
 
 /* Begin in motion, which went on as the n samples of the first window begin, (n,) m each. */
 HSEP_API void hsep_disturbances_begin_in_motion(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n);
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n);
 
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
-HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_word n);
+HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n);
 
 /* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for what
  * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6
  * tanh and 9 (6 n_modes) multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_word n, hsep_real velocity_scale,
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale,
     hsep_real rows[]);
 
 /* Fill stiffness, damping and what repeats of samples first ... last - 1 of these in the rows, which act at the
  * position x, (n,), m; first is 0, or where the last call ended; may be tried again. */
 HSEP_API void hsep_disturbances_motion(
-    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word first, hsep_word last,
+    hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int first, hsep_int last,
     hsep_real rows[]);
 
 /* End the window, which are the samples that were tried last. */
@@ -86,23 +86,23 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
 /* Velocity of the change of sign of friction i, m/s; velocity of the damping at place j of n samples, m/s; angle within
  * the period at a position, rad, 0 without a period. */
-HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_word i);
+HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i);
 HSEP_API hsep_real hsep_disturbances_damped_velocity(
-    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_word n, hsep_word j);
+    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j);
 HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);
 
 /* Increments of the command. */
 typedef struct {
-    hsep_word n;         /* samples of a prediction */
-    hsep_word dead_time; /* samples */
-    hsep_word p;         /* lags, and increments after the first, whatever p of the settings is */
-    hsep_word count;     /* features without lags, p + 2 */
-    hsep_word n_before;  /* commands before a window that its features need */
+    hsep_int n;         /* samples of a prediction */
+    hsep_int dead_time; /* samples */
+    hsep_int p;         /* lags, and increments after the first, whatever p of the settings is */
+    hsep_int count;     /* features without lags, p + 2 */
+    hsep_int n_before;  /* commands before a window that its features need */
     /* Offsets in words from the beginning of the struct */
-    hsep_word commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
+    hsep_int commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
-    hsep_word rows;     /* (n, count) features, sample after sample */
-    hsep_word shares;   /* (count,) effects that they may have, relative to the largest */
+    hsep_int rows;     /* (n, count) features, sample after sample */
+    hsep_int shares;   /* (count,) effects that they may have, relative to the largest */
 } hsep_command;
 
 HSEP_ASSERT_WORDS(hsep_command, 8);
@@ -113,19 +113,19 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_paramete
 HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
-HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_word feature);
+HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
-HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_word m);
+HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m);
 
 /* Fill the rows of samples first ... last - 1 of these. */
-HSEP_API void hsep_command_fill(hsep_command *self, hsep_word m, hsep_word first, hsep_word last);
+HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last);
 
 /* Of these, the commands as many samples ago as the dead time has, (m,), m. */
-HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_word m);
+HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m);
 
 /* End the window, which are the m samples taken in last. */
-HSEP_API void hsep_command_end(hsep_command *self, hsep_word m);
+HSEP_API void hsep_command_end(hsep_command *self, hsep_int m);
 
 /* Begin in motion: commands, m, went on as the first and the second of the first window. */
 HSEP_API void hsep_command_begin_in_motion(hsep_command *self, hsep_real first, hsep_real second);

@@ -4,26 +4,26 @@
 #include "hsep_predict_constants.h"
 #include "hsep_range.h"
 
-HSEP_API void hsep_reach_begin(hsep_reach *self, hsep_real largest, hsep_real fastest)
+HSEP_API void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real fastest)
 {
     self->largest = largest;
     self->fastest = fastest;
     self->known = largest > 0.0 && fastest > 0.0;
 }
 
-HSEP_API int hsep_reach_judge(hsep_reach *self, hsep_real e, hsep_real T_s)
+HSEP_API int hsep_gate_judge(hsep_gate *self, hsep_real e, hsep_real T_s)
 {
-    const hsep_real size = hsep_fabs(e), most = HSEP_TRUST_REACH_RESIDUALS * self->largest;
+    const hsep_real size = hsep_fabs(e), most = HSEP_AVERAGING_GATE_RESIDUALS * self->largest;
     self->n_missing++;
     if (!isfinite(e)) {
         return 0;
     }
-    if (self->known && size > most + HSEP_TRUST_REACH_STEPS * self->fastest) {
+    if (self->known && size > most + HSEP_AVERAGING_GATE_STEPS * self->fastest) {
         self->n_beyond++;
     } else if (self->n_beyond > 0) {
         self->n_beyond--;
     }
-    if (self->n_beyond > 0 && (hsep_real)self->n_missing <= hsep_ceil(HSEP_TRUST_PATIENCE / T_s)) {
+    if (self->n_beyond > 0 && (hsep_real)self->n_missing <= hsep_ceil(HSEP_AVERAGING_PATIENCE / T_s)) {
         self->farthest = hsep_fmax(self->farthest, hsep_fmin(size, HSEP_PREDICTION_MAX));
         return 0;
     }

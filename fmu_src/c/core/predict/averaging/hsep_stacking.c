@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-static const hsep_real stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
+static const hsep_real stack_first[HSEP_N_EXPERTS] = {
+    0.0, HSEP_AVERAGING_FIRST_ARX_RESIDUAL, HSEP_AVERAGING_FIRST_STATIC, 0.0, 0.0};
 
 HSEP_API void hsep_stack_init(hsep_stack *self)
 {
@@ -103,20 +104,20 @@ HSEP_API void hsep_stack_update(
     hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least)
 {
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
-    self->evidence[0] = HSEP_TRUST_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
-    self->evidence[1] = HSEP_TRUST_GAMMA * self->evidence[1] + n;
+    self->evidence[0] = HSEP_AVERAGING_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
+    self->evidence[1] = HSEP_AVERAGING_GAMMA * self->evidence[1] + n;
     hsep_real best = self->evidence[0]; /* of the prediction 0, which is always there */
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         for (int j = 0; j < HSEP_N_EXPERTS; j++) {
             hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
-            *gram = HSEP_TRUST_GAMMA * *gram + products[i][j];
+            *gram = HSEP_AVERAGING_GAMMA * *gram + products[i][j];
             H[i][j] = *gram;
         }
-        self->cross[i] = HSEP_TRUST_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
+        self->cross[i] = HSEP_AVERAGING_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
         best = hsep_fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
     const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
-    const hsep_real ridge = HSEP_TRUST_KAPPA * square * n;
+    const hsep_real ridge = HSEP_AVERAGING_KAPPA * square * n;
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
         l[i] = self->cross[i] + ridge * stack_first[i];
@@ -124,24 +125,25 @@ HSEP_API void hsep_stack_update(
     stack_minimise(H, l, self->weights);
 }
 
-HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self)
+HSEP_API hsep_int hsep_stack_leader(const hsep_stack *self)
 {
     const hsep_real *weights = self->weights;
-    return weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC] ? HSEP_COMMAND : HSEP_LAGGED;
+    return weights[HSEP_ARX_COMMAND] > weights[HSEP_ARX_RESIDUAL] + weights[HSEP_STATIC] ? HSEP_ARX_COMMAND
+                                                                                         : HSEP_ARX_RESIDUAL;
 }
 
-HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to)
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_int expert, hsep_int to)
 {
     memcpy(self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert, HSEP_N_EXPERTS * sizeof(hsep_real));
-    for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         self->gram[HSEP_N_EXPERTS * i + to] = self->gram[HSEP_N_EXPERTS * i + expert];
     }
     self->cross[to] = self->cross[expert];
 }
 
-HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_word expert)
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_int expert)
 {
-    for (hsep_word i = 0; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         self->gram[HSEP_N_EXPERTS * i + expert] = self->gram[HSEP_N_EXPERTS * expert + i] = 0.0;
     }
     self->cross[expert] = self->weights[expert] = 0.0;

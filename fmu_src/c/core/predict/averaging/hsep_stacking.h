@@ -29,13 +29,13 @@ HSEP_API void hsep_stack_init(hsep_stack *self);
 HSEP_API void hsep_stack_update(
     hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
 
-/* HSEP_COMMAND, if it has more of the weights than HSEP_LAGGED and HSEP_STATIC together, else HSEP_LAGGED. */
-HSEP_API hsep_word hsep_stack_leader(const hsep_stack *self);
+/* HSEP_ARX_COMMAND, if it has more weight than HSEP_ARX_RESIDUAL and HSEP_STATIC together; else HSEP_ARX_RESIDUAL. */
+HSEP_API hsep_int hsep_stack_leader(const hsep_stack *self);
 
 /* Give an expert the evidence of another, as if it had predicted the same so far. */
-HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_word expert, hsep_word to);
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_int expert, hsep_int to);
 
 /* Forget an expert that predicts no more. */
-HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_word expert);
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_int expert);
 
 #endif

@@ -10,7 +10,7 @@
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     const hsep_real Np = (hsep_real)parameters->settings->Np, n = (hsep_real)parameters->n;
     const hsep_real n_states = 2.0 * (hsep_real)n_modes, all = n_states + (hsep_real)dead_time;
     hsep_real end = HSEP_WORDS(hsep_start);
@@ -40,14 +40,14 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *
     (void)start_lay_out(self, parameters);
     hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
     const hsep_real late = (hsep_real)(settings->dead_time + (self->n - self->Np)); /* samples */
-    for (hsep_word i = 0; i < parameters->n_modes; i++) {
+    for (hsep_int i = 0; i < parameters->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = v t has the solution omega^2 z = v t - 2 zeta v / omega, in the state
          * (omega^2 z, omega z'). */
         const hsep_real omega = HSEP_TWO_PI * parameters->modes[i].f_n, v = 1.0 / settings->T_s;
         states[2 * i] = -late - 2.0 * parameters->modes[i].zeta * v / omega;
         states[2 * i + 1] = v / omega;
     }
-    for (hsep_word i = 0; i < self->dead_time; i++) {
+    for (hsep_int i = 0; i < self->dead_time; i++) {
         within[i] = (hsep_real)i - late;
     }
     hsep_physics_init(
@@ -66,12 +66,12 @@ HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters 
 
 /* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
  * measurement is late. */
-static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_word count)
+static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_int count)
 {
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    const hsep_word late = self->n - self->Np;
+    const hsep_int late = self->n - self->Np;
     hsep_physics_begin(trial, hsep_at(self, self->state));
-    for (hsep_word k = 0; k < count; k++) {
+    for (hsep_int k = 0; k < count; k++) {
         const hsep_real x_d = k < late ? -step * (hsep_real)(late - k) : 0.0;
         hsep_physics_forced_response(trial, &x_d, x_pb + k, 1);
     }
@@ -80,9 +80,9 @@ static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hs
 /* First step of the commands, m; 0 if the axis begins at rest, as far as they tell. */
 static hsep_real start_step(const hsep_start *self, const hsep_real x_d[])
 {
-    const hsep_word late = self->n - self->Np, first = self->n - 1 - late;
+    const hsep_int late = self->n - self->Np, first = self->n - 1 - late;
     hsep_real peak = 0.0;
-    for (hsep_word j = first; j-- > 0;) {
+    for (hsep_int j = first; j-- > 0;) {
         const hsep_real change = hsep_fabs(x_d[j] - x_d[j + 1]);
         peak = change > peak ? change : peak;
     }
@@ -98,8 +98,8 @@ HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[])
 /* Whether enough residuals are measured. */
 static int start_knows(const hsep_start *self, const hsep_real e[])
 {
-    hsep_word known = 0;
-    for (hsep_word k = self->n - self->Np; k < self->Np; k++) {
+    hsep_int known = 0;
+    for (hsep_int k = self->n - self->Np; k < self->Np; k++) {
         known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
     }
     return known >= HSEP_START_SAMPLES * self->n_states;
@@ -111,11 +111,11 @@ static void start_fold(hsep_start *self, const hsep_real e[])
     hsep_regression *regression = (hsep_regression *)hsep_at(self, self->regression);
     const hsep_real *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
     hsep_regression_init(regression, self->n_states, HSEP_START_DAMPING);
-    for (hsep_word k = 0; k < self->Np; k++) {
+    for (hsep_int k = 0; k < self->Np; k++) {
         hsep_real *row = hsep_regression_row(regression);
         const hsep_real measured = e[self->Np - 1 - k];
         if (isfinite(measured)) {
-            for (hsep_word i = 0; i < self->n_states; i++) {
+            for (hsep_int i = 0; i < self->n_states; i++) {
                 row[i] = responses[i * self->n + k];
             }
             row[self->n_states] = measured - response[k];
@@ -127,23 +127,23 @@ static void start_fold(hsep_start *self, const hsep_real e[])
 
 HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[])
 {
-    const hsep_word all = self->n_states + self->dead_time;
+    const hsep_int all = self->n_states + self->dead_time;
     const hsep_real step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
     hsep_real *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
     hsep_real seen = 0.0, left = 0.0;
     if (!hsep_start_moves(self, x_d) || !start_knows(self, e)) {
         return 0;
     }
-    for (hsep_word i = 0; i < self->n_states; i++) {
+    for (hsep_int i = 0; i < self->n_states; i++) {
         memset(state, 0, (size_t)all * sizeof(hsep_real));
         state[i] = 1.0;
         start_respond(self, 0.0, hsep_at(self, self->responses) + i * self->n, self->n);
     }
-    for (hsep_word i = 0; i < all; i++) {
+    for (hsep_int i = 0; i < all; i++) {
         state[i] = step * hsep_at(self, self->states)[i];
     }
     start_respond(self, step, response, self->n);
-    for (hsep_word k = 0; k < self->Np; k++) {
+    for (hsep_int k = 0; k < self->Np; k++) {
         const hsep_real measured = e[self->Np - 1 - k], rest = measured - response[k];
         seen += isfinite(measured) ? measured * measured : 0.0;
         left += isfinite(measured) ? rest * rest : 0.0;
@@ -152,7 +152,7 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const 
         return 0;
     }
     start_fold(self, e);
-    for (hsep_word i = 0; i < self->n_states; i++) {
+    for (hsep_int i = 0; i < self->n_states; i++) {
         state[i] += weights[i];
     }
     start_respond(self, step, response, self->n + self->Np);
@@ -162,16 +162,16 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const 
 HSEP_API void hsep_start_apply(
     const hsep_start *self, hsep_real x_d[], hsep_real x_pb[], hsep_real ahead[], hsep_physics *physics)
 {
-    const hsep_word late = self->n - self->Np;
+    const hsep_int late = self->n - self->Np;
     const hsep_real *response = hsep_at_const(self, self->response);
     const hsep_real step = late + 1 < self->n ? x_d[self->n - 2 - late] - x_d[self->n - 1 - late] : 0.0;
-    for (hsep_word k = 0; k < late; k++) {
+    for (hsep_int k = 0; k < late; k++) {
         x_d[self->n - 1 - k] -= step * (hsep_real)(late - k);
     }
-    for (hsep_word k = 0; k < self->n; k++) {
+    for (hsep_int k = 0; k < self->n; k++) {
         x_pb[self->n - 1 - k] += response[k];
     }
-    for (hsep_word i = 0; i < self->Np; i++) {
+    for (hsep_int i = 0; i < self->Np; i++) {
         ahead[i] += response[self->n + i];
     }
     hsep_physics_add(physics, (const hsep_physics *)hsep_at_const(self, self->trial));

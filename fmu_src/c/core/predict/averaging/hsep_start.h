@@ -12,15 +12,15 @@
 #include "hsep_window.h"
 
 typedef struct {
-    hsep_word Np, n;             /* samples measured and predicted */
-    hsep_word n_states;          /* of the modes */
-    hsep_word dead_time;         /* samples */
-    hsep_word states;            /* offsets in words: (n_states + dead_time,) state of a motion by one metre a sample */
-    hsep_word state;             /* (n_states + dead_time,) m, the one that is tried */
-    hsep_word response;          /* (n + Np,) m, to it, oldest first */
-    hsep_word responses;         /* (n_states, n) to each state of the modes alone, oldest first */
-    hsep_word weights;           /* (n_states,) m, change of the state */
-    hsep_word trial, regression; /* the physics model on its own; least squares */
+    hsep_int Np, n;             /* samples measured and predicted */
+    hsep_int n_states;          /* of the modes */
+    hsep_int dead_time;         /* samples */
+    hsep_int states;            /* offsets in words: (n_states + dead_time,) state of a motion by one metre a sample */
+    hsep_int state;             /* (n_states + dead_time,) m, the one that is tried */
+    hsep_int response;          /* (n + Np,) m, to it, oldest first */
+    hsep_int responses;         /* (n_states, n) to each state of the modes alone, oldest first */
+    hsep_int weights;           /* (n_states,) m, change of the state */
+    hsep_int trial, regression; /* the physics model on its own; least squares */
 } hsep_start;
 
 HSEP_ASSERT_WORDS(hsep_start, 11);

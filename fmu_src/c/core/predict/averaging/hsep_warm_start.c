@@ -3,66 +3,66 @@
 #include "hsep_math.h"
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static hsep_real evidence_lay_out(hsep_evidence *self, hsep_word n)
+static hsep_real evidence_lay_out(hsep_warm_start *self, hsep_int n)
 {
-    hsep_real end = HSEP_WORDS(hsep_evidence);
+    hsep_real end = HSEP_WORDS(hsep_warm_start);
     self->of_run = hsep_take_block(&end, hsep_gram_size(n));
     self->earlier = hsep_take_block(&end, hsep_gram_size(n));
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_evidence_size(hsep_word n) { return evidence_lay_out(&(hsep_evidence){0}, n); }
+HSEP_API hsep_real hsep_warm_start_size(hsep_int n) { return evidence_lay_out(&(hsep_warm_start){0}, n); }
 
-HSEP_API void hsep_evidence_init(hsep_evidence *self, hsep_word n)
+HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n)
 {
     (void)evidence_lay_out(self, n);
-    hsep_gram_init(hsep_evidence_of_run(self), n);
-    hsep_gram_init(hsep_evidence_earlier(self), n);
+    hsep_gram_init(hsep_warm_start_of_run(self), n);
+    hsep_gram_init(hsep_warm_start_earlier(self), n);
 }
 
-HSEP_API int hsep_evidence_valid(const void *block, hsep_word n)
+HSEP_API int hsep_warm_start_valid(const void *block, hsep_int n)
 {
-    hsep_evidence got;
+    hsep_warm_start got;
     return HSEP_LAID_OUT(got, block, evidence_lay_out(&got, n)) &&
            hsep_gram_valid(hsep_at_bytes(block, got.of_run), n) &&
            hsep_gram_valid(hsep_at_bytes(block, got.earlier), n);
 }
 
-HSEP_API hsep_real hsep_evidence_n_rows(hsep_evidence *self)
+HSEP_API hsep_real hsep_warm_start_n_rows(hsep_warm_start *self)
 {
-    return hsep_evidence_of_run(self)->n_rows + hsep_evidence_earlier(self)->n_rows;
+    return hsep_warm_start_of_run(self)->n_rows + hsep_warm_start_earlier(self)->n_rows;
 }
 
-HSEP_API void hsep_evidence_forget(hsep_evidence *self)
+HSEP_API void hsep_warm_start_forget(hsep_warm_start *self)
 {
-    hsep_gram_init(hsep_evidence_of_run(self), hsep_evidence_of_run(self)->n);
-    hsep_evidence_forget_earlier(self);
+    hsep_gram_init(hsep_warm_start_of_run(self), hsep_warm_start_of_run(self)->n);
+    hsep_warm_start_forget_earlier(self);
 }
 
-HSEP_API void hsep_evidence_believe_earlier(hsep_evidence *self)
+HSEP_API void hsep_warm_start_believe_earlier(hsep_warm_start *self)
 {
-    if (hsep_evidence_earlier(self)->n_rows > 0.0) {
-        hsep_gram_add(hsep_evidence_of_run(self), hsep_evidence_earlier(self), 1.0);
-        hsep_evidence_forget_earlier(self);
+    if (hsep_warm_start_earlier(self)->n_rows > 0.0) {
+        hsep_gram_add(hsep_warm_start_of_run(self), hsep_warm_start_earlier(self), 1.0);
+        hsep_warm_start_forget_earlier(self);
     }
 }
 
-HSEP_API void hsep_evidence_forget_earlier(hsep_evidence *self) { hsep_evidence_earlier(self)->n_rows = 0.0; }
+HSEP_API void hsep_warm_start_forget_earlier(hsep_warm_start *self) { hsep_warm_start_earlier(self)->n_rows = 0.0; }
 
-HSEP_API void hsep_evidence_discount(hsep_evidence *self, hsep_real kept)
+HSEP_API void hsep_warm_start_discount(hsep_warm_start *self, hsep_real forgetting_factor)
 {
-    if (kept < 1.0) {
-        hsep_gram_discount(hsep_evidence_of_run(self), kept);
-        hsep_gram_discount(hsep_evidence_earlier(self), kept);
+    if (forgetting_factor < 1.0) {
+        hsep_gram_discount(hsep_warm_start_of_run(self), forgetting_factor);
+        hsep_gram_discount(hsep_warm_start_earlier(self), forgetting_factor);
     }
 }
 
-HSEP_API void hsep_evidence_begin_run(hsep_evidence *self, hsep_real most)
+HSEP_API void hsep_warm_start_begin_run(hsep_warm_start *self, hsep_real most)
 {
-    hsep_gram *of_run = hsep_evidence_of_run(self);
-    hsep_evidence_believe_earlier(self);
-    hsep_evidence_discount(self, most / hsep_fmax(of_run->n_rows, most));
+    hsep_gram *of_run = hsep_warm_start_of_run(self);
+    hsep_warm_start_believe_earlier(self);
+    hsep_warm_start_discount(self, most / hsep_fmax(of_run->n_rows, most));
     hsep_gram_settle(of_run);
-    memcpy(hsep_evidence_earlier(self), of_run, (size_t)hsep_gram_size(of_run->n));
+    memcpy(hsep_warm_start_earlier(self), of_run, (size_t)hsep_gram_size(of_run->n));
     hsep_gram_init(of_run, of_run->n);
 }

@@ -6,34 +6,37 @@
 #include "hsep_gram.h"
 
 typedef struct {
-    hsep_word of_run, earlier; /* offsets in words: Gram matrices; one whose n_rows are 0 has no rows */
-} hsep_evidence;
+    hsep_int of_run, earlier; /* offsets in words: Gram matrices; one whose n_rows are 0 has no rows */
+} hsep_warm_start;
 
-HSEP_ASSERT_WORDS(hsep_evidence, 2);
+HSEP_ASSERT_WORDS(hsep_warm_start, 2);
 
 /* Bytes of the block, counted as a number so that no size can overflow; n: features. */
-HSEP_API hsep_real hsep_evidence_size(hsep_word n);
-HSEP_API void hsep_evidence_init(hsep_evidence *self, hsep_word n);
-HSEP_API int hsep_evidence_valid(const void *block, hsep_word n);
+HSEP_API hsep_real hsep_warm_start_size(hsep_int n);
+HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n);
+HSEP_API int hsep_warm_start_valid(const void *block, hsep_int n);
 
-static inline hsep_gram *hsep_evidence_of_run(hsep_evidence *self) { return (hsep_gram *)hsep_at(self, self->of_run); }
-static inline hsep_gram *hsep_evidence_earlier(hsep_evidence *self)
+static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self)
+{
+    return (hsep_gram *)hsep_at(self, self->of_run);
+}
+static inline hsep_gram *hsep_warm_start_earlier(hsep_warm_start *self)
 {
     return (hsep_gram *)hsep_at(self, self->earlier);
 }
 
 /* Number of all rows, weighted. */
-HSEP_API hsep_real hsep_evidence_n_rows(hsep_evidence *self);
+HSEP_API hsep_real hsep_warm_start_n_rows(hsep_warm_start *self);
 
 /* Forget all rows; go on with all of them as rows of this run; with the rows of this run alone. */
-HSEP_API void hsep_evidence_forget(hsep_evidence *self);
-HSEP_API void hsep_evidence_believe_earlier(hsep_evidence *self);
-HSEP_API void hsep_evidence_forget_earlier(hsep_evidence *self);
+HSEP_API void hsep_warm_start_forget(hsep_warm_start *self);
+HSEP_API void hsep_warm_start_believe_earlier(hsep_warm_start *self);
+HSEP_API void hsep_warm_start_forget_earlier(hsep_warm_start *self);
 
-/* Weigh all rows so far by kept. */
-HSEP_API void hsep_evidence_discount(hsep_evidence *self, hsep_real kept);
+/* Weigh all rows so far by forgetting_factor. */
+HSEP_API void hsep_warm_start_discount(hsep_warm_start *self, hsep_real forgetting_factor);
 
 /* Begin another run: all rows so far are of earlier ones, and weigh at most as many of this one. */
-HSEP_API void hsep_evidence_begin_run(hsep_evidence *self, hsep_real most);
+HSEP_API void hsep_warm_start_begin_run(hsep_warm_start *self, hsep_real most);
 
 #endif

@@ -1,6 +1,6 @@
 /* What a version of FMI calls things, and how it counts variables: all that messages and value references need. */
-#ifndef HSEP_WORDS_H
-#define HSEP_WORDS_H
+#ifndef HSEP_FMI_NAMES_H
+#define HSEP_FMI_NAMES_H
 
 #include "hsep_api.h"
 #include "hsep_model.h"
@@ -35,6 +35,6 @@ typedef struct {
     hsep_found (*find)(const hsep_context *context, size_t reference);
     /* and its name, in text. */
     const char *(*name)(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE]);
-} hsep_words;
+} hsep_fmi_names;
 
 #endif

@@ -42,7 +42,7 @@ static const char *fmi3_name(const hsep_context *context, size_t reference, char
     return text;
 }
 
-static const hsep_words fmi3_words = {
+static const hsep_fmi_names fmi3_names = {
     .instantiate = "fmi3InstantiateCoSimulation",
     .reset = "fmi3Reset",
     .token = "instantiationToken",
@@ -62,6 +62,6 @@ static const hsep_words fmi3_words = {
     .find = fmi3_find,
     .name = fmi3_name};
 
-HSEP_API const hsep_words *hsep_fmi3_words(void) { return &fmi3_words; }
+HSEP_API const hsep_fmi_names *hsep_fmi3_names(void) { return &fmi3_names; }
 
 HSEP_API fmi3Status hsep_fmi3_status(hsep_status status) { return (status == HSEP_REFUSED) ? fmi3Error : fmi3OK; }

@@ -1,6 +1,6 @@
-"""Benchmark of compensation with the trusted model, by the settings of the machine files.
+"""Benchmark of compensation with the averaged model, by the settings of the machine files.
 
-    python -m benchmarks.compensation.trusted [--seeds 1] [--first-seed 0] [--only TEXT]      (15 minutes a seed)
+    python -m benchmarks.compensation.averaged [--seeds 1] [--first-seed 0] [--only TEXT]      (15 minutes a seed)
 
 Tracking RMS of the true position in µm, cold and warm, mean over the seeds, beside the physics model's plans and the
 limits; the exit code is 1 if one is missed. The stage's friction follows the command, or the actual velocity.
@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.averaging import circle, random_moves, short_staircase, with_friction_on
 from benchmarks.compensation.loops import Case, LibraryLoops
 from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, Report, excess
-from benchmarks.trust import circle, random_moves, short_staircase, with_friction_on
 from hybridsep.base.metrics import largest
 from hybridsep.base.signals import Array
 from hybridsep.machines.machine import Machine, load_machine

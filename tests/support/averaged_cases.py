@@ -1,4 +1,4 @@
-"""Drives whose residual is known, and predictors with trust for them."""
+"""Drives whose residual is known, and predictors with averaging for them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from predictor_cases import MODEL
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.predict.averaging.model import TrustedModel
+from hybridsep.predict.averaging.model import AveragedModel
 from hybridsep.predict.predictor import HybridPredictor
 
 __all__ = [
     "FRICTION",
     "PERIOD",
     "TS",
+    "averaged",
+    "averaged_model",
     "change_learned",
     "cycles",
     "friction",
     "physics",
     "run",
-    "trusted",
-    "trusted_model",
 ]
 
 TS = 1e-3  # s
@@ -34,20 +34,20 @@ FRICTION = 2e-5
 """Offset of the command, m, that friction is worth."""
 
 
-def trusted(**changes: Any) -> HybridPredictor:
-    """Return a predictor with trust of the default drive."""
-    return HybridPredictor(MODEL, PredictorSettings(trust=True, **changes))
+def averaged(**changes: Any) -> HybridPredictor:
+    """Return a predictor with averaging of the default drive."""
+    return HybridPredictor(MODEL, PredictorSettings(averaging=True, **changes))
 
 
-def trusted_model(predictor: HybridPredictor) -> TrustedModel:
-    """Return the residual model of a predictor with trust."""
-    assert isinstance(predictor.residual, TrustedModel)
+def averaged_model(predictor: HybridPredictor) -> AveragedModel:
+    """Return the residual model of a predictor with averaging."""
+    assert isinstance(predictor.residual, AveragedModel)
     return predictor.residual
 
 
 def change_learned(predictor: HybridPredictor, **changes: Any) -> None:
-    """Change numbers that a predictor with trust has learned."""
-    model = trusted_model(predictor)
+    """Change numbers that a predictor with averaging has learned."""
+    model = averaged_model(predictor)
     residual = replace(model, learned=replace(model.learned, **changes))
     predictor.state = replace(predictor.state, residual=residual)
 

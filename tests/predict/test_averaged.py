@@ -1,4 +1,4 @@
-"""The residual model with trust: what it predicts of known residuals, and what it never does."""
+"""The residual model with averaging: what it predicts of known residuals, and what it never does."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from averaged_cases import FRICTION, PERIOD, TS, averaged, averaged_model, cycles, friction, physics, run
 from predictor_cases import MODEL
-from trusted_cases import FRICTION, PERIOD, TS, cycles, friction, physics, run, trusted, trusted_model
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.model import OF_PHYSICS
-from hybridsep.predict.averaging.stacking import COMMAND, LAGGED, STATIC
+from hybridsep.predict.averaging.model import MODEL_RESIDUAL
+from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, STATIC
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-7  # m
@@ -33,7 +33,7 @@ def with_friction(n: int, noise: float = NOISE, seed: int = 0) -> tuple[Array, A
 
 def test_a_residual_that_is_a_feature_is_predicted_to_the_noise() -> None:
     x_d, x_pb, x = with_friction(4 * PERIOD)
-    x_h = run(trusted(), x_d, x)
+    x_h = run(averaged(), x_d, x)
     seen = slice(2 * PERIOD, None)
     assert rms((x - x_pb)[seen]) > 100 * NOISE
     assert rms((x - x_h)[seen]) < 1.15 * NOISE
@@ -44,10 +44,10 @@ def test_what_was_learned_is_kept_while_the_velocity_grows() -> None:
     k = np.arange(4500.0)
     x_d = np.asarray(5e-3 * (k / 4500.0) ** 1.8 * np.sin(2.0 * np.pi * 2e-3 * k))
     velocity = np.abs(np.diff(x_d))
-    assert 500.0 < velocity.max() / velocity[:100].max() < CONSTANTS.outgrown
+    assert 500.0 < velocity.max() / velocity[:100].max() < CONSTANTS.velocity_jump
     x_pb = physics(x_d)
     x = x_pb + friction(x_d) + NOISE * np.random.default_rng(0).normal(size=len(k))
-    x_h = run(trusted(), x_d, x)
+    x_h = run(averaged(), x_d, x)
     for window in range(25, 45):
         seen = slice(100 * window, 100 * (window + 1))
         assert rms((x - x_h)[seen]) < 0.5 * rms((x - x_pb)[seen]), window
@@ -58,11 +58,11 @@ def test_the_rounding_of_a_command_at_rest_is_outgrown() -> None:
     x_d, _, x = with_friction(2 * PERIOD)
     x_d = np.concatenate((np.zeros(500), x_d)) + 1e-12 * np.random.default_rng(2).normal(size=500 + len(x_d))
     x = np.concatenate((np.zeros(500), x))
-    predictor = trusted()
+    predictor = averaged()
     run(predictor, x_d[:500], x[:500])
-    assert 0.0 < trusted_model(predictor).learned.velocity_scale < 1e-8
+    assert 0.0 < averaged_model(predictor).learned.velocity_scale < 1e-8
     x_h = run(predictor, x_d[500:], x[500:])
-    assert trusted_model(predictor).learned.velocity_scale > 1e-2
+    assert averaged_model(predictor).learned.velocity_scale > 1e-2
     assert rms((x[500:] - x_h)[PERIOD:]) < 10 * NOISE
 
 
@@ -73,7 +73,7 @@ def test_an_unstable_recursion_is_bounded_by_the_residuals_so_far(rate: float, g
     x_pb = physics(x_d)
     e = 1e-9 * rate ** np.minimum(np.arange(1000.0), grown)
     x = x_pb + e
-    paper, predictor = HybridPredictor(MODEL, PredictorSettings(trust=False, t_init=0.0)), trusted()
+    paper, predictor = HybridPredictor(MODEL, PredictorSettings(averaging=False, t_init=0.0)), averaged()
     runaway = 0.0
     for k in range(0, 1000, 100):
         window, largest = slice(k, k + 100), np.abs(e[:k]).max(initial=0.0)
@@ -86,7 +86,7 @@ def test_an_unstable_recursion_is_bounded_by_the_residuals_so_far(rate: float, g
 
 
 def test_before_anything_is_learned_it_is_the_physics_model() -> None:
-    predictor = trusted()
+    predictor = averaged()
     for command in (cycles(100), cycles(250) + 0.3):
         prediction = predictor.predict(command)
         np.testing.assert_array_equal(prediction.e_h, 0.0)
@@ -96,7 +96,7 @@ def test_before_anything_is_learned_it_is_the_physics_model() -> None:
 
 @pytest.mark.parametrize("start", [0.0, 0.3])
 def test_without_a_residual_nothing_is_predicted(start: float) -> None:
-    predictor, x_d = trusted(), start + cycles(1500)
+    predictor, x_d = averaged(), start + cycles(1500)
     for k in range(0, 1500, 100):
         prediction = predictor.predict(x_d[k : k + 100])
         assert np.abs(prediction.e_h).max() <= 1e-15 * start  # rounding
@@ -108,8 +108,8 @@ def test_without_a_residual_nothing_is_predicted(start: float) -> None:
 def test_any_unit_gives_the_same(size: float, given: dict[str, float]) -> None:
     x_d, _, x = with_friction(2500, noise=1e-6)
     scaled = {name: value * (1.0 if name == "forgetting" else size) for name, value in given.items()}
-    x_h = run(trusted(**given), x_d, x)
-    found = run(trusted(lam=1e-12 * size**2, **scaled), size * x_d, size * x)
+    x_h = run(averaged(**given), x_d, x)
+    found = run(averaged(lam=1e-12 * size**2, **scaled), size * x_d, size * x)
     np.testing.assert_allclose(found / size, x_h, rtol=0, atol=1e-6 * np.abs(x_h - physics(x_d)).max())
 
 
@@ -119,7 +119,7 @@ def test_a_first_reversal_falls_back() -> None:
     x_d = 2e-5 * np.minimum(t, 2000 - t)  # to and back at 20 mm/s
     x_pb = physics(x_d)
     x = x_pb + friction(x_d) + NOISE * np.random.default_rng(1).normal(size=2000)
-    predictor = trusted()
+    predictor = averaged()
     x_h = run(predictor, x_d, x)
     turned, later = slice(1000, 1100), slice(1800, 2000)
     assert rms((x - x_h)[900:1000]) < 0.2 * rms((x - x_pb)[900:1000])
@@ -132,7 +132,7 @@ def test_a_first_reversal_falls_back() -> None:
 def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
     """What is learned does not depend on the windows: there is one row for each measured sample."""
     x_d, x_pb, x = with_friction(600, noise=1e-6)
-    usual, other = trusted(Np=60, p=20), trusted(Np=60, p=20)
+    usual, other = averaged(Np=60, p=20), averaged(Np=60, p=20)
     run(usual, x_d, x, 60)
     x_h = run(other, x_d, x, n, measured)
     assert other.k == usual.k == 600
@@ -148,14 +148,14 @@ def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
 
 def test_the_last_accepted_residual_is_that_of_the_last_plausible_measurement() -> None:
     x_d, x_pb, x = with_friction(150)
-    predictor = trusted()
+    predictor = averaged()
     run(predictor, x_d, x)
     assert predictor.residual.last == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
 
 
 def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
     x_d, x_pb, x = with_friction(300)
-    predictor = trusted()
+    predictor = averaged()
     run(predictor, x_d[:200], x[:200])
     before, n_rows = predictor.regression.factor, predictor.regression.n_rows
     predictor.predict(x_d[200:])
@@ -170,11 +170,11 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     x_d = cycles(3000)
     rng = np.random.default_rng(5)
     x = physics(x_d) + 1e-5 + np.cumsum(1e-7 * rng.normal(size=3000))  # an offset that drifts, which a hold predicts
-    predictor = trusted()
+    predictor = averaged()
     run(predictor, x_d[:2900], x[:2900])
-    assert trusted_model(predictor).learned.stack.weights[0] > 0.3
-    trusted_model(predictor).run.past[OF_PHYSICS][0] = 1.0
-    largest = trusted_model(predictor).learned.scales[OF_PHYSICS].largest
+    assert averaged_model(predictor).learned.stack.weights[0] > 0.3
+    averaged_model(predictor).run.past[MODEL_RESIDUAL][0] = 1.0
+    largest = averaged_model(predictor).learned.scales[MODEL_RESIDUAL].largest
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * largest < 1e-4
 
 
@@ -186,7 +186,7 @@ def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
     e[changed:] *= -3.0
     true = x_pb + e
     x = true + 1e-6 * np.random.default_rng(2).normal(size=len(x_d))
-    kept, faded = run(trusted(), x_d, x), run(trusted(forgetting=0.3), x_d, x)
+    kept, faded = run(averaged(), x_d, x), run(averaged(forgetting=0.3), x_d, x)
     late = slice(changed + 4 * PERIOD, None)
     assert rms((true - faded)[late]) < 0.7 * rms((true - kept)[late])
     assert rms((true - faded)[late]) < 1e-6
@@ -194,19 +194,21 @@ def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
 
 def test_the_noise_that_is_given_is_that_of_the_experts() -> None:
     x_d, _, x = with_friction(1000, noise=1e-6)
-    predictor = trusted(noise_std=3e-6)
+    predictor = averaged(noise_std=3e-6)
     run(predictor, x_d, x)
-    learned = trusted_model(predictor).learned
-    assert [learned.errors_of(i).noise_variance for i in (LAGGED, STATIC, COMMAND)] == [pytest.approx(9e-12)] * 3
-    estimated = trusted()
+    learned = averaged_model(predictor).learned
+    assert [learned.errors_of(i).noise_variance for i in (ARX_RESIDUAL, STATIC, ARX_COMMAND)] == [
+        pytest.approx(9e-12)
+    ] * 3
+    estimated = averaged()
     run(estimated, x_d, x)
-    for i in (LAGGED, STATIC):
-        assert math.sqrt(trusted_model(estimated).learned.errors_of(i).noise_variance) == pytest.approx(1e-6, rel=0.3)
+    for i in (ARX_RESIDUAL, STATIC):
+        assert math.sqrt(averaged_model(estimated).learned.errors_of(i).noise_variance) == pytest.approx(1e-6, rel=0.3)
 
 
 def test_an_effect_that_is_given_bounds_what_features_explain() -> None:
     x_d, _, x = with_friction(1500, noise=1e-6)
-    usual, little = run(trusted(effect=FRICTION), x_d, x), run(trusted(effect=1e-12), x_d, x)
+    usual, little = run(averaged(effect=FRICTION), x_d, x), run(averaged(effect=1e-12), x_d, x)
     last = slice(1000, None)
     assert rms((x - usual)[last]) < 1.5e-6
     assert rms((x - little)[last]) > 2.0 * rms((x - usual)[last])
@@ -215,7 +217,7 @@ def test_an_effect_that_is_given_bounds_what_features_explain() -> None:
 @pytest.mark.parametrize(("t_init", "n_init"), [(-1.0, 0), (0.0, 0), (0.25, 250)])
 def test_warm_up(t_init: float, n_init: int) -> None:
     x_d, x_pb, x = with_friction(600)
-    predictor = trusted(t_init=t_init)
+    predictor = averaged(t_init=t_init)
     assert predictor.n_init == n_init
     x_h = run(predictor, x_d, x)
     np.testing.assert_allclose(x_h[:n_init], x_pb[:n_init], rtol=0, atol=1e-16)
@@ -230,7 +232,7 @@ def test_a_rest_trains_nothing_of_a_motion() -> None:
     rng = np.random.default_rng(4)
     x_pb = physics(x_d)
     x = x_pb + np.where(np.arange(5000) < 2000, 3e-6, friction(x_d)) + NOISE * rng.normal(size=5000)
-    predictor = trusted()
+    predictor = averaged()
     x_h = run(predictor, x_d[:2000], x[:2000])
     assert rms((x[:2000] - x_h)[1000:]) < 1.2 * NOISE
     first = predictor.predict(x_d[2000:2100])
@@ -240,11 +242,11 @@ def test_a_rest_trains_nothing_of_a_motion() -> None:
 
 
 def test_an_operator_is_refused() -> None:
-    with pytest.raises(ParameterError, match="needs the paper's model, trust = false"):
-        trusted().operator()
+    with pytest.raises(ParameterError, match="needs the paper's model, averaging = false"):
+        averaged().operator()
 
 
-def test_features_are_those_of_the_model_with_trust() -> None:
-    predictor = trusted(p=7, q=2)
+def test_features_are_those_of_the_model_with_averaging() -> None:
+    predictor = averaged(p=7, q=2)
     assert predictor.regression.n_features == len(predictor.weights) == 2 + 2 + 16 + 7
     assert predictor.T_s == TS

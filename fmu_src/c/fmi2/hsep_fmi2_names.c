@@ -11,7 +11,7 @@ static hsep_found fmi2_find(const hsep_context *context, size_t reference)
 /* Enumerations are read and written as integers. */
 static const char fmi2_integer[] = "Integer";
 
-static const hsep_words fmi2_words = {
+static const hsep_fmi_names fmi2_names = {
     .instantiate = "fmi2Instantiate",
     .reset = "fmi2Reset",
     .token = "fmuGUID",
@@ -31,6 +31,6 @@ static const hsep_words fmi2_words = {
     .find = fmi2_find,
     .name = hsep_table_name};
 
-HSEP_API const hsep_words *hsep_fmi2_words(void) { return &fmi2_words; }
+HSEP_API const hsep_fmi_names *hsep_fmi2_names(void) { return &fmi2_names; }
 
 HSEP_API fmi2Status hsep_fmi2_status(hsep_status status) { return (status == HSEP_REFUSED) ? fmi2Error : fmi2OK; }

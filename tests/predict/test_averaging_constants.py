@@ -1,4 +1,4 @@
-"""Constants of the model with trust: few, all in one place; names of library and C core correspond."""
+"""Constants of the model with averaging: few, all in one place; names of library and C core correspond."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from hybridsep.predict.averaging.constants import CONSTANTS
 from hybridsep.predict.averaging.experts import ExpertErrors, ResidualScale
-from hybridsep.predict.averaging.gate import Reach
+from hybridsep.predict.averaging.gate import InnovationGate
 from hybridsep.predict.averaging.model import Learned
 from hybridsep.predict.averaging.stacking import Stack
 
@@ -115,11 +115,11 @@ def test_all_that_is_learned_has_the_same_order() -> None:
     """The largest magnitudes of the features, whose number the settings decide, are behind the struct."""
     *struct, largest = names(Learned)
     assert members("hsep_averaged_model.h", "hsep_learned") == struct
-    assert largest == members("hsep_averaged_model.h", "hsep_trusted")[-2]
+    assert largest == members("hsep_averaged_model.h", "hsep_averaged")[-2]
 
 
 def test_what_is_known_of_the_reach_has_the_same_names() -> None:
-    assert members("hsep_gate.h", "hsep_reach")[:3] == names(Reach)
+    assert members("hsep_gate.h", "hsep_gate")[:3] == names(InnovationGate)
 
 
 @pytest.mark.parametrize("package", ["predict", "predict/averaging"])

@@ -1,20 +1,20 @@
-/* Memory of a planner on the residual model with trust: its layout, beginning and check. */
-#include "hsep_trusted_planner.h"
+/* Memory of a planner on the residual model with averaging: its layout, beginning and check. */
+#include "hsep_averaged_planner.h"
 
 #include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real trusted_planner_lay_out(
-    hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
+static hsep_real averaged_planner_lay_out(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
-    const hsep_word n = hsep_splines_count(planner->preview, planner->spacing);
+    const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
     const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const hsep_word n_pinned = hsep_planner_n_pinned(planner);
+    const hsep_int n_pinned = hsep_planner_n_pinned(planner);
     const hsep_real columns = (hsep_real)(n - n_pinned), coefficients = HSEP_N_DECIDED + (hsep_real)n;
     const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
-    hsep_real end = HSEP_WORDS(hsep_trusted_planner);
+    hsep_real end = HSEP_WORDS(hsep_averaged_planner);
     self->preview = planner->preview;
     self->late = hsep_late(parameters->settings);
     self->p = parameters->settings->p;
@@ -36,18 +36,18 @@ static hsep_real trusted_planner_lay_out(
 }
 
 HSEP_API hsep_real
-hsep_trusted_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
+hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
-    return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
+    return averaged_planner_lay_out(&(hsep_averaged_planner){0}, parameters, planner);
 }
 
-HSEP_API void hsep_trusted_planner_init(
-    hsep_trusted_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
+HSEP_API void hsep_averaged_planner_init(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
-    (void)trusted_planner_lay_out(self, parameters, planner);
+    memset(self, 0, (size_t)hsep_averaged_planner_size(parameters, planner));
+    (void)averaged_planner_lay_out(self, parameters, planner);
     self->start = start;
     self->columns = self->rows = self->n_pinned;
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
@@ -58,18 +58,18 @@ HSEP_API void hsep_trusted_planner_init(
     }
 }
 
-HSEP_API int hsep_trusted_planner_valid(
+HSEP_API int hsep_averaged_planner_valid(
     const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
-    const hsep_word n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
-    hsep_trusted_planner got;
+    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    hsep_averaged_planner got;
     memcpy(&got, block, sizeof got);
-    (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
+    (void)averaged_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_AVERAGED_PREDICT && got.follows <= 1 &&
            got.varied <= got.preview + got.late && got.predicted <= got.preview + got.late &&
-           got.steps <= HSEP_TRUSTED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
+           got.steps <= HSEP_AVERAGED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
            got.part < HSEP_LINEARISED_EXPERTS && got.rows >= got.n_pinned && got.rows <= got.n &&
-           got.tries <= HSEP_TRUSTED_TRIES && got.planned <= 2 && got.bounded <= 1 && got.ended <= 1 &&
+           got.tries <= HSEP_AVERAGED_TRIES && got.planned <= 2 && got.bounded <= 1 && got.ended <= 1 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);

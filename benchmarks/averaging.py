@@ -1,6 +1,6 @@
-"""Paper's model and predictor with trust beside the physics model and the hold, cold and warm.
+"""Paper's model and predictor with averaging beside the physics model and the hold, cold and warm.
 
-    python -m benchmarks.trust [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
+    python -m benchmarks.averaging [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
 
 RMS of the prediction error against the measured position, µm, over the whole run from its first sample. A warm run goes
 on with what the cold one has learned, under other noise; over a recording it is a second pass. The stage's friction
@@ -73,7 +73,7 @@ class Row:
     name : str
     physics, hold : float
         Of the cold run.
-    paper, trust : tuple of two floats
+    paper, averaging : tuple of two floats
         Cold and warm.
     """
 
@@ -81,11 +81,11 @@ class Row:
     physics: float
     hold: float
     paper: tuple[float, float]
-    trust: tuple[float, float]
+    averaging: tuple[float, float]
 
     def __str__(self) -> str:
-        cells = [self.physics, self.hold, *self.paper, *self.trust]
-        ratios = [self.trust[0] / self.physics, self.trust[0] / self.hold]
+        cells = [self.physics, self.hold, *self.paper, *self.averaging]
+        ratios = [self.averaging[0] / self.physics, self.averaging[0] / self.hold]
         return (
             f"{self.name:40}"
             + "".join(f"{_micrometres(cell):>10}" for cell in cells)
@@ -99,8 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
     parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
     options = parser.parse_args(arguments)
-    columns = ("physics", "hold", "paper", "warm", "trust", "warm", "× physics", "× hold")
-    print(f"{'µm; ratios: trust, cold':40}" + "".join(f"{column:>10}" for column in columns))
+    columns = ("physics", "hold", "paper", "warm", "averaging", "warm", "× physics", "× hold")
+    print(f"{'µm; ratios: averaging, cold':40}" + "".join(f"{column:>10}" for column in columns))
     for case in cases(options.emps, options.recordings):
         print(replayed(case), flush=True)
 
@@ -174,7 +174,7 @@ def random_moves(seed: int) -> Array:
 def recorded(path: Path, Np: int) -> Case:
     """Return the case of a recording with a model fitted to it."""
     x_d, x, T_s = even(path)
-    settings = PredictorSettings(trust=False, Np=Np, p=min(50, Np), T_s=T_s)
+    settings = PredictorSettings(averaging=False, Np=Np, p=min(50, Np), T_s=T_s)
     return Case(f"{path.stem}, Np = {Np}", fitted_model(x_d, x, T_s), settings, x_d, (x, x))
 
 
@@ -206,14 +206,14 @@ def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:
 
 def replayed(case: Case) -> Row:
     """Return the errors of all predictors on a case."""
-    trusting = replace(case.settings, trust=True, t_init=-1.0)
-    peers = backtest(HybridPredictor(case.model, trusting), case.x_d, case.x_meas[0]).overall
+    averages = replace(case.settings, averaging=True, t_init=-1.0)
+    peers = backtest(HybridPredictor(case.model, averages), case.x_d, case.x_meas[0]).overall
     return Row(
         case.name,
         peers.rms_pb,
         peers.rms_hold,
         _cold_and_warm(HybridPredictor(case.model, case.settings), case),
-        _cold_and_warm(HybridPredictor(case.model, trusting), case),
+        _cold_and_warm(HybridPredictor(case.model, averages), case),
     )
 
 

@@ -1,4 +1,4 @@
-"""Saved state of a predictor with trust: restored bit for bit, or refused."""
+"""Saved state of a predictor with averaging: restored bit for bit, or refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trusted_cases import cycles, friction, physics, run, trusted, trusted_model
+from averaged_cases import averaged, averaged_model, cycles, friction, physics, run
 
 from hybridsep.base.errors import StateError
 from hybridsep.base.signals import Array
@@ -35,7 +35,7 @@ def in_mid_run(x: Array | None = None, *, warm: bool = False, **changes: Any) ->
     """Return a small predictor after 400 samples, of a second run if it is warm, with a predicted window of 30."""
     x_d, sound = signals()
     x = sound if x is None else x
-    predictor = trusted(**{"Np": 20, "p": 6, "q": 2, "forgetting": 2.0} | changes)
+    predictor = averaged(**{"Np": 20, "p": 6, "q": 2, "forgetting": 2.0} | changes)
     if warm:
         run(predictor, x_d, sound, 20)
         predictor.restart(0.1)
@@ -56,8 +56,8 @@ def test_a_restored_predictor_continues_bit_for_bit(pending: bool, warm: bool) -
     x_d, x = signals()
     x[[390, 395]], x[435:440] = np.nan, x[435] + 1e-2  # what is missing is part of the state, too
     original = in_mid_run(x=x, warm=warm)
-    assert trusted_model(original).doubts == warm
-    assert trusted_model(original).n_rejected >= 2
+    assert averaged_model(original).doubts == warm
+    assert averaged_model(original).n_rejected >= 2
     if not pending:
         original.update(x[400:430])
     twins = {way: restored(original) for way, restored in WAYS.items()}
@@ -79,7 +79,7 @@ def test_a_restored_predictor_continues_bit_for_bit(pending: bool, warm: bool) -
 
 @pytest.mark.parametrize("samples", [0, 1])
 def test_before_anything_is_learned(samples: int) -> None:
-    predictor = trusted(q=0)
+    predictor = averaged(q=0)
     if samples:
         run(predictor, np.zeros(1), np.zeros(1))
     predictor.predict(np.linspace(0.0, 1e-3, 100))
@@ -91,7 +91,7 @@ def test_before_anything_is_learned(samples: int) -> None:
 def test_with_dead_time_first_order_hold_and_a_restart() -> None:
     x_d, x = signals()
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 4)
-    predictor = HybridPredictor(model, trusted(input_hold="foh", Np=20, p=20).settings)
+    predictor = HybridPredictor(model, averaged(input_hold="foh", Np=20, p=20).settings)
     run(predictor, x_d[:300], x[:300], 20)
     predictor.restart(0.1)
     twin = HybridPredictor.from_bytes(predictor.to_bytes())
@@ -185,7 +185,7 @@ def test_a_prediction_that_overflows_is_refused() -> None:
         HybridPredictor.from_bytes(pack("predictor", meta, arrays))
 
 
-@pytest.mark.parametrize("change", [{"trust": False}, {"q": 3}, {"p": 7}, {"p": 5}, {"p": 20, "q": 0}])
+@pytest.mark.parametrize("change", [{"averaging": False}, {"q": 3}, {"p": 7}, {"p": 5}, {"p": 20, "q": 0}])
 def test_other_settings(change: dict[str, Any]) -> None:
     meta, arrays, _ = unpack("predictor", saved())
     meta["settings"] |= change

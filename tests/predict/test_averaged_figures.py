@@ -1,4 +1,4 @@
-"""RMS errors of the model with trust, cold and warm, on the default drive, the stage and the recorded axis."""
+"""RMS errors of the model with averaging, cold and warm, on the default drive, the stage and the recorded axis."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from hybridsep.plants.trajectory import spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 
 
-def with_trust(machine: Machine) -> HybridPredictor:
-    """Return the machine's predictor with trust, without a warm-up."""
-    return machine.new_predictor(replace(machine.predictor_settings, trust=True, t_init=-1.0))
+def with_averaging(machine: Machine) -> HybridPredictor:
+    """Return the machine's predictor with averaging, without a warm-up."""
+    return machine.new_predictor(replace(machine.predictor_settings, averaging=True, t_init=-1.0))
 
 
 def rms_um(predictor: HybridPredictor, x_d: Array, x: Array) -> float:
@@ -32,7 +32,7 @@ def rms_um(predictor: HybridPredictor, x_d: Array, x: Array) -> float:
 
 def cold_and_warm(name: str, x_d: Array, noise_std: float) -> tuple[float, float]:
     machine = load_machine(name)
-    predictor, x = with_trust(machine), simulate(machine.new_plant(), x_d, machine.T_s)
+    predictor, x = with_averaging(machine), simulate(machine.new_plant(), x_d, machine.T_s)
     cold = rms_um(predictor, x_d, Encoder(noise_std, 0).measure_all(x))
     predictor.restart()
     return cold, rms_um(predictor, x_d, Encoder(noise_std, 1000).measure_all(x))
@@ -60,7 +60,7 @@ def test_spiral_of_the_stage(axis: str, cold_most: float, warm_most: float) -> N
 def test_recorded_axis() -> None:
     """The physics model alone: 15.45 µm."""
     log = read_log(EMPS, columns={"t": "t", "x_d": "qg", "x": "qm"})
-    predictor = with_trust(load_machine("emps"))
+    predictor = with_averaging(load_machine("emps"))
     cold = rms_um(predictor, log.x_d, log.x_meas)
     predictor.restart()
     assert cold <= 3.5

@@ -1,6 +1,6 @@
-/* Work of the parts of a plan on the residual model with trust, in multiply-adds, counted from the sizes and
+/* Work of the parts of a plan on the residual model with averaging, in multiply-adds, counted from the sizes and
  * not timed, so that samples can share it equally on any processor. */
-#include "hsep_trusted_planner.h"
+#include "hsep_averaged_planner.h"
 
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
@@ -20,7 +20,7 @@ static const hsep_real work_completed = 50.0, work_pivots = 1.5, work_product = 
                        work_shifted = 20.0, work_bounds = 280.0, work_allowed = 90.0;
 static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 200.0;
 
-static const hsep_word work_solved[1 + HSEP_TRUSTED_STEPS] = {HSEP_NEWTON_SOLVED};
+static const hsep_int work_solved[1 + HSEP_AVERAGED_STEPS] = {HSEP_NEWTON_SOLVED};
 
 /* Disturbances that are filtered for a prediction: friction once, stiffness and damping twice. */
 static const hsep_real work_filtered = 10.0, work_of_mode = 9.0;
@@ -36,16 +36,16 @@ typedef struct {
     hsep_real free;                  /* splines that are not pinned */
     hsep_real modes;
     work_experts experts;
-    hsep_word n_columns;               /* experts that columns take work for, */
+    hsep_int n_columns;                /* experts that columns take work for, */
     hsep_real columns[HSEP_N_EXPERTS]; /* and their lags */
 } work_sizes;
 
-static work_experts work_of_experts(hsep_trusted *model)
+static work_experts work_of_experts(hsep_averaged *model)
 {
     work_experts sum = {0.0, 0.0, 0.0, 0.0};
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
         if (model->predicted[i]) {
-            const hsep_expert *expert = hsep_trusted_expert(model, i);
+            const hsep_expert *expert = hsep_averaged_expert(model, i);
             const hsep_real n = (hsep_real)(expert->p + expert->n_static);
             sum.count += 1.0;
             sum.features += n;
@@ -56,7 +56,7 @@ static work_experts work_of_experts(hsep_trusted *model)
     return sum;
 }
 
-static work_sizes work_of(const hsep_trusted_planner *self, const hsep_trusted_task *task)
+static work_sizes work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
     work_sizes sizes = {
@@ -66,9 +66,9 @@ static work_sizes work_of(const hsep_trusted_planner *self, const hsep_trusted_t
         .free = (hsep_real)(self->n - self->n_pinned),
         .modes = (hsep_real)physics->n_modes,
         .experts = work_of_experts(task->model)};
-    for (hsep_word i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
         if (hsep_linearised_counts(task->model, i)) {
-            sizes.columns[sizes.n_columns++] = (hsep_real)hsep_trusted_expert(task->model, i)->p;
+            sizes.columns[sizes.n_columns++] = (hsep_real)hsep_averaged_expert(task->model, i)->p;
         }
     }
     return sizes;
@@ -81,7 +81,7 @@ static hsep_real work_factor(const work_sizes *sizes, hsep_real solutions)
 }
 
 /* Parts of an interior-point step, and all of it. */
-static hsep_real work_interior_part(const work_sizes *sizes, hsep_word part)
+static hsep_real work_interior_part(const work_sizes *sizes, hsep_int part)
 {
     const hsep_real n = sizes->free;
     if (part == 0) {
@@ -96,7 +96,7 @@ static hsep_real work_interior_part(const work_sizes *sizes, hsep_word part)
 static hsep_real work_interior(const work_sizes *sizes)
 {
     hsep_real sum = 0.0;
-    for (hsep_word part = 0; part < HSEP_INTERIOR_PARTS; part++) {
+    for (hsep_int part = 0; part < HSEP_INTERIOR_PARTS; part++) {
         sum += work_interior_part(sizes, part);
     }
     return sum;
@@ -136,9 +136,9 @@ static hsep_real work_predict(const work_sizes *sizes)
 }
 
 /* The part of a prediction that comes next. */
-static hsep_real work_next(const hsep_trusted_planner *self, const work_sizes *sizes)
+static hsep_real work_next(const hsep_averaged_planner *self, const work_sizes *sizes)
 {
-    const hsep_real first = work_commands(sizes) + work_run(sizes, sizes->all / HSEP_TRUSTED_AT_FIRST);
+    const hsep_real first = work_commands(sizes) + work_run(sizes, sizes->all / HSEP_AVERAGED_AT_FIRST);
     return self->predicted > 0 ? work_predict(sizes) - first : first;
 }
 
@@ -159,7 +159,7 @@ static hsep_real work_linearise(const work_sizes *sizes) { return sizes->all * w
 static hsep_real work_begin(const work_sizes *sizes) { return sizes->all * (sizes->experts.lags + work_change); }
 
 /* A part of the columns that begin with spline j, side by side. */
-static hsep_real work_columns(const work_sizes *sizes, hsep_real j, hsep_word part)
+static hsep_real work_columns(const work_sizes *sizes, hsep_real j, hsep_int part)
 {
     const hsep_real length = sizes->preview - sizes->spacing * j;
     hsep_real sum = work_group + (part == 0 ? length : 0.0);
@@ -173,11 +173,11 @@ static hsep_real work_columns(const work_sizes *sizes, hsep_real j, hsep_word pa
 
 /* Those from spline j on, but the first parts of the next ones. */
 static hsep_real work_columns_left(
-    const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word j, hsep_word first)
+    const hsep_averaged_planner *self, const work_sizes *sizes, hsep_int j, hsep_int first)
 {
     hsep_real sum = 0.0;
     for (; j < self->n; j += HSEP_PHYSICS_ABREAST, first = 0) {
-        for (hsep_word part = first; part == 0 || part < sizes->n_columns; part++) {
+        for (hsep_int part = first; part == 0 || part < sizes->n_columns; part++) {
             sum += work_columns(sizes, (hsep_real)j, part);
         }
     }
@@ -185,92 +185,92 @@ static hsep_real work_columns_left(
 }
 
 /* Products of the last n columns with each other. */
-static hsep_real work_products(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word row)
+static hsep_real work_products(const hsep_averaged_planner *self, const work_sizes *sizes, hsep_int row)
 {
     const hsep_real n = row < self->n ? (hsep_real)(self->n - row) : 0.0,
                     longest = sizes->preview - sizes->spacing * (hsep_real)row;
     return n * (n + 1.0) * (0.5 * longest - sizes->spacing * (n - 1.0) / 3.0 + work_product);
 }
 
-HSEP_API hsep_real hsep_trusted_planner_next(const hsep_trusted_planner *self, const hsep_trusted_task *task)
+HSEP_API hsep_real hsep_averaged_planner_next(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const work_sizes sizes = work_of(self, task);
-    switch ((hsep_trusted_stage)self->stage) {
-    case HSEP_TRUSTED_DONE:
+    switch ((hsep_averaged_stage)self->stage) {
+    case HSEP_AVERAGED_DONE:
         return 0.0;
-    case HSEP_TRUSTED_VARY:
+    case HSEP_AVERAGED_VARY:
         return self->varied < self->late + self->Np
-                   ? work_samples(&sizes, HSEP_TRUSTED_VARIED, 1.0)
-                   : work_samples(&sizes, HSEP_NEWTON_APART * HSEP_TRUSTED_VARIED, HSEP_NEWTON_APART);
-    case HSEP_TRUSTED_CHANGE:
+                   ? work_samples(&sizes, HSEP_AVERAGED_VARIED, 1.0)
+                   : work_samples(&sizes, HSEP_NEWTON_APART * HSEP_AVERAGED_VARIED, HSEP_NEWTON_APART);
+    case HSEP_AVERAGED_CHANGE:
         return work_begin(&sizes);
-    case HSEP_TRUSTED_BEGIN:
+    case HSEP_AVERAGED_BEGIN:
         return work_open(&sizes);
-    case HSEP_TRUSTED_AIM:
+    case HSEP_AVERAGED_AIM:
         return work_aim(&sizes);
-    case HSEP_TRUSTED_AIMED:
+    case HSEP_AVERAGED_AIMED:
         return work_factor(&sizes, work_pivots);
-    case HSEP_TRUSTED_FACTOR:
+    case HSEP_AVERAGED_FACTOR:
         return self->bounded ? work_completed * sizes.preview : work_factor(&sizes, work_pivots);
-    case HSEP_TRUSTED_FACTORED:
+    case HSEP_AVERAGED_FACTORED:
         return work_factored(&sizes);
-    case HSEP_TRUSTED_SOLVE:
+    case HSEP_AVERAGED_SOLVE:
         return self->bounded ? work_bound(&sizes) : work_factored(&sizes);
-    case HSEP_TRUSTED_PHYSICS:
-    case HSEP_TRUSTED_BOUNDED:
+    case HSEP_AVERAGED_PHYSICS:
+    case HSEP_AVERAGED_BOUNDED:
         return work_interior_part(&sizes, hsep_planner_part(task->planner));
-    case HSEP_TRUSTED_STEP:
+    case HSEP_AVERAGED_STEP:
         return (self->steps == 0 ? work_open(&sizes) : 0.0) + work_slopes(&sizes);
-    case HSEP_TRUSTED_AT:
+    case HSEP_AVERAGED_AT:
         return work_linearise(&sizes);
-    case HSEP_TRUSTED_COLUMN:
+    case HSEP_AVERAGED_COLUMN:
         return work_columns(&sizes, (hsep_real)self->columns, self->part);
-    case HSEP_TRUSTED_PRODUCT:
+    case HSEP_AVERAGED_PRODUCT:
         return work_products(self, &sizes, self->rows) -
-               work_products(self, &sizes, self->rows + HSEP_TRUSTED_PRODUCTS);
-    case HSEP_TRUSTED_JUDGE:
-    case HSEP_TRUSTED_COMPARE:
+               work_products(self, &sizes, self->rows + HSEP_AVERAGED_PRODUCTS);
+    case HSEP_AVERAGED_JUDGE:
+    case HSEP_AVERAGED_COMPARE:
         return work_next(self, &sizes);
-    case HSEP_TRUSTED_PREDICT:
+    case HSEP_AVERAGED_PREDICT:
         break;
     }
-    return (self->predicted > 0 ? 0.0 : work_commands(&sizes)) + work_samples(&sizes, HSEP_TRUSTED_VARIED, 1.0);
+    return (self->predicted > 0 ? 0.0 : work_commands(&sizes)) + work_samples(&sizes, HSEP_AVERAGED_VARIED, 1.0);
 }
 
 /* Solver steps of a programme at most, after those that are done. */
-static hsep_real work_steps(const work_sizes *sizes, hsep_word programme, hsep_word done)
+static hsep_real work_steps(const work_sizes *sizes, hsep_int programme, hsep_int done)
 {
-    const hsep_word most = work_solved[programme];
+    const hsep_int most = work_solved[programme];
     return done < most ? (hsep_real)(most - done) * work_interior(sizes) : 0.0;
 }
 
 /* Lengths of a Newton step. */
-static hsep_real work_judge(const hsep_trusted_planner *self, const work_sizes *sizes)
+static hsep_real work_judge(const hsep_averaged_planner *self, const work_sizes *sizes)
 {
-    return (hsep_real)(HSEP_TRUSTED_TRIES - self->tries) * work_predict(sizes);
+    return (hsep_real)(HSEP_AVERAGED_TRIES - self->tries) * work_predict(sizes);
 }
 
 /* From the solution of a Newton step's programme on, up to the next step. */
-static hsep_real work_programme(const hsep_trusted_planner *self, const work_sizes *sizes, hsep_word step)
+static hsep_real work_programme(const hsep_averaged_planner *self, const work_sizes *sizes, hsep_int step)
 {
     const hsep_real begin = self->bounded || step > self->steps + 1 ? work_bound(sizes) : work_solve(sizes);
-    return begin + work_steps(sizes, step, 0) + HSEP_TRUSTED_TRIES * work_predict(sizes);
+    return begin + work_steps(sizes, step, 0) + HSEP_AVERAGED_TRIES * work_predict(sizes);
 }
 
 /* Newton steps that have not begun. */
-static hsep_real work_newton(const hsep_trusted_planner *self, const work_sizes *sizes)
+static hsep_real work_newton(const hsep_averaged_planner *self, const work_sizes *sizes)
 {
     const hsep_real linearise = work_slopes(sizes) + work_linearise(sizes) +
                                 work_columns_left(self, sizes, self->n_pinned, 0) +
                                 work_products(self, sizes, self->n_pinned);
     hsep_real sum = self->steps == 0 ? work_open(sizes) : 0.0;
-    for (hsep_word step = self->steps + 1; step <= HSEP_TRUSTED_STEPS; step++) {
+    for (hsep_int step = self->steps + 1; step <= HSEP_AVERAGED_STEPS; step++) {
         sum += linearise + work_programme(self, sizes, step);
     }
     return sum;
 }
 
-HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, const hsep_trusted_task *task)
+HSEP_API hsep_real hsep_averaged_planner_left(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const work_sizes sizes = work_of(self, task);
     const hsep_real predict = work_predict(&sizes), window = (hsep_real)(self->late + self->Np);
@@ -278,9 +278,9 @@ HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, c
     const hsep_real begun = self->predicted > 0 ? predict - work_next(self, &sizes) : 0.0; /* is done */
     const hsep_real after_step = work_newton(self, &sizes) + predict + last;
     const hsep_real after_physics = self->follows ? after_step : last;
-    const hsep_word programme = self->stage == HSEP_TRUSTED_BOUNDED ? self->steps : 0;
+    const hsep_int programme = self->stage == HSEP_AVERAGED_BOUNDED ? self->steps : 0;
     hsep_real bounded = work_steps(&sizes, programme, hsep_planner_steps(task->planner));
-    for (hsep_word part = hsep_planner_part(task->planner); part > 0 && part < HSEP_INTERIOR_PARTS; part++) {
+    for (hsep_int part = hsep_planner_part(task->planner); part > 0 && part < HSEP_INTERIOR_PARTS; part++) {
         bounded += work_interior_part(&sizes, part);
     }
     const hsep_real varied = (hsep_real)self->varied, within = varied < window ? window - varied : 0.0;
@@ -288,53 +288,53 @@ HSEP_API hsep_real hsep_trusted_planner_left(const hsep_trusted_planner *self, c
     const hsep_real solve = work_solve(&sizes) + work_steps(&sizes, 0, 0) + after_physics;
     const hsep_real begin = work_open(&sizes) + work_aim(&sizes) + solve;
     hsep_real left = 0.0;
-    switch ((hsep_trusted_stage)self->stage) {
-    case HSEP_TRUSTED_DONE:
+    switch ((hsep_averaged_stage)self->stage) {
+    case HSEP_AVERAGED_DONE:
         return 0.0;
-    case HSEP_TRUSTED_VARY:
+    case HSEP_AVERAGED_VARY:
         left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_NEWTON_APART);
         return left + work_begin(&sizes) + begin;
-    case HSEP_TRUSTED_CHANGE:
+    case HSEP_AVERAGED_CHANGE:
         return work_begin(&sizes) + begin;
-    case HSEP_TRUSTED_BEGIN:
+    case HSEP_AVERAGED_BEGIN:
         return begin;
-    case HSEP_TRUSTED_AIM:
+    case HSEP_AVERAGED_AIM:
         return work_aim(&sizes) + solve;
-    case HSEP_TRUSTED_AIMED:
+    case HSEP_AVERAGED_AIMED:
         return solve;
-    case HSEP_TRUSTED_FACTORED:
+    case HSEP_AVERAGED_FACTORED:
         return solve - work_factor(&sizes, work_pivots);
-    case HSEP_TRUSTED_PHYSICS:
+    case HSEP_AVERAGED_PHYSICS:
         return bounded + after_physics;
-    case HSEP_TRUSTED_AT:
+    case HSEP_AVERAGED_AT:
         left = work_linearise(&sizes) + work_columns_left(self, &sizes, self->n_pinned, 0) +
                work_products(self, &sizes, self->n_pinned) + work_programme(self, &sizes, self->steps);
         break;
-    case HSEP_TRUSTED_COLUMN:
+    case HSEP_AVERAGED_COLUMN:
         left = work_columns_left(self, &sizes, self->columns, self->part) + work_products(self, &sizes, self->rows) +
                work_programme(self, &sizes, self->steps);
         break;
-    case HSEP_TRUSTED_PRODUCT:
+    case HSEP_AVERAGED_PRODUCT:
         left = work_products(self, &sizes, self->rows) + work_programme(self, &sizes, self->steps);
         break;
-    case HSEP_TRUSTED_FACTOR:
+    case HSEP_AVERAGED_FACTOR:
         left = work_programme(self, &sizes, self->steps);
         break;
-    case HSEP_TRUSTED_SOLVE:
+    case HSEP_AVERAGED_SOLVE:
         left = work_programme(self, &sizes, self->steps) - (self->bounded ? 0.0 : work_factor(&sizes, work_pivots));
         break;
-    case HSEP_TRUSTED_BOUNDED:
+    case HSEP_AVERAGED_BOUNDED:
         left = bounded + work_judge(self, &sizes);
         break;
-    case HSEP_TRUSTED_JUDGE:
+    case HSEP_AVERAGED_JUDGE:
         left = work_judge(self, &sizes) - begun;
         break;
-    case HSEP_TRUSTED_COMPARE:
+    case HSEP_AVERAGED_COMPARE:
         return predict - begun + last;
-    case HSEP_TRUSTED_PREDICT:
+    case HSEP_AVERAGED_PREDICT:
         left = self->predicted > 0 ? 0.0 : work_commands(&sizes);
         return left + work_samples(&sizes, window - (hsep_real)self->predicted, 1.0);
-    case HSEP_TRUSTED_STEP:
+    case HSEP_AVERAGED_STEP:
         break;
     }
     return left + after_step;

@@ -1,4 +1,4 @@
-"""The predictor with trust on random drives: as good as the physics model on each, far better on most."""
+"""The predictor with averaging on random drives: as good as the physics model on each, far better on most."""
 
 from __future__ import annotations
 
