@@ -19,8 +19,8 @@ import numpy as np
 
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.records import leaves
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
+from hybridsep.base.state import leaves
 from hybridsep.compensate import newton, planning, qp, splines
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.model.physics import ModalModel

@@ -25,12 +25,10 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.peers import fitted_lag
 from hybridsep.logs.log import read_log
-from hybridsep.machines.machine import Machine
-from hybridsep.machines.paper import paper_machine
+from hybridsep.machines.machine import Machine, paper_machine
 from hybridsep.machines.sections import StageSection
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import PAPER_LIMITS, along_path, rest_to_rest, spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -31,8 +31,7 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.model.physics import ModalModel
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import Plant, simulate
+from hybridsep.plants.plant import Encoder, Plant, simulate
 from hybridsep.plants.trajectory import spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 

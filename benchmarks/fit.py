@@ -24,7 +24,7 @@ from hybridsep.fitting.advice import recommendation
 from hybridsep.fitting.fit import FitOptions, fit
 from hybridsep.fitting.report import judged_by
 from hybridsep.logs.log import Log, read_log
-from hybridsep.machines.naming import machine_name
+from hybridsep.machines.machine import machine_name
 
 WINDOWS = (100, 20)
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import rumoca
 
-from hybridsep.base.data_files import data_folder
+from hybridsep.base.files import data_folder
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu

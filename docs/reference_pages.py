@@ -11,11 +11,11 @@ from typing import Any
 
 import typer
 
+from docs.messages import ERRORS, FINDINGS, Explanation
 from hybridsep import load_machine
 from hybridsep.app.cli import EXAMPLES, app
 from hybridsep.base import errors
-from hybridsep.base.data_files import DEFAULT_MACHINE
-from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
+from hybridsep.base.files import DEFAULT_MACHINE
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import CompensatorSettings
 from hybridsep.fmi.description import TERMINALS

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybridsep import Limits, ModalModel, Mode, read_log, rest_to_rest, simulate
-from hybridsep.base.output import written_whole
+from hybridsep.base.files import written_whole
 from hybridsep.base.signals import Array
 from hybridsep.logs.formats import EXAMPLE
 from hybridsep.plants.stage_drive import StageDrive

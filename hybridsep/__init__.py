@@ -27,12 +27,10 @@ if TYPE_CHECKING:
     from .fmi.archive import build_fmu
     from .fmi.spec import fmu_names
     from .logs.log import Log, read_log
-    from .machines.machine import Machine, load_machine, machine_names
-    from .machines.paper import paper_machine
+    from .machines.machine import Machine, load_machine, machine_names, paper_machine
     from .model.physics import ModalModel, Mode
     from .online.look_ahead import LookAhead
-    from .plants.encoder import Encoder
-    from .plants.plant import Plant, simulate
+    from .plants.plant import Encoder, Plant, simulate
     from .plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
     from .predict.predictor import HybridPredictor
 
@@ -74,7 +72,7 @@ _MODULES = {
     "PAPER_LIMITS": "plants.trajectory",
     "Compensator": "cosim.adapters",
     "CompensatorSettings": "base.settings",
-    "Encoder": "plants.encoder",
+    "Encoder": "plants.plant",
     "FmuInstance": "cosim.fmu",
     "HybridPredictor": "predict.predictor",
     "HybridSepError": "base.errors",
@@ -95,7 +93,7 @@ _MODULES = {
     "fmu_names": "fmi.spec",
     "load_machine": "machines.machine",
     "machine_names": "machines.machine",
-    "paper_machine": "machines.paper",
+    "paper_machine": "machines.machine",
     "read_log": "logs.log",
     "rest_to_rest": "plants.trajectory",
     "simulate": "plants.plant",

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
+from docs.messages import ERRORS, FINDINGS
 from generate import generated
 from hybridsep.base import errors
-from hybridsep.base.messages import ERRORS, FINDINGS
 
 
 @pytest.mark.parametrize("path", generated(), ids=lambda path: path.name)

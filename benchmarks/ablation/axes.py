@@ -30,7 +30,7 @@ from hybridsep.fitting.choice import settings_for
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
 from hybridsep.logs.log import read_log
-from hybridsep.machines.paper import paper_machine
+from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel
 
 __all__ = ["LEVELS", "Axis", "Errors", "Folders", "errors_of", "logs_of", "physics", "simulations_of"]

@@ -18,9 +18,8 @@ from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.spec import fmu_names
 from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Encoder, Plant
 
 __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed", "paper_machine"]
 

@@ -23,8 +23,7 @@ from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.run import Run
-from hybridsep.machines.machine import Machine, machine_from_table
-from hybridsep.machines.paper import PAPER_SETTINGS
+from hybridsep.machines.machine import PAPER_SETTINGS, Machine, machine_from_table
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase

@@ -25,7 +25,7 @@ from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instruction
 from hybridsep.base.settings import CompensatorSettings, Limits
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.machines.machine import load_machine
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 

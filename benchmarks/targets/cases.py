@@ -16,7 +16,7 @@ from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PR
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 

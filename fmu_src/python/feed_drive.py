@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from hybridsep.base.clock import check_communication_point, check_step_size
-from hybridsep.base.saved import Saved
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import check_position
+from hybridsep.base.state import Saved
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive
+from hybridsep.plants.plant import Drive, Encoder
 from hybridsep.plants.stage_drive import StageDrive
 
 _TIME_TOLERANCE = 0.5  # of a step: rounding of the importer's times

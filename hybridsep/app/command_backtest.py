@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..base.output import written_text
+from ..base.files import written_text
 from .options import (
     PREDICTOR_ENTRIES,
     ForceOption,

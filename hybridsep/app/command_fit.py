@@ -50,7 +50,7 @@ def fit(
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
     from ..logs.log import read_log
-    from ..machines.naming import checked_name, machine_name
+    from ..machines.machine import checked_name, machine_name
     from .console import check_outputs, keep_written, written_before
 
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..base.output import written_text
+from ..base.files import written_text
 from .options import (
     AxisOption,
     CommandColumnOption,
@@ -65,7 +65,7 @@ def identify(
     from ..identify.output_error import in_time
     from ..logs.checks import checked
     from ..logs.log import read_log
-    from ..machines.naming import checked_name, machine_name
+    from ..machines.machine import checked_name, machine_name
     from .console import check_outputs, console, print_json, print_written, progress_bar
     from .logs import show
 

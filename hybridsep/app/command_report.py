@@ -47,8 +47,7 @@ def report(
     from ..fitting.report import write_errors, write_findings, write_use
     from ..fmi.weights import warm_predictor
     from ..logs.units import shown_of
-    from ..machines.machine import load_machine, machine_path
-    from ..machines.naming import machine_name
+    from ..machines.machine import load_machine, machine_name, machine_path
     from ..predict.predictor import HybridPredictor
     from .console import check_outputs, console, progress_bar
     from .logs import read_checked, reading_of

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..base.output import written_text
+from ..base.files import written_text
 from ..base.settings import PredictorSettings
 from .options import (
     PREDICTOR_ENTRIES,

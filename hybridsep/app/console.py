@@ -391,7 +391,7 @@ def written_before(results: Path, logs: Sequence[Path]) -> set[Path]:
 
 def keep_written(results: Path, logs: Sequence[Path], files: Iterable[Path]) -> None:
     """Add to a ``fit.json`` which logs it is of, and the hashes of the files that were written beside it."""
-    from ..base.output import written_text
+    from ..base.files import written_text
 
     found = json.loads(results.read_bytes())
     hashes = {path.name: _hash(path) for path in files if path != results}

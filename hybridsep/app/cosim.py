@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..base.data_files import COMMANDS, DEFAULT_MACHINE
 from ..base.errors import ParameterError
+from ..base.files import COMMANDS, DEFAULT_MACHINE
 from ..base.settings import PARAMETERS, check
 from ..fmi.flavours import FLAVOURS
 from .options import (
@@ -139,7 +139,7 @@ def _default_trajectory(machine: str | Path) -> str:
 def _read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
     """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
     from ..logs.log import check_reading
-    from ..machines.agree import check_interval
+    from ..machines.machine import check_interval
     from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 
     check_reading(unit, T_s)

@@ -190,7 +190,7 @@ def _extras_of(
     """
     from ..fmi.weights import load_trained
     from ..logs.log import check_reading
-    from ..machines.agree import check_interval
+    from ..machines.machine import check_interval
     from ..plants.trajectory import read_trajectory
 
     extras: dict[str, dict[str, Any]] = {}
@@ -257,7 +257,7 @@ def hal(
     The component (compensator, or predictor) is the same for all machines; each axis has a folder of its name that
     ``loadrt hsep axes=`` takes.
     """
-    from ..base.output import written_whole
+    from ..base.files import written_whole
     from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
     from ..fmi.weights import WEIGHTS_FILE, load_trained
     from ..machines.machine import load_machine
@@ -315,7 +315,7 @@ def header(
     The library is fmu_src/c: a compensator, or a predictor, for a controller that runs no FMU. The header has the
     axis's modes, settings and, with ``--weights``, what an earlier run has learned.
     """
-    from ..base.output import written_text
+    from ..base.files import written_text
     from ..fmi.controllers import axis_header
     from ..fmi.weights import load_trained
     from ..machines.machine import load_machine, machine_path

@@ -13,8 +13,7 @@ from ..base.errors import LogError
 from ..logs.checks import Finding, checked
 from ..logs.log import Log, read_log
 from ..logs.remedies import Samples, whole_turns
-from ..machines.agree import check_interval, check_unit
-from ..machines.machine import Machine
+from ..machines.machine import Machine, check_interval, check_unit
 from .console import errors_console
 from .options import ReadingOptions
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..base.data_files import COMMANDS
+from ..base.files import COMMANDS
 from ..base.parameters import Parameter
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
 from ..fmi.compile import TARGET_NAMES

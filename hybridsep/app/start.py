@@ -170,9 +170,9 @@ def init(
 
     Of a lag of 6 ms where no option says what the axis is; hybridsep fit and identify find it from a log.
     """
-    from ..base.output import written_text
+    from ..base.files import written_text
     from ..identify.model import machine_of
-    from ..machines.naming import machine_name
+    from ..machines.machine import machine_name
     from ..machines.text import machine_text
     from .console import check_outputs
 

@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError
-from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_published, as_samples
-from ..base.state import pack, unpack
+from ..base.state import Saved, pack, unpack
 from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead
 from ..online.planner import PublishedWindow

@@ -17,8 +17,7 @@ from ..base.settings import check
 from ..base.signals import check_position
 from ..compensate.compensator import SepCompensator
 from ..online.look_ahead import LookAhead
-from ..plants.encoder import Encoder
-from ..plants.plant import Plant
+from ..plants.plant import Encoder, Plant
 from ..predict.predictor import HybridPredictor
 from .run import COMPENSATOR, PREDICTOR, Kind
 

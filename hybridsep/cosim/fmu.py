@@ -31,7 +31,7 @@ from fmpy.fmi2 import (
 from fmpy.fmi3 import FMU3Slave
 
 from ..base.errors import FmuError, first_line, listed
-from ..base.output import named_errors
+from ..base.files import named_errors
 
 __all__ = ["FmuInstance", "read_description"]
 

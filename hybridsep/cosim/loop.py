@@ -22,8 +22,7 @@ from ..base.errors import FmuError, ParameterError
 from ..base.signals import as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
-from ..plants.encoder import Encoder
-from ..plants.plant import Plant
+from ..plants.plant import Encoder, Plant
 from ..predict.predictor import HybridPredictor
 from .adapters import Compensator, FmuController, FmuDrive, LibraryController, LibraryDrive, OwnController
 from .run import Run

@@ -11,9 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction_percent, rms, rms_ratio, shares
-from ..base.output import written_text, written_whole
-from ..base.shown_results import html_table, line_plot, one_line
+from ..base.files import written_text, written_whole
+from ..base.metrics import (
+    batch_rms,
+    hold,
+    html_table,
+    largest,
+    line_plot,
+    one_line,
+    peak_derivatives,
+    reduction_percent,
+    rms,
+    rms_ratio,
+    shares,
+)
 from ..base.signals import Array
 from ..compensate.planning import SepState
 

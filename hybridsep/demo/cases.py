@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.files import written_text
 from ..base.metrics import contour_error, largest, rms
-from ..base.output import written_text
 from ..base.settings import PARAMETERS
 from ..base.signals import Array
 from ..cosim.loop import cosimulate
@@ -22,9 +22,8 @@ from ..fmi.archive import build_here, build_pair, default_flavour
 from ..fmi.flavours import FMI_VERSIONS, versions_of
 from ..fmi.spec import fmu_names
 from ..logs.log import Log, read_log
-from ..machines.machine import Machine, load_machine
-from ..machines.paper import PAPER_SETTINGS, paper_machine
-from ..plants.encoder import Encoder
+from ..machines.machine import PAPER_SETTINGS, Machine, load_machine, paper_machine
+from ..plants.plant import Encoder
 from ..plants.trajectory import archimedean_spiral, spiral, staircase
 from .page import PRINTED, write_page
 

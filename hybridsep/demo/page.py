@@ -9,8 +9,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from ..base.files import written_text
 from ..base.metrics import shown_figure
-from ..base.output import written_text
 
 __all__ = ["PRINTED", "Table", "compensation_table", "prediction_table", "write_page"]
 

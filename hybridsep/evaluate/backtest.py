@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
-from ..base.metrics import RunningErrors, last_residual, reduction_percent, rms_ratio
-from ..base.shown_results import html_table, line_plot, one_line
+from ..base.metrics import RunningErrors, html_table, last_residual, line_plot, one_line, reduction_percent, rms_ratio
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.planning import SepState

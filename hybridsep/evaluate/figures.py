@@ -21,8 +21,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
+from ..base.files import written_whole
 from ..base.metrics import rms
-from ..base.output import written_whole
 from ..base.signals import Array
 from ..compensate.planning import SepState
 from ..cosim.run import Run

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.output import written_text
+from ..base.files import written_text
 from ..base.signals import Indices
 
 if TYPE_CHECKING:

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.data_files import COMMANDS
 from ..base.errors import FmuError, IdentificationError, ParameterError
+from ..base.files import COMMANDS, written_text
 from ..base.metrics import rms_ratio
-from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..base.threads import one_blas_thread

@@ -16,7 +16,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
-from ..base.output import written_whole
+from ..base.files import written_whole
 from ..fmi import native, python
 from ..machines.machine import Machine
 from .compile import ALL_TARGETS, default_targets, expanded, has_native

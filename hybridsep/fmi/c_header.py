@@ -22,8 +22,8 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..base.data_files import data_folder
 from ..base.errors import FmuError
+from ..base.files import data_folder
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, FmuTable, Value, Variable, angular_unit
 

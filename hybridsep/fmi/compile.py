@@ -29,9 +29,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ..base.data_files import data_folder
 from ..base.errors import FmuError
-from ..base.output import named_errors, written_whole
+from ..base.files import data_folder, named_errors, written_whole
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
 

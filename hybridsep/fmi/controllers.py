@@ -20,12 +20,10 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-from ..base.data_files import data_folder
 from ..base.errors import ParameterError
-from ..base.output import written_whole
+from ..base.files import data_folder, written_whole
 from ..base.version import __version__
-from ..machines.agree import check_drive_limits
-from ..machines.machine import Machine
+from ..machines.machine import Machine, check_drive_limits
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
 from .spec import content_guid, table_of
 from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS

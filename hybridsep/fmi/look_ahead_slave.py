@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ..base.saved import Saved
 from ..base.settings import PredictorSettings
+from ..base.state import Saved
 from ..model.physics import ModalModel, Mode
 from ..online.look_ahead import LookAhead
 from ..online.look_ahead_inputs import LookAheadInputs

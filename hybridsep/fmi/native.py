@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from ..base.data_files import data_folder
+from ..base.files import data_folder
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase

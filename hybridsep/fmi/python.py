@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pythonfmu
 
-from ..base.data_files import data_folder
 from ..base.errors import FmuError
+from ..base.files import data_folder
 from ..base.version import __version__
 from .description import model_description
 from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data

@@ -24,7 +24,7 @@ from ..base.errors import FmuError
 from ..base.settings import samples_before
 from ..base.signals import Array
 from ..machines.machine import Machine
-from ..plants.encoder import Encoder
+from ..plants.plant import Encoder
 from ..plants.trajectory import staircase
 from .c_header import TABLE_FILE, table_file
 from .compile import TARGETS, host_target, libraries

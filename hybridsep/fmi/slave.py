@@ -22,10 +22,9 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 from pythonfmu.enums import Fmi2Status
 
 from ..base.errors import FmuError, HybridSepError, SignalError, StateError
-from ..base.saved import Saved
 from ..base.settings import PARAMETERS
 from ..base.signals import check_position
-from ..base.state import pack, unpack
+from ..base.state import Saved, pack, unpack
 from .variables import FmuTable, Variable
 
 __all__ = [

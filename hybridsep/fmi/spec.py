@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
+from ..base.files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS
 from ..base.signals import Array, as_samples
 from ..base.version import VERSION_DATE
-from ..machines.machine import Machine
-from ..machines.paper import PAPER_SETTINGS
+from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase

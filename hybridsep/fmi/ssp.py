@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
-from ..base.output import written_whole
+from ..base.files import written_whole
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..fmi import native

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import SignalError, StateError
-from ..base.records import numbers_of, unsound, with_numbers
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..base.state import numbers_of, unsound, with_numbers
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression

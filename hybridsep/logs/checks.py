@@ -111,7 +111,7 @@ class Finding:
     Attributes
     ----------
     name : str
-        A key of :data:`hybridsep.base.messages.FINDINGS`.
+        A key of ``FINDINGS`` of ``docs/messages.py``.
     words : str
         What it is, by how much, and what to do.
     evidence : mapping

@@ -10,7 +10,7 @@ import gzip
 from pathlib import Path
 
 from ..base.errors import LogError
-from ..base.output import written_whole
+from ..base.files import written_whole
 from .arrays import MatSource, NpzSource, ParquetSource
 from .capture import CaptureSource
 from .halscope import HalscopeCsvSource, HalscopePairsSource

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..base.data_files import data_folder
 from ..base.errors import MachineError, ParameterError, brief, first_line, listed
+from ..base.files import data_folder
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
@@ -45,11 +45,31 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs neither
+
+import re
+
+from ..base.errors import FmuError
+from .sections import NAME_PATTERN
+
+if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..compensate.compensator import SepCompensator
+    from ..logs.log import Log
     from ..predict.predictor import HybridPredictor
 
-__all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
+__all__ = [
+    "PAPER_SETTINGS",
+    "Machine",
+    "check_drive_limits",
+    "check_interval",
+    "check_unit",
+    "checked_name",
+    "load_machine",
+    "machine_from_table",
+    "machine_name",
+    "machine_names",
+    "machine_path",
+    "paper_machine",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,3 +345,81 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
     if machine is None:
         raise ParameterError(listed(problems, str, "; "))
     return machine
+
+
+def check_drive_limits(axis: Machine, instead: str) -> None:
+    """Raise FmuError if a machine has no limits of its drive, which a compensator needs; ``instead`` needs none."""
+    if axis.drive_limits is None:
+        raise FmuError(
+            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {axis.name}; {instead}"
+        )
+
+
+def check_interval(name: str, T_s: float, axis: Machine) -> None:
+    """Raise ParameterError if a file's sampling interval is not the machine's."""
+    if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
+        return
+    hint = "resample the file or correct T_s"
+    for factor, unit in ((1e3, "ms"), (1e6, "µs")):
+        if abs(T_s / axis.T_s / factor - 1) < 0.01:
+            hint = f"is its time in {unit}? It must be in seconds"
+    raise ParameterError(f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
+
+
+def check_unit(name: str, log: Log, axis: Machine) -> None:
+    """Raise ParameterError if a log states lengths for a rotary axis, or angles for a linear one."""
+    if log.unit_stated and log.unit != axis.unit:
+        raise ParameterError(
+            f"{name} is in {log.unit}, but machine {axis.name} has unit = {axis.unit!r}; correct the machine file, or "
+            "say the log's unit (--unit)"
+        )
+
+
+_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
+"""Endings behind that of the format."""
+
+
+def machine_name(path: Path, axis: str | None = None) -> str:
+    """Return a machine's name from the names of a log and of the axis that is read from it."""
+    stem = path.with_suffix("") if path.suffix.lower() in _COMPRESSED else path
+    name = re.sub(r"[^A-Za-z0-9]+", "_", f"{stem.stem} {axis or ''}").strip("_")
+    name = name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
+    if not re.fullmatch(NAME_PATTERN, name):
+        raise ParameterError(
+            f"an axis's name must have at most 100 letters, the log's gives {brief(name)}; give a --name"
+        )
+    return name
+
+
+def checked_name(name: str) -> str:
+    """Return a machine's name; ParameterError if it cannot be one."""
+    if re.fullmatch(NAME_PATTERN, name):
+        return name
+    raise ParameterError(f"--name must be a letter, then at most 99 letters, digits and _, got {name!r}")
+
+
+PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {
+    "spring_mass_damper": {"averaging": False, "t_init": 0.3},
+    "als25010_x": {"averaging": False, "t_init": 0.297},
+    "als25010_y": {"averaging": False, "t_init": 0.297},
+    "emps": {"averaging": False, "t_init": 1.242},
+}
+"""By machine: the residual model of eqs. (5) and (6) as printed, and a warm-up, s, of 5 % of the trajectory."""
+
+
+def paper_machine(name: str) -> Machine:
+    """Return a bundled machine whose predictor has the paper's settings.
+
+    Parameters
+    ----------
+    name : str
+        Of :data:`PAPER_SETTINGS`.
+
+    Raises
+    ------
+    MachineError
+        If the paper has no settings for it.
+    """
+    if name not in PAPER_SETTINGS:
+        raise MachineError(f"the paper's machines are {', '.join(PAPER_SETTINGS)}, got {name!r}")
+    return load_machine(name).changed("predictor", PAPER_SETTINGS[name])

@@ -18,10 +18,9 @@ import math
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.saved import Saved
 from ..base.settings import samples_before
 from ..base.signals import POSITION_MAX, Array, as_measured, check_position
-from ..base.state import pack, unpack
+from ..base.state import Saved, pack, unpack
 from ..predict.predictor import HybridPredictor
 from .planner import Planner, PublishedWindow, Unmodified, WindowPlanner
 

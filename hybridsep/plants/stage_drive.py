@@ -8,10 +8,50 @@ from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import PARAMETERS, check
 from ..model.physics import ModalModel, Mode
-from .motion_friction import velocity_under_friction
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
-__all__ = ["StageDrive"]
+__all__ = ["StageDrive", "velocity_under_friction"]
+
+_STEPS_MAX = 60
+"""Largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end."""
+
+
+def velocity_under_friction(w: float, gain: float, scale: float, last: float) -> float:
+    """Return the solution of ``v = w − gain·tanh(v/scale)``, m/s.
+
+    Parameters
+    ----------
+    w : float, m/s
+        Velocity without friction.
+    gain : float, m/s
+        Velocity that the whole friction takes away at once.
+    scale : float, m/s
+        Velocity scale of the friction's change of sign, > 0.
+    last : float, m/s
+        Velocity before, whose direction is kept where there are two solutions.
+    """
+    if w == 0.0 and last == 0.0:
+        return 0.0
+    sign = math.copysign(1.0, w)
+    if gain < -scale:
+        # v + gain·tanh(v/scale) falls between ± turn: a solution of the other sign than w may be there
+        ratio = -gain / scale
+        turn = scale * math.log(math.sqrt(ratio) + math.sqrt(ratio - 1.0))  # acosh √ratio
+        if last * w < 0.0 and abs(w) <= -turn - gain * math.tanh(turn / scale):
+            sign = -sign
+    w *= sign
+    # Newton from the side where its steps are monotone: v + gain·tanh(v/scale) is concave or convex for v > 0.
+    v = max(w - gain, w / (1.0 + gain / scale)) if gain > 0.0 else w - gain
+    for _ in range(_STEPS_MAX):
+        t = math.tanh(v / scale)
+        slope = 1.0 + gain / scale * (1.0 - t * t)
+        if not slope > 0.0:
+            break
+        step = (v + gain * t - w) / slope
+        v -= step
+        if abs(step) <= 1e-15 * abs(v):
+            break
+    return sign * v
 
 
 class StageDrive:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..base.records import FIXED
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..base.state import FIXED
 from .regression import RidgeRegression, lags
 from .window import Forecast, ResidualWindow
 

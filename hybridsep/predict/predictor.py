@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError, StateError
-from ..base.output import written_whole
-from ..base.records import arrays_of, restored
-from ..base.saved import Saved
+from ..base.files import written_whole
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
-from ..base.state import pack, unpack
+from ..base.state import Saved, arrays_of, pack, restored, unpack
 from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
 from . import paper, residual_model

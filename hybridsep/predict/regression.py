@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ..base.errors import ParameterError, SignalError
-from ..base.records import bounded
 from ..base.settings import check
 from ..base.signals import Array, as_samples
+from ..base.state import bounded
 
 __all__ = ["PenalisedSolution", "RidgeRegression", "lags"]
 

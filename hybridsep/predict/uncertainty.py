@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..base.records import bounded
 from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
+from ..base.state import bounded
 
 __all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
 

@@ -15,7 +15,7 @@ from staircase_data import commanded
 
 from hybridsep import Encoder, cosimulate, load_machine, staircase
 from hybridsep.app.options import PREDICTOR_ENTRIES
-from hybridsep.base.data_files import data_folder
+from hybridsep.base.files import data_folder
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest

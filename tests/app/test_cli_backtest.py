@@ -13,7 +13,7 @@ from command_line import Run, write_log
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
-from hybridsep.base.data_files import data_folder
+from hybridsep.base.files import data_folder
 from hybridsep.evaluate.backtest import backtest
 
 MACHINE = ("-m", "spring_mass_damper")

@@ -14,8 +14,7 @@ from log_files import write
 
 from hybridsep.app.console import written_before
 from hybridsep.demo.cases import demo_files
-from hybridsep.machines.machine import machine_path
-from hybridsep.machines.naming import machine_name
+from hybridsep.machines.machine import machine_name, machine_path
 
 MACHINE = "spring_mass_damper"
 

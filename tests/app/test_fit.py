@@ -27,7 +27,7 @@ from hybridsep.fitting.report import fit_report, judged_by
 from hybridsep.fmi.extras import RESOURCE_DATA_FILE
 from hybridsep.logs.checks import checked
 from hybridsep.logs.units import shown_in
-from hybridsep.machines.naming import machine_name
+from hybridsep.machines.machine import machine_name
 
 N = 3000
 NP = 50

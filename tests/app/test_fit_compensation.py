@@ -21,8 +21,7 @@ from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import binding_words, drive_limits
 from hybridsep.fmi.archive import build_fmu
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
 
 LIMITS = ("--v_max", 0.3, "--a_max", 30, "--j_max", 2e4)

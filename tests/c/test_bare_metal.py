@@ -16,8 +16,7 @@ from places import ROOT
 from benchmarks.targets.targets import Target, program, run
 from hybridsep import backtest, build_fmu, load_machine
 from hybridsep.base.signals import Array
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import staircase
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]

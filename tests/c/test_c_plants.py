@@ -11,7 +11,7 @@ import pytest
 import staircase_data as staircase
 from c_core import TS, CModel, write_trajectory
 
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 
 
 @pytest.mark.parametrize("seed", [0, 1, 12345, 2**31 - 1])

@@ -23,7 +23,7 @@ from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import Machine
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -23,7 +23,7 @@ from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve, solve_again
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 

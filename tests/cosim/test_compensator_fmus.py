@@ -21,7 +21,7 @@ from hybridsep.cosim.run import COMPENSATOR, Run
 from hybridsep.evaluate.figures import contour_figure, tracking_figure
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machines.machine import Machine
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")

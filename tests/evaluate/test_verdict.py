@@ -11,8 +11,7 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
-from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.machines.paper import paper_machine
+from hybridsep.machines.machine import Machine, load_machine, paper_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor

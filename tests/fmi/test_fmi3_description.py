@@ -14,7 +14,7 @@ from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 from fmi3_rules import Archive, violations
 from fmpy.validation import validate_fmu
 
-from hybridsep.base.data_files import data_folder
+from hybridsep.base.files import data_folder
 from hybridsep.fmi.compile import ALL_TARGETS, TARGETS, placed
 from hybridsep.fmi.description import ICON_FILE, TERMINALS, build_description, fmi3_description, terminals_and_icons
 from hybridsep.fmi.spec import FmuSpec, fmu_names

@@ -11,8 +11,8 @@ import pytest
 from built_once import PYTHON
 
 from hybridsep import build_fmu, load_machine
-from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import FmuError
+from hybridsep.base.files import data_folder
 
 LICENSES = data_folder("fmu_src") / "c" / "licenses"
 

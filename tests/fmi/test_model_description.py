@@ -11,7 +11,7 @@ import pytest
 from built_once import NATIVE, PYTHON, BuiltFmus, each_kind
 from fmi2_rules import variables_of, violations
 
-from hybridsep.base.data_files import data_folder
+from hybridsep.base.files import data_folder
 from hybridsep.fmi.description import model_description
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.spec import FmuSpec, fmu_names

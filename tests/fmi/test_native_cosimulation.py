@@ -20,9 +20,8 @@ from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.spec import fmu_names
-from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.machines.paper import PAPER_SETTINGS
-from hybridsep.plants.encoder import Encoder
+from hybridsep.machines.machine import PAPER_SETTINGS, Machine, load_machine
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import staircase
 
 TOLERANCE = 1e-11  # m

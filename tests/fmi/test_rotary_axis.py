@@ -8,8 +8,8 @@ import fmpy
 import pytest
 
 from hybridsep import build_fmu, load_machine
-from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import MachineError
+from hybridsep.base.files import data_folder
 from hybridsep.fmi.spec import table_of
 
 

@@ -23,15 +23,14 @@ from spoiled_weights import sealed, spoiled
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.state import numbers_of
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.spec import fmu_names
 from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
-from hybridsep.machines.machine import load_machine
-from hybridsep.machines.paper import paper_machine
+from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -15,8 +15,7 @@ from scipy.optimize import brentq
 from hybridsep import ModalModel, Mode, load_machine, simulate
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.plants import stage_drive
-from hybridsep.plants.motion_friction import velocity_under_friction
-from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.plants.stage_drive import StageDrive, velocity_under_friction
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -26,9 +26,8 @@ from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive
+from hybridsep.plants.plant import Drive, Encoder
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor

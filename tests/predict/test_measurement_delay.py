@@ -20,7 +20,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.machines.machine import load_machine
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from properties import examples
 
 from hybridsep.base.errors import ParameterError, SignalError
-from hybridsep.base.records import arrays_of, restored
-from hybridsep.base.saved import Saved
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.state import Saved, arrays_of, restored
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression

@@ -6,8 +6,8 @@ import numpy as np
 import oracle
 import pytest
 
-from hybridsep.base.records import numbers_of
 from hybridsep.base.signals import Array
+from hybridsep.base.state import numbers_of
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.averaging.features import StaticFeatures
 from hybridsep.predict.window import ResidualWindow

@@ -9,13 +9,12 @@ import pytest
 from averaged_cases import FRICTION, averaged, cycles, friction, physics
 
 from hybridsep.base.metrics import coverage
-from hybridsep.base.records import numbers_of, unsound, with_numbers
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import PREDICTION_MAX, Array
+from hybridsep.base.state import numbers_of, unsound, with_numbers
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.machines.machine import load_machine
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.uncertainty import N_COMPONENTS, PredictedError, Uncertainty, first_variance

@@ -22,8 +22,7 @@ from streams import StreamMaker, on_all
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, N_EXPERTS
 
 AVERAGING: dict[str, Value] = {"averaging": True, "t_init": 0.0}

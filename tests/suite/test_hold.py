@@ -12,8 +12,7 @@ from staircase_data import commanded
 from stream import COMPENSATOR, LIBRARY, OUTPUTS, PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_all
 
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
+from hybridsep.plants.plant import Encoder, simulate
 
 N, FIRST = 1400, 1060
 """Samples, and the sample of the staircase where they begin: in the middle of a move, so the start is corrected."""

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.records import numbers_of
 from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.state import numbers_of
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import (
     AVERAGING_SETTINGS,

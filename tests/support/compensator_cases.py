@@ -14,8 +14,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Encoder, Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -14,7 +14,7 @@ from library_stream import LookAheadStream
 from staircase_data import commanded
 from stream import COMPENSATOR, LOOK_AHEADS, OUTPUTS, PREDICTOR, TRAJECTORY, Array, Stream, Value, kind_of, machine_of
 
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import spiral
 
 T_S = 1e-3  # s

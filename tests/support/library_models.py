@@ -15,12 +15,11 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import restore_weights, weights_file
-from hybridsep.machines.paper import paper_machine
+from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive, simulate
+from hybridsep.plants.plant import Drive, Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor

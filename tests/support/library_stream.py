@@ -15,7 +15,7 @@ from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.online.look_ahead_inputs import LookAheadInputs
-from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Encoder
 
 
 @contextmanager

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from hybridsep.fmi.spec import table_of
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import Drive
+from hybridsep.plants.plant import Drive, Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ from hybridsep.fmi.spec import FmuSpec
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.machine import Machine
 from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import Drive
+from hybridsep.plants.plant import Drive, Encoder
 from hybridsep.plants.trajectory import staircase
 
 

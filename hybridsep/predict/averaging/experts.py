@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ...base.records import bounded
 from ...base.signals import Array
+from ...base.state import bounded
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from .constants import CONSTANTS
 

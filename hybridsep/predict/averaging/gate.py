@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.records import bounded
 from ...base.signals import PREDICTION_MAX, Array
+from ...base.state import bounded
 from .constants import CONSTANTS
 
 __all__ = ["InnovationGate", "gated"]

@@ -18,9 +18,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.records import FIXED, bounded
 from ...base.settings import PredictorSettings
 from ...base.signals import Array
+from ...base.state import FIXED, bounded
 from ...model.discrete import DiscreteModel
 from ..regression import RidgeRegression, lags
 from ..window import FeatureScales, Forecast, ResidualWindow

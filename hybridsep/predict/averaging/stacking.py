@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ...base.records import bounded
 from ...base.signals import Array
+from ...base.state import bounded
 from .constants import CONSTANTS
 
 __all__ = [

@@ -15,7 +15,7 @@ from string import Template
 from typing import Any
 
 from hybridsep.base.errors import LogError
-from hybridsep.base.output import written_text
+from hybridsep.base.files import written_text
 
 __all__ = ["Course", "courses", "write_page"]
 

@@ -13,7 +13,7 @@ import pyarrow
 from pyarrow import parquet
 
 from hybridsep.base.errors import StateError, first_line
-from hybridsep.base.output import written_whole
+from hybridsep.base.files import written_whole
 
 from .sources import LogFile
 

@@ -23,9 +23,7 @@ from hybridsep.fitting.replay import Recording, Replay, replay
 from hybridsep.fitting.report import fit_report, judged_by, write_errors, write_findings
 from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
-from hybridsep.machines.agree import check_interval, check_unit
-from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.machines.naming import machine_name
+from hybridsep.machines.machine import Machine, check_interval, check_unit, load_machine, machine_name
 from hybridsep.predict.predictor import HybridPredictor
 
 from .settings import AxisTask, FleetSettings, Looked

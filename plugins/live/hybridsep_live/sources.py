@@ -18,8 +18,7 @@ from typing import TypeVar
 
 from hybridsep.base.errors import HybridSepError, ParameterError, SignalError
 from hybridsep.logs.log import Log, check_reading, read_log
-from hybridsep.machines.agree import check_interval
-from hybridsep.machines.machine import Machine
+from hybridsep.machines.machine import Machine, check_interval
 
 from .sample import AS_NAMED, MessageReader, Reading, RowReader, Sample
 

@@ -51,8 +51,8 @@ def modal(
     """
     from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
-    from hybridsep.base.output import written_text
-    from hybridsep.machines.naming import checked_name, machine_name
+    from hybridsep.base.files import written_text
+    from hybridsep.machines.machine import checked_name, machine_name
     from hybridsep.machines.text import machine_text
 
     from .figure import response_figure

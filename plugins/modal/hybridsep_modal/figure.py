@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hybridsep.base.output import written_whole
+from hybridsep.base.files import written_whole
 
 from .frequency_response import IdentifiedResponse
 

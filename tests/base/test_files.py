@@ -18,8 +18,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from hybridsep import HybridPredictor, ModalModel, build_fmu, load_machine
-from hybridsep.base import output
-from hybridsep.base.output import written_text, written_whole
+from hybridsep.base import files
+from hybridsep.base.files import written_text, written_whole
 from hybridsep.cosim.run import save_columns
 from hybridsep.evaluate.figures import save_figure
 
@@ -183,7 +183,7 @@ def test_a_full_tmpfs_costs_the_new_file_only(tmp_path: Path) -> None:
         import sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         import errno, pathlib
-        from test_output import OLD, WRITERS, left_over
+        from test_files import OLD, WRITERS, left_over
         disk = pathlib.Path({str(disk)!r})
         for name, write in WRITERS.items():
             (disk / name).write_bytes(OLD)
@@ -225,11 +225,9 @@ def test_a_killed_process_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
     path.write_bytes(OLD)
     whole = {OLD, b"A" * 1_000_000}
-    assert output.__file__ is not None
+    assert files.__file__ is not None
     for moment in np.random.default_rng(0).uniform(0.0, 0.05, 12):
-        process = subprocess.Popen(
-            [sys.executable, "-c", WRITE_FOR_EVER, output.__file__, path], stdout=subprocess.PIPE
-        )
+        process = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, files.__file__, path], stdout=subprocess.PIPE)
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(moment)
@@ -237,47 +235,3 @@ def test_a_killed_process_leaves_a_whole_file(tmp_path: Path) -> None:
         process.communicate()
         assert path.read_bytes() in whole
     assert set(left_over(tmp_path)) == {other.name for other in tmp_path.iterdir()} - {path.name}
-    with written_whole(tmp_path / "other.csv"):
-        pass
-    assert not left_over(tmp_path)
-
-
-@pytest.mark.slow
-@POSIX
-def test_what_is_written_elsewhere_at_the_same_time_stays(tmp_path: Path) -> None:
-    """Three processes write for ever; their files in the making survive other writes into the folder."""
-    assert output.__file__ is not None
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", WRITE_FOR_EVER, output.__file__, tmp_path / f"{i}.csv"], stdout=subprocess.PIPE
-        )
-        for i in range(3)
-    ]
-    try:
-        for process in processes:
-            assert process.stdout is not None
-            process.stdout.readline()
-        with written_whole(tmp_path / "slow.csv") as slow:
-            for _ in range(300):
-                with written_whole(tmp_path / "quick.csv") as quick:
-                    quick.write(b"B")
-            slow.write(b"A")
-        assert [process.poll() for process in processes] == [None] * 3
-    finally:
-        for process in processes:
-            process.kill()
-            process.communicate()
-    assert (tmp_path / "slow.csv").read_bytes() == b"A"
-    assert all((tmp_path / f"{i}.csv").read_bytes() == b"A" * 1_000_000 for i in range(3))
-
-
-@POSIX
-def test_only_our_own_left_over_files_are_removed(tmp_path: Path) -> None:
-    ours = tmp_path / f".hybridsep-{'0123abcd' * 4}.tmp"
-    others = [tmp_path / name for name in (".hybridsep-notes.tmp", f"{ours.name}x", "result.tmp")]
-    for path in (ours, *others):
-        path.write_bytes(OLD)
-    with written_whole(tmp_path / "result.csv"):
-        pass
-    assert not ours.exists()
-    assert all(path.exists() for path in others)

@@ -1,0 +1,93 @@
+"""Files: written whole or not at all, and where those of this installation are.
+
+A file is written beside its target, flushed to the disk, and moved over it: the target is unchanged until the last byte
+is on the disk, so that a full disk, an exception, Ctrl-C or the end of the process loses the new file only. A killed
+process leaves ``.hybridsep-….tmp`` in the target's folder.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import stat
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+__all__ = ["COMMANDS", "DEFAULT_MACHINE", "data_folder", "named_errors", "written_text", "written_whole"]
+
+DEFAULT_MACHINE = "spring_mass_damper"
+"""Machine file of the paper's staircase; its FMUs have no suffix."""
+
+COMMANDS = "commands.csv"
+"""File that ``hybridsep fit`` writes beside a machine file: commands of the log to try with."""
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def data_folder(name: str) -> Path:
+    """Return the folder ``fmu_src/…`` or ``models``: inside the package in a wheel, beside it in a checkout."""
+    installed = _PACKAGE / "_data" / name
+    return installed if installed.is_dir() else _PACKAGE.parent / name
+
+
+@contextmanager
+def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
+    """Open a binary file that replaces ``path`` when the block ends without an exception; its folder is made.
+
+    A symbolic link is followed, the old file's permissions are kept; other hard links keep the old content. A device or
+    a pipe cannot be replaced and is written directly.
+
+    Raises
+    ------
+    OSError
+        With ``path`` as its file name, if it is a folder or write-protected or cannot be written; an old file is
+        unchanged.
+    """
+    target = Path(os.path.realpath(path))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f".hybridsep-{uuid.uuid4().hex}.tmp")
+    try:
+        before = Path(path).stat() if Path(path).exists() else None
+        if before is not None and not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if before is not None and not stat.S_ISREG(before.st_mode):
+            with Path(path).open("wb") as device:
+                yield device
+            return
+        with part.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        if before is not None:
+            part.chmod(stat.S_IMODE(before.st_mode))
+        part.replace(target)
+    except OSError as error:
+        if error.filename is None or str(error.filename) == str(part):
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+        raise
+    finally:
+        part.unlink(missing_ok=True)
+
+
+@contextmanager
+def named_errors(path: str | Path) -> Iterator[None]:
+    """Add the file name to an OSError that has none, as from a write to a full disk."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
+def written_text(path: str | Path) -> Iterator[IO[str]]:
+    """Open a UTF-8 text file, line ends untranslated, as :func:`written_whole` does."""
+    with written_whole(path) as file:
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+        yield text
+        text.detach()  # what is buffered goes to the file, which stays open
