@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.compile import compile_flags
+from hybridsep.fmi.compile import FLAGS
 from hybridsep.fmi.variables import FmuTable
 from hybridsep.fmi.weights import WEIGHTS_FILE, weights_file
 from hybridsep.model.physics import ModalModel
@@ -72,7 +72,7 @@ def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
     subprocess.run(
         [
             *command,
-            *compile_flags(command),
+            *FLAGS,
             *includes,
             str(HERE / "main.c"),
             *map(str, sources),

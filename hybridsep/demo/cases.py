@@ -18,7 +18,7 @@ from ..cosim.run import Run
 from ..evaluate.backtest import backtest, replayed_run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
-from ..fmi.archive import build_here, build_pair, default_flavour
+from ..fmi.archive import build_here, default_flavour
 from ..fmi.flavours import FMI_VERSIONS, versions_of
 from ..fmi.spec import fmu_names
 from ..logs.log import Log, read_log
@@ -128,13 +128,19 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 """The machine of each case."""
 
 
+def _pair(machine: Machine, out: Path, flavour: str, fmi: str) -> tuple[Path, Path]:
+    """Return a machine's predictor and plant FMU, built."""
+    predictor, plant = (build_here(machine, model, out, flavour, fmi=fmi) for model in ("HybridPredictor", "FeedDrive"))
+    return predictor, plant
+
+
 def staircase_case(
     out: Path, seeds: int, flavour: str, advance: Callable[[str], None], fmi: str = FMI_VERSIONS[0]
 ) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = build_pair(machine, out / "fmus", flavour, fmi)
+    fmus = _pair(machine, out / "fmus", flavour, fmi)
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
@@ -166,7 +172,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None], fmi: st
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = build_pair(machine, out / "fmus", flavour, fmi)
+        fmus = _pair(machine, out / "fmus", flavour, fmi)
         advance(label)
         values = PAPER_SETTINGS[machine.name]
         axes[axis] = run = cosimulate(*fmus, command, controller_values=values)

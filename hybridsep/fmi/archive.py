@@ -23,14 +23,7 @@ from .compile import ALL_TARGETS, default_targets, expanded, has_native
 from .flavours import FLAVOURS, FMI_VERSIONS, versions_of
 from .spec import FmuSpec, fmu_name, fmu_names
 
-__all__ = [
-    "archived",
-    "build_fmu",
-    "build_here",
-    "build_pair",
-    "default_flavour",
-    "other_platforms",
-]
+__all__ = ["archived", "build_fmu", "build_here", "default_flavour", "other_platforms"]
 
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
@@ -190,14 +183,6 @@ def build_here(
         for version in versions_of(fmi, flavour)
     ]
     return paths[0]
-
-
-def build_pair(machine: Machine, out: Path, flavour: str, fmi: str = FMI_VERSIONS[0]) -> tuple[Path, Path]:
-    """Build a machine's predictor and plant FMU; arguments as of :func:`build_here`."""
-    return (
-        build_here(machine, "HybridPredictor", out, flavour, fmi=fmi),
-        build_here(machine, "FeedDrive", out, flavour, fmi=fmi),
-    )
 
 
 def other_platforms(fmu: Path, machine: Path, weights: Path | None = None, fmi: str = FMI_VERSIONS[0]) -> str:

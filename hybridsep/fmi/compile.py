@@ -36,6 +36,7 @@ from .flavours import FMI_VERSIONS
 
 __all__ = [
     "ALL_TARGETS",
+    "FLAGS",
     "TARGETS",
     "TARGET_NAMES",
     "ZIG",
@@ -43,7 +44,6 @@ __all__ = [
     "Library",
     "check_available",
     "chosen_targets",
-    "compile_flags",
     "compiled",
     "compiler_for",
     "default_targets",
@@ -62,11 +62,9 @@ __all__ = [
 ZIG = "ziglang 0.17.1"
 """The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
 
-_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
-"""Options of every compiler. Never ``-ffast-math``: every platform is to give the same numbers."""
-
-_STACK_PROTECTOR = "-fstack-protector-strong"
-"""An overflow of an array on the stack ends the process before the function returns; gcc 4.9, clang 3.5 and newer."""
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-fstack-protector-strong")
+"""Options of every compiler, gcc 4.9, clang 3.5 or newer. Never ``-ffast-math``: every platform is to give the same
+numbers. An overflow of an array on the stack ends the process before the function returns."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ class _Target:
         Where importers of FMI 2.0 look for the library, below ``binaries/``.
     suffix : str
     flags : tuple of str
-        Options besides :func:`compile_flags`.
+        Options besides :data:`FLAGS`.
     """
 
     triple: str
@@ -182,27 +180,6 @@ def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]
     return files
 
 
-def compile_flags(command: Sequence[str]) -> list[str]:
-    """Return this compiler's options for the sources, the same for every platform.
-
-    Parameters
-    ----------
-    command : sequence of str
-        Of a compiler that understands the options of gcc.
-    """
-    return [*_FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
-
-
-@cache
-def _understands(command: tuple[str, ...], flag: str) -> bool:
-    """Return whether a compiler knows an option."""
-    with TemporaryDirectory() as place:
-        source = Path(place) / "nothing.c"
-        source.write_text("int nothing;\n")
-        arguments = [*command, "-Werror", flag, "-c", source.name, "-o", "nothing.o"]
-        return subprocess.run(arguments, cwd=place, capture_output=True, check=False).returncode == 0
-
-
 def compiler_for(target: str) -> Compiler:
     """Return the compiler for a key of :data:`TARGETS`: ``ziglang``, or for the host ``$CC``, cc, gcc or clang.
 
@@ -256,7 +233,7 @@ def compiled(
                 for file, text in sources.items():
                     (folder / file).write_bytes(text)
             # dladdr is no part of POSIX
-            flags = [*compile_flags(compiler.command), "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
+            flags = [*FLAGS, "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
             output = f"{name}{TARGETS[target].suffix}"
             command = [*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags]
             done = subprocess.run(
@@ -443,7 +420,7 @@ def _place(compiler: str, library: Library) -> Path:
 @cache
 def _version(compiler: str) -> str:
     """Return a hash of all that libraries are made of: sources, headers of the kinds, options and compiler."""
-    digest = hashlib.sha256(repr((compiler, _FLAGS, dict(TARGETS))).encode())
+    digest = hashlib.sha256(repr((compiler, FLAGS, dict(TARGETS))).encode())
     for name, content in [*c_sources().items(), *((kind, kind_header(kind).encode()) for kind in KINDS)]:
         digest.update(name.encode() + hashlib.sha256(content).digest())
     return digest.hexdigest()[:16]

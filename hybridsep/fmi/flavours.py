@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from ..base.errors import FmuError, ParameterError
 
-__all__ = [
-    "FLAVOURS",
-    "FMI_CHOICES",
-    "FMI_VERSIONS",
-    "check_version",
-    "versions_of",
-]
+__all__ = ["FLAVOURS", "FMI_CHOICES", "FMI_VERSIONS", "check_version", "versions_of"]
 
 FLAVOURS = ("native", "python")
 """The default first."""

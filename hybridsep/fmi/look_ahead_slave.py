@@ -19,9 +19,7 @@ from .slave import TableSlave
 from .variables import modes_from
 from .weights import WEIGHTS_FILE, restore_weights
 
-__all__ = [
-    "LookAheadSlave",
-]
+__all__ = ["LookAheadSlave"]
 
 
 class LookAheadSlave(TableSlave):

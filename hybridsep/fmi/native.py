@@ -38,10 +38,7 @@ from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .variables import FmuTable
 
-__all__ = [
-    "files",
-    "sources",
-]
+__all__ = ["files", "sources"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 

@@ -27,9 +27,7 @@ from ..base.signals import check_position
 from ..base.state import Saved, pack, unpack
 from .variables import FmuTable, Variable
 
-__all__ = [
-    "TableSlave",
-]
+__all__ = ["TableSlave"]
 
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and GUID of the FMU's content."""

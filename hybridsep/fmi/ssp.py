@@ -26,14 +26,7 @@ from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
 
-__all__ = [
-    "SSP_VERSIONS",
-    "Component",
-    "Connection",
-    "build_system",
-    "check_system",
-    "system_structure",
-]
+__all__ = ["SSP_VERSIONS", "Component", "Connection", "build_system", "check_system", "system_structure"]
 
 SSP_VERSIONS = ("1", "2")
 """SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""

@@ -30,14 +30,7 @@ from ..predict.uncertainty import Uncertainty
 if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
 
-__all__ = [
-    "WEIGHTS_FILE",
-    "learned_settings",
-    "load_trained",
-    "restore_weights",
-    "warm_predictor",
-    "weights_file",
-]
+__all__ = ["WEIGHTS_FILE", "learned_settings", "load_trained", "restore_weights", "warm_predictor", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
 _MAGIC = b"HSEPWG14"

@@ -12,12 +12,12 @@ import fmpy
 import numpy as np
 import pytest
 from built_once import BuiltFmus
-from c_compiler import FMI_HEADERS, compiler, run_compiler
+from c_compiler import FMI_HEADERS, run_compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.fmi.compile import compile_flags
+from hybridsep.fmi.compile import FLAGS
 
 ROLES = {"REFERENCE": "ReferenceTrajectory", "PREDICTOR": "HybridPredictor", "PLANT": "FeedDrive"}
 MODELS = (*ROLES.values(), "SepCompensator")
@@ -59,7 +59,7 @@ def compile_all(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
     sources = fmu.with_suffix("") / "sources"
     run_compiler(
         [
-            *compile_flags(compiler()),
+            *FLAGS,
             *flags,
             f"-I{sources}",
             f"-I{headers}",

@@ -14,9 +14,10 @@ import pytest
 from command_line import Run
 from places import ROOT
 
+from hybridsep import load_machine
 from hybridsep.base.errors import FmuError
 from hybridsep.fmi import compile as module
-from hybridsep.fmi.archive import other_platforms
+from hybridsep.fmi.archive import build_here, other_platforms
 from hybridsep.fmi.c_header import KINDS, c_sources
 from hybridsep.fmi.compile import (
     ALL_TARGETS,
@@ -103,12 +104,13 @@ def test_a_command_of_its_own_does_not_wait_for_other_platforms(without: Path) -
 
 
 def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path: Path) -> None:
-    """As ``init`` prints it, and ``fit``; run for this machine alone."""
-    _, said, _ = hybridsep("init", tmp_path / "axis.toml", "--tau", "0.01", "--fmi", "3")
-    line = said.splitlines()[-1].removeprefix(f"native FMUs are for {host_target()}; for all platforms: ")
+    """As ``fit`` prints it; run for this machine alone."""
+    machine = tmp_path / "axis.toml"
+    hybridsep("init", machine)
+    fmu = build_here(load_machine(machine), "HybridPredictor", tmp_path, "native", fmi="3")
+    says, _, line = other_platforms(fmu, machine, fmi="3").partition("; for all platforms: ")
     program, *arguments = shlex.split(line)
-    assert program == "hybridsep"
-    fmu = tmp_path / "HybridPredictorFmi3_axis.fmu"
+    assert (says, program) == (f"native FMUs are for {host_target()}", "hybridsep")
     first = fmu.read_bytes()
     fmu.unlink()
     assert hybridsep(*("host" if word == "all" else word for word in arguments))[0] == 0

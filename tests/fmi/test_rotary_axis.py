@@ -44,5 +44,5 @@ def test_a_plant_is_a_linear_axis(tmp_path: Path) -> None:
         load_machine(rotary(tmp_path, "spring_mass_damper"))
     path = rotary(tmp_path)
     path.write_text(path.read_text(encoding="utf-8").replace('"rad"', '"deg"'), encoding="utf-8")
-    with pytest.raises(MachineError, match=r"unit: Input should be 'm' or 'rad', got 'deg'"):
+    with pytest.raises(MachineError, match="unit must be m or rad, got 'deg'"):
         load_machine(path)
