@@ -67,11 +67,12 @@ _START = 0.25
 _LATE = 0.1
 """Lag, s, from which it is noted: the look-ahead of a controller of which nothing is known."""
 
-_OFFSET_TRAVEL, _OFFSET_SPREAD = 0.02, 6.0
-"""Offset, relative to the travel and to the spread of the error around it, from which it is noted."""
+_ALONE, _SIZE = 10.0, 0.02
+"""Size of a jump or an outlier in the steps around it, of an offset in the spread of the error, and of each relative to
+the travel, from which it is noted."""
 
-_ALONE, _SIZE = 10.0, 0.01
-"""Size of a jump or an outlier in the steps around it, and relative to the travel, from which it is noted."""
+_USUAL = 0.98
+"""Quantile of what is usual, beyond which are the samples that are looked for."""
 
 _HELD, _REPEATED = 0.1, 0.2
 """Way of the command, relative to its travel, while the measured position is held; and share of the samples in fast
@@ -217,7 +218,7 @@ def _unit(log: Log) -> Iterator[Finding]:
         for one in log.segments()
     ]
     moving = np.concatenate([one[one > 0.0] for one in accelerations])
-    usual = float(np.quantile(moving, 0.99)) if len(moving) else 0.0
+    usual = float(np.quantile(moving, _USUAL)) if len(moving) else 0.0
     travel = _travel(log.x_d)
     if travel <= _TRAVEL_MAX and usual <= _ACCELERATION_MAX:
         return
@@ -266,7 +267,7 @@ def following(u: Array, x: Array) -> Following:
     alone = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
     one = int(np.argmax(alone))
     basis, R = np.linalg.qr(A)
-    h, _ = nnls(R, basis.T @ y, maxiter=100 * len(lags))
+    h, _ = nnls(R, basis.T @ y, maxiter=len(u))
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))
     gain = float(h.sum())
     return Following(
@@ -299,7 +300,7 @@ def _meaning(log: Log, part: slice, given: Following) -> Iterator[Finding]:
     """
     x_d, x = log.x_d[part], log.x_meas[part]
     known = np.isfinite(x)
-    picture = _over_time(log, "Around the fastest motion", around=part)
+    picture = _over_time(log, "Command and measurement")
     evidence = given._asdict()
     filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])
     exchanged = following(filled, np.where(known, x_d, np.nan))
@@ -413,7 +414,7 @@ def _note_start(log: Log) -> Iterator[Finding]:
             "first samples"
         )
         evidence = {"velocity": float(steps[0]) / log.T_s, "largest": float(steps.max()) / log.T_s}
-        yield Finding("start in motion", words, evidence, _over_time(log, "Start", around=slice(0, len(log.t))))
+        yield Finding("start in motion", words, evidence, _over_time(log, "Start"))
 
 
 def _note_missing(log: Log) -> Iterator[Finding]:
@@ -444,7 +445,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
 def _note_relation(log: Log, part: slice, found: Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
     x_d, x = log.x_d[part], log.x_meas[part]
-    picture = _over_time(log, "Around the fastest motion", around=part)
+    picture = _over_time(log, "Command and measurement")
     if found.lag * log.T_s > _LATE:
         words = (
             f"the measured position lags its command by {found.lag:.3g} samples ({found.lag * log.T_s:.3g} s), drive, "
@@ -454,8 +455,8 @@ def _note_relation(log: Log, part: slice, found: Following) -> Iterator[Finding]
         yield Finding("late", words, {"lag": found.lag * log.T_s}, picture, options=options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - found.lag_of_one, 0)]
     offset = float(np.nanmedian(error))
-    spread = float(np.nanquantile(np.abs(error - offset), 0.9))
-    if abs(offset) > max(_OFFSET_TRAVEL * _travel(x_d), _OFFSET_SPREAD * spread):
+    spread = float(np.nanmedian(np.abs(error - offset)))
+    if abs(offset) > max(_SIZE * _travel(x_d), _ALONE * spread):
         words = (
             f"the measured position is {log.shown.words(offset, '+.4g')} away from its command throughout, "
             f"{abs(offset) / _travel(x_d):.2g} of the travel, while the error varies by {log.shown.words(spread)}"
@@ -481,7 +482,7 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
     for name, x in (("commanded", log.x_d), ("measured", log.x_meas)):
         steps = np.diff(x)
         spikes = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
-        usual = float(np.nanquantile(np.abs(steps), 0.98))
+        usual = float(np.nanquantile(np.abs(steps), _USUAL))
         wrong = np.flatnonzero(spikes > max(_ALONE * usual, _SIZE * _travel(log.x_d))) + 1
         if len(wrong):
             height = float(spikes[wrong - 1].max())
@@ -498,12 +499,12 @@ def _note_held(log: Log) -> Iterator[Finding]:
     x, x_d = log.x_meas, log.x_d
     same = np.diff(x) == 0.0
     speed = np.abs(np.diff(x_d))
-    fast = speed > max(_REPEATED * float(np.quantile(speed, 0.99)), 2.0 * resolution(x))
+    fast = speed > max(_REPEATED * float(np.quantile(speed, _USUAL)), resolution(x))
     if fast.sum() > _SAMPLES_MIN and same[fast].mean() > _REPEATED:
         share, where = float(same[fast].mean()), np.flatnonzero(same & fast) + 1
         words = (
             f"{100 * share:.3g} % of the measured positions repeat the one before in fast motion: they are renewed "
-            f"every {1.0 / max(1.0 - share, 1e-3):.2g} samples in the mean"
+            f"every {fast.sum() / max((fast & ~same).sum(), 1):.2g} samples in the mean"
         )
         yield Finding("repeated samples", words, {"share": share}, _over_time(log, "Repeated samples", where))
     edges = np.flatnonzero(~np.concatenate(([False], same, [False])))  # a run is from edge to edge
@@ -561,7 +562,7 @@ def _jumps(x: Array, starts: Sequence[int]) -> Indices:
     steps[np.array(starts[1:], dtype=np.intp) - 1] = 0.0
     padded = np.pad(steps, 2)
     beside = np.maximum.reduce([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]])
-    usual = float(np.nanquantile(steps, 0.98))
+    usual = float(np.nanquantile(steps, _USUAL))
     least = np.maximum(_ALONE * np.maximum(beside, usual), _SIZE * _travel(x))
     return np.asarray(np.flatnonzero(steps > least) + 1)
 
@@ -577,20 +578,16 @@ def _liveliest(log: Log) -> slice:
     best, most = slice(0, len(log.t)), -1.0
     for start, end in zip(log.starts, (*log.starts[1:], len(log.t)), strict=True):
         way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(log.x_d[start:end])))))
-        for first in range(0, max(end - start - _SPAN, 0) + 1, _SPAN // 4):
+        for first in range(0, max(end - start - _SPAN, 0) + 1, _SPAN):
             last = min(first + _SPAN, end - start) - 1
             if way[last] - way[first] > most:
                 best, most = slice(start + first, start + last + 1), float(way[last] - way[first])
     return best
 
 
-def _over_time(log: Log, title: str, marks: Indices | None = None, *, around: slice | None = None) -> Picture:
-    """Return the picture of both positions over time, whole or around the fastest motion of a part."""
-    near = slice(0, len(log.t))
-    if around is not None:
-        fastest = around.start + int(np.argmax(np.abs(np.diff(log.x_d[around]))))
-        near = slice(max(fastest - 150, 0), fastest + 150)
+def _over_time(log: Log, title: str, marks: Indices | None = None) -> Picture:
+    """Return the picture of both positions over time."""
     t = log.t - log.t[0]
     factor, unit = log.shown.position
-    lines = {name: (t[near], factor * x[near]) for name, x in (("commanded", log.x_d), ("measured", log.x_meas))}
+    lines = {name: (t, factor * x) for name, x in (("commanded", log.x_d), ("measured", log.x_meas))}
     return Picture(title, "time [s]", f"position [{unit}]", lines, t[marks] if marks is not None else np.empty(0))

@@ -111,7 +111,7 @@ def at_sensor_phase(given: Samples) -> tuple[Samples, str]:
     changes = np.diff(given.x_meas)
     at = np.flatnonzero(np.isfinite(changes) & (changes != 0.0)) + 1
     sizes = np.abs(changes[at - 1])
-    if len(at) < _CHANGES or np.median(sizes) <= 2.0 * sizes.min():  # steps of an encoder that moves evenly
+    if len(at) < _CHANGES or np.isclose(np.median(sizes), sizes.min()):  # steps of an encoder that moves evenly
         return given, ""
     usual = int(np.bincount(np.diff(at)).argmax())  # a multiple of the period
     for n in (usual // k for k in range(1, usual) if usual % k == 0):

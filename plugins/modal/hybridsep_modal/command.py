@@ -96,6 +96,8 @@ def _identified(
     dead_time: int,
 ) -> IdentifiedResponse:
     """Return the model of a file, whose kind its columns tell."""
+    import numpy as np
+
     from hybridsep.base.errors import ParameterError
     from hybridsep.logs.log import read_log
 
@@ -114,6 +116,10 @@ def _identified(
     std: Array | None
     if sampled:
         log = read_log(file, columns=columns, unit=unit, T_s=T_s, axis=axis)
+        if len(log.starts) > 1 or np.isnan(log.x_meas).any():
+            raise ParameterError(
+                f"{file}: a swept sine must have no gap, and be measured in every sample; record it again"
+            )
         lines = h1(log.x_d, log.x_meas, log.T_s)
         frequency, response, std, T_s = lines.frequency, lines.response, lines.std, log.T_s
     else:
