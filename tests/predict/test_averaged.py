@@ -128,7 +128,16 @@ def test_a_first_reversal_falls_back() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n", "measured"), [(250, None), (37, None), (100, 30), (1, None), (100, 1)])
+@pytest.mark.parametrize(
+    ("n", "measured"),
+    [
+        (250, None),
+        (37, None),
+        (100, 30),
+        pytest.param(1, None, marks=pytest.mark.nightly),
+        pytest.param(100, 1, marks=pytest.mark.nightly),
+    ],
+)
 def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
     """What is learned does not depend on the windows: there is one row for each measured sample."""
     x_d, x_pb, x = with_friction(600, noise=1e-6)

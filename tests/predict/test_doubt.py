@@ -51,8 +51,8 @@ def slower(indices: tuple[int, ...] = (35, 40)) -> dict[int, tuple[RandomDrive, 
     }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("index", [pytest.param(26, marks=pytest.mark.nightly), 40])
+@pytest.mark.nightly  # by day: what_has_changed_is_relearned_as_cold
+@pytest.mark.parametrize("index", [26, 40])
 def test_a_random_drive_whose_frequencies_fell_by_a_tenth_is_relearned(index: int) -> None:
     drive, x_meas = (slower() if index in slower() else slower((index,)))[index]
     warm = HybridPredictor(drive.model)
