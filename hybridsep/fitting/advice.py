@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..evaluate.peers import ARX_LAGS, LAG_HOLD
+from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
 from ..logs.log import Log
@@ -188,7 +188,8 @@ def peers_in_words(judged: Judged) -> str:
     words = ["Hold: physics model plus its residual at the last sample measured before the window"]
     if LAG_HOLD in names:
         words.append(f"{LAG_HOLD}: the same on a first-order lag with dead time fitted to the first half")
-    ways = "frozen after the first half or " if LAG_HOLD in names else ""
+    frozen = any(peer.way == FROZEN for peer in judged.replay.peers)
+    ways = "frozen after the first half or " if frozen else ""
     words.append(
         f"ARX: black-box models of {' and '.join(str(n) for n in ARX_LAGS)} lags of x − x_d and of the command's "
         f"increments by least squares, {ways}refitted before each window to all samples so far"

@@ -323,16 +323,10 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
     if steps:
         report.paragraph(_times(names[0], steps, T_s))
     report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
-    report.bullets(
-        [
-            "OMSimulator: add the FMU to a system, connect x_d to the drive and its measured position to x_meas, fixed "
-            f"step size {T_s:g} s",
-            "OpenModelica: File > Import FMU; in an OMSimulator model as above",
-            f"Dymola: File > Open > Import FMU, co-simulation, communication step {T_s:g} s",
-            f"Simulink: FMU Import block (FMI 2.0, co-simulation), sample time {T_s:g} s",
-            "x_d_ahead is the trajectory, as many samples early as the look-ahead is long; wire x_d to the drive: the "
-            "FMU is the look-ahead buffer",
-        ]
+    report.paragraph(
+        f"In a simulation tool: co-simulation with a step of {T_s:g} s. x_d_ahead is the trajectory, as many samples "
+        "early as the look-ahead is long; wire x_d to the drive, and its measured position to x_meas: the FMU is the "
+        "look-ahead buffer."
     )
 
 

@@ -30,7 +30,6 @@ from .replay import Recording, replay
 
 __all__ = [
     "TUNED",
-    "Losses",
     "Piece",
     "Tuning",
     "candidates",
@@ -68,23 +67,6 @@ _LAMBDA_FACTORS = (1.0, 1e2, 1e4)
 
 _FORGETTING = 30
 """Windows after which samples are forgotten in half of the candidates with averaging."""
-
-
-@dataclass(frozen=True)
-class Losses:
-    """RMS errors against the measured position over a log, m, as of a backtest without :func:`n_unjudged` samples.
-
-    Attributes
-    ----------
-    rms_pb, rms_hold : float
-        Physics model, hold baseline.
-    rms_h : float
-        Hybrid; infinite where the prediction diverges.
-    """
-
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
 
 
 @dataclass(frozen=True)
@@ -211,22 +193,16 @@ def over_windows(
     return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
 
 
-def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[Losses]) -> Tuning:
+def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: Sequence[Array]) -> Tuning:
     """Return the tuning of the losses of each log, one after the other."""
-    n = len(found) // len(logs)
-    by_log = [found[i : i + n] for i in range(0, len(found), n)]
+    by_log = np.reshape(found, (len(logs), -1, 3))
     # A replay that diverges leaves no baselines; all replays of a log have the same.
-    baselines = [next((one for one in losses if not math.isnan(one.rms_pb)), losses[0]) for losses in by_log]
-    return Tuning(
-        tuple(logs),
-        candidates,
-        np.array([one.rms_pb for one in baselines]),
-        np.array([one.rms_hold for one in baselines]),
-        np.array([[one.rms_h for one in losses] for losses in by_log]).T,
-    )
+    sound = np.argmax(~np.isnan(by_log[:, :, 0]), axis=1)
+    rms_pb, rms_hold = by_log[np.arange(len(logs)), sound, :2].T
+    return Tuning(tuple(logs), candidates, rms_pb, rms_hold, by_log[:, :, 2].T)
 
 
-def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Losses]:
+def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Array]:
     """Return the losses of each task, in their order."""
     n, n_jobs = len(tasks), min(jobs, len(tasks))
     if n_jobs == 1:
@@ -246,7 +222,7 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
     return found
 
 
-def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Losses:
+def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Array:
     name, pieces, candidate = task
     try:
         return replayed_losses(model, pieces, candidate, progress)
@@ -267,8 +243,10 @@ def replayed_losses(
     pieces: Sequence[Piece],
     candidate: PredictorSettings,
     progress: Progress = lambda _done: None,
-) -> Losses:
-    """Return the losses of a candidate by a replay of its own; NaN for the baselines where it diverges.
+) -> Array:
+    """Return the losses of a candidate by a replay of its own: RMS of physics model, hold and hybrid, ``(3,)``, m.
+
+    Without :func:`n_unjudged` samples. Where it diverges the last is infinite, and the others are NaN.
 
     Parameters
     ----------
@@ -294,11 +272,11 @@ def replayed_losses(
         recordings = [Recording(x_d, x, 0) for x_d, x in pieces]
         found = replay(HybridPredictor(model, candidate), recordings, progress=progress)
     except SignalError:  # the samples are sound: it diverges
-        return Losses(math.nan, math.nan, math.inf)
+        return np.array([math.nan, math.nan, math.inf])
     firsts = np.cumsum([0, *(len(x) for _, x in pieces[:-1])])
     left = [first + np.arange(n_unjudged(x_d, candidate.Np)) for first, (x_d, _) in zip(firsts, pieces, strict=True)]
     errors = np.delete(found.errors(), np.concatenate(left), axis=1)
-    return Losses(*np.sqrt(np.nanmean(errors**2, axis=1)).tolist())
+    return np.asarray(np.sqrt(np.nanmean(errors**2, axis=1)))
 
 
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:

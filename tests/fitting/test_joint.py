@@ -29,8 +29,8 @@ def test_each_log_is_replayed_untrained_and_ranked_by_the_geometric_mean() -> No
     found = tune(MODEL, LOGS, CANDIDATES)
     for i, pieces in enumerate(LOGS.values()):
         alone = [replayed_losses(MODEL, pieces, one) for one in CANDIDATES]
-        assert found.rms_h[:, i].tolist() == [one.rms_h for one in alone]
-        assert (found.rms_pb[i], found.rms_hold[i]) == (alone[0].rms_pb, alone[0].rms_hold)
+        assert found.rms_h[:, i].tolist() == [one[2] for one in alone]
+        assert (found.rms_pb[i], found.rms_hold[i]) == tuple(alone[0][:2])
     np.testing.assert_allclose(found.ratio, np.sqrt(np.prod(found.rms_h / found.rms_hold, axis=1)), rtol=1e-12)
     assert found.logs == ("one", "two")
     assert found.ranking == np.argsort(found.ratio, kind="stable").tolist()
@@ -65,7 +65,7 @@ def test_the_error_over_windows_is_that_of_as_many_lags_as_fit() -> None:
     for Np, tuning in found.items():
         fitting = replace(PAPER, Np=Np, p=min(15, Np), q=min(6, Np - 1))
         assert tuning.candidates == (fitting,)
-        expected = [replayed_losses(MODEL, pieces, fitting).rms_h for pieces in LOGS.values()]
+        expected = [replayed_losses(MODEL, pieces, fitting)[2] for pieces in LOGS.values()]
         np.testing.assert_allclose(tuning.rms_h[0], expected, rtol=1e-9)
     assert done == sorted(done)
     short: Logs = {**LOGS, "short": [small_signals(30)]}
