@@ -23,7 +23,7 @@ def test_a_plug_in_that_is_not_installed_is_named(name: str, hybridsep: Run) -> 
 def test_a_plug_in_that_is_installed_is_a_command(hybridsep: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("modal", "json:dumps", "hybridsep.commands")
     monkeypatch.setattr(EntryPoint, "load", lambda _: _shown)
-    monkeypatch.setattr(cli, "entry_points", lambda group: [point] * (group == point.group))
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [point] * (group == point.group))
     assert hybridsep("modal", "3")[:2] == (0, "got 3\n")
     assert "Show a number." in hybridsep("--help")[1]
 

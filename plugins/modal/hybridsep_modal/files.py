@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from hybridsep.base.errors import LogError, brief, listed
 from hybridsep.base.signals import Array
 from hybridsep.logs.formats import open_source
-from hybridsep.logs.source import Source
 
 __all__ = ["ResponseFile", "has_response", "read_response"]
 
@@ -46,14 +45,14 @@ class ResponseFile(NamedTuple):
     std: Array | None
 
 
-def has_response(path: str | Path, columns: Mapping[str, str] | None = None) -> bool:
+def has_response(path: Path) -> bool:
     """Return whether a file has columns of a frequency response and none of a log."""
-    names = open_source(Path(path)).names
-    found = _found(names, columns or {})
+    names = open_source(path).names
+    found = _found(names)
     return "frequency" in found and "x_d" not in names and ("real" in found or "magnitude" in found)
 
 
-def read_response(path: str | Path, columns: Mapping[str, str] | None = None) -> ResponseFile:
+def read_response(path: Path) -> ResponseFile:
     """Return the frequency response of a file.
 
     Frequencies are in Hz, or in rad/s where the column is called omega or has that unit; magnitudes are linear unless
@@ -61,45 +60,41 @@ def read_response(path: str | Path, columns: Mapping[str, str] | None = None) ->
 
     Parameters
     ----------
-    path : str or Path
+    path : Path
         CSV, MAT or NPZ; a complex vector ``H`` of a MAT file counts as ``H.real`` and ``H.imag``.
-    columns : mapping, optional
-        The file's names of ``"frequency"``, ``"real"``, ``"imag"``, ``"magnitude"``, ``"phase"``, ``"std"``.
 
     Raises
     ------
     LogError
         If the file or its columns cannot be used.
     """
-    file = Path(path)
-    source = open_source(file)
-    found = _found(source.names, columns or {})
+    source = open_source(path)
+    found = _found(source.names)
     pair = ("real", "imag") if "real" in found else ("magnitude", "phase")
     missing = [role for role in ("frequency", *pair) if role not in found]
     if missing:
         there = listed(source.names)
         raise LogError(
             f"{path}: a frequency response needs the columns frequency and real, imag or magnitude, phase; "
-            f"{', '.join(missing)} was not found, the file has {there}; give its name in columns"
+            f"{', '.join(missing)} was not found, the file has {there}"
         )
     roles = ["frequency", *pair, *(["std"] if "std" in found else [])]
-    values = _columns(source, [found[role] for role in roles])
+    values = source.read([found[role] for role in roles]).columns
+    if not len(values[0]):
+        raise LogError(f"{path}: a frequency response needs lines, got none")
     frequency = values[0] / (2 * np.pi) if _is_angular(found["frequency"]) else values[0]
     if pair == ("real", "imag"):
         response = values[1] + 1j * values[2]
     else:
-        phase = _phase(file, found["phase"], values[2])
+        phase = _phase(path, found["phase"], values[2])
         response = _magnitude(found["magnitude"], values[1]) * np.exp(1j * phase)
     return ResponseFile(frequency, np.asarray(response, np.complex128), values[3] if "std" in found else None)
 
 
-def _found(names: list[str], columns: Mapping[str, str]) -> dict[str, str]:
-    """Return the file's column of each role: as given, else by its whole name, else by a word of it."""
+def _found(names: list[str]) -> dict[str, str]:
+    """Return the file's column of each role: by its whole name, else by a word of it."""
     found = {}
     for role, words in ROLES.items():
-        if role in columns:
-            found[role] = columns[role]
-            continue
         whole = [name for name in names if _plain(name) in words]
         part = [name for name in names if set(_WORD.findall(name.lower())) & set(words[:2])]
         if role == "magnitude":
@@ -111,16 +106,6 @@ def _found(names: list[str], columns: Mapping[str, str]) -> dict[str, str]:
 
 def _plain(name: str) -> str:
     return re.sub(r"[\[(].*", "", name.lower()).strip(" _")
-
-
-def _columns(source: Source, names: list[str]) -> list[Array]:
-    for name in names:
-        if name not in source.names:
-            raise LogError(f"{source.path}: column {brief(name)} is missing, the file has {listed(source.names)}")
-    columns = source.read(names).columns
-    if not len(columns[0]):
-        raise LogError(f"{source.path}: a frequency response needs lines, got none")
-    return columns
 
 
 def _is_angular(name: str) -> bool:

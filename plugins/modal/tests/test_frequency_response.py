@@ -255,5 +255,3 @@ def test_files_without_a_response(tmp_path: Path) -> None:
         read_response(other)
     with pytest.raises(LogError, match=r"magnitude, phase was not found, the file has 'f', 'x'"):
         read_response(path)
-    with pytest.raises(LogError, match="column 'q' is missing"):
-        read_response(path, {"real": "q", "imag": "x"})
