@@ -25,8 +25,7 @@ from ..base.settings import CompensatorSettings, PredictorSettings, samples_befo
 from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import Saved, pack, unpack
 from ..base.threads import one_blas_thread
-from ..online.look_ahead import LookAhead
-from ..online.planner import PublishedWindow
+from ..online.look_ahead import LookAhead, PublishedWindow
 from ..predict.averaging.features import Disturbance
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor

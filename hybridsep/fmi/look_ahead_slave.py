@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 from ..base.settings import PredictorSettings
 from ..base.state import Saved
 from ..model.physics import ModalModel, Mode
-from ..online.look_ahead import LookAhead
+from ..online.look_ahead import LookAhead, Planner
 from ..online.look_ahead_inputs import LookAheadInputs
-from ..online.planner import Planner
 from ..predict.predictor import HybridPredictor
 from .slave import TableSlave
 from .variables import modes_from
