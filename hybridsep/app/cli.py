@@ -20,15 +20,13 @@ from typer.core import TyperCommand, TyperGroup
 from ..base.errors import HybridSepError, LogError, ParameterError, brief
 from ..base.settings import DRIVE_LIMIT_ENTRIES
 from ..base.version import version_text
-from .command_backtest import backtest
-from .command_fit import fit
-from .command_identify import identify
-from .command_report import report
-from .command_tune import tune
 from .cosim import cosim, system
+from .fit import fit, identify
 from .fmus import build, hal, header
+from .logs import backtest, report
 from .options import COMPENSATOR_ENTRIES, KNOWN_ENTRIES, PREDICTOR_ENTRIES
 from .start import demo, example_log, init
+from .tune import tune
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
