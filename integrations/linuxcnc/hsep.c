@@ -46,13 +46,14 @@ MODULE_LICENSE("Dual BSD/GPL");
 #define HSEP_PATH_SIZE 4096 /* characters */
 #define HSEP_AXES 9         /* as many joints as LinuxCNC has */
 #define HSEP_TURN 6.283185307179586
-#define HSEP_FAST 1.000001  /* of the largest velocity: a command above it is faster, for more than its rounding */
-#define HSEP_ORIGIN 1.5     /* of the largest step: cmd and fb that both step by more are at another origin */
-#define HSEP_ALIKE 0.25     /* of such a step: what fb may differ by from cmd, and what out may move by itself */
-#define HSEP_FADE 0.2       /* 1/periods, rate at which a change without a model fades, if the limits allow it */
-#define HSEP_GONE 1e-3      /* of the largest acceleration and jerk: a change that may end by a step */
-#define HSEP_NOISE 4.0      /* of the largest acceleration, a period: what a command at rest may move by */
-#define HSEP_OTHER_T_S 0.01 /* deviation of the period, relative to the sampling interval, that is another one */
+#define HSEP_FAST 1.000001   /* of the largest velocity: a command above it is faster, for more than its rounding */
+#define HSEP_ORIGIN 1.5      /* of the largest step: cmd and fb that both step by more are at another origin */
+#define HSEP_ALIKE 0.25      /* of such a step: what fb may differ by from cmd, and out may have moved by itself */
+#define HSEP_REMEMBERED 0.99 /* of a step of out, a period later: the drive may still be on its way */
+#define HSEP_FADE 0.2        /* 1/periods, rate at which a change without a model fades, if the limits allow it */
+#define HSEP_GONE 1e-3       /* of the largest acceleration and jerk: a change that may end by a step */
+#define HSEP_NOISE 4.0       /* of the largest acceleration, a period: what a command at rest may move by */
+#define HSEP_OTHER_T_S 0.01  /* deviation of the period, relative to the sampling interval, that is another one */
 
 static char *axes[HSEP_AXES];
 RTAPI_MP_ARRAY_STRING(axes, HSEP_AXES, "folders of the axes, written by hybridsep hal");
@@ -87,13 +88,14 @@ typedef struct {
     void *weights;          /* what weights.bin holds; NULL: none */
     double *ring;           /* (n_ring,) the last commands */
     size_t n_ring, at;
-    double limit[3];                               /* m, of the differences of the change of orders 1 to 3 */
-    double scale;                                  /* machine units in a metre */
-    double origin;                                 /* of a rotary axis whole turns, and what cmd and fb jumped by */
-    double command, step;                          /* the last one, and what it moved by */
-    double feedback[2], measured;                  /* the last ones: NaN, and held, where it is missing */
-    double out[4], change, velocity, acceleration; /* of the change of the command, out - delayed, a period */
-    size_t still;                                  /* periods since the command has moved, n_ring at most */
+    double limit[3];                       /* m, of the differences of the change of orders 1 to 3 */
+    double scale;                          /* machine units in a metre */
+    double origin;                         /* of a rotary axis whole turns, and what cmd and fb jumped by */
+    double command, step;                  /* the last one, and what it moved by */
+    double feedback[2], measured;          /* the last ones: NaN, and held, where it is missing */
+    double out, moved;                     /* the last one; its largest step, which is forgotten by and by */
+    double change, velocity, acceleration; /* of the command, out - delayed, a period */
+    size_t still;                          /* periods since the command has moved, n_ring at most */
     size_t fast;    /* periods until the model's preview holds no command that is faster than the limits */
     size_t missing; /* measurements, one after another */
     uint64_t k;     /* sample of this run */
@@ -101,7 +103,8 @@ typedef struct {
     int runs;       /* whether the model does */
     int ending;     /* whether it makes no more plans, to begin anew at rest */
     int faulty;     /* whether it has refused a sample: it does not begin until reset or inactive */
-    int unknown;    /* whether it was said that the command is no number */
+    int held;       /* whether the command is no position, so that the last one is held */
+    int said;       /* whether that was said */
     int was_reset;
 } axis_data;
 
@@ -114,63 +117,44 @@ static char axis_message[HSEP_MESSAGE_SIZE];
 
 static double *axis_value(axis_data *self, size_t place) { return &self->instance.values[place]; }
 
-/* The model's change of the command in this sample. */
-static double axis_planned(axis_data *self)
-{
+/* What the two components differ in: the model's change of the command in this sample; the model that may plan until the
+ * parameter is set, the machine file's; the pin state while the model has measurements; the time without a measurement,
+ * s, after which the change fades, 0: never; which model may plan the next windows; and limits of the drive, of which a
+ * predictor, that changes nothing, knows none: those of a slow one. */
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d);
-#else
-    (void)self;
-    return 0.0;
-#endif
-}
-
-/* The model that may plan until the parameter is set: the machine file's. */
-static hal_u32_t axis_first_model(axis_data *self)
+static double axis_planned(axis_data *self) { return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d); }
+static unsigned axis_first_model(axis_data *self) { return *axis_value(self, HSEP_VR_compensate) > 1.0 ? 2 : 1; }
+static int axis_state(axis_data *self) { return AXIS_DELAYS + (int)*axis_value(self, HSEP_VR_sep_state); }
+static double axis_timeout(axis_data *self) { return *axis_value(self, HSEP_VR_measurement_timeout); }
+static void axis_choose(axis_data *self, int plans)
 {
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    return *axis_value(self, HSEP_VR_compensate) >= (double)HSEP_SEP_HYBRID ? 2 : 1;
-#else
-    (void)self;
-    return 1;
-#endif
+    const hsep_sep_state model = self->pins->model == 1 ? HSEP_SEP_PHYSICS : HSEP_SEP_HYBRID;
+    *axis_value(self, HSEP_VR_compensate) = plans ? (double)model : (double)HSEP_SEP_OFF;
 }
-
-/* Value of the pin state while the model runs and has measurements. */
+#define HSEP_LIMIT(self, name, slow) *axis_value(self, HSEP_VR_##name)
+#else
+static double axis_planned(axis_data *self) { return (void)self, 0.0; }
+static unsigned axis_first_model(axis_data *self) { return (void)self, 1; }
 static int axis_state(axis_data *self)
 {
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    return AXIS_DELAYS + (int)*axis_value(self, HSEP_VR_sep_state);
-#else
     return *axis_value(self, HSEP_VR_hybrid_active) > 0.0 ? AXIS_HYBRID : AXIS_PHYSICS;
-#endif
 }
+static double axis_timeout(axis_data *self) { return (void)self, 0.0; }
+static void axis_choose(axis_data *self, int plans) { (void)self, (void)plans; }
+#define HSEP_LIMIT(self, name, slow) slow
+#endif
 
-/* Whether no measurement came for measurement_timeout. */
+/* Whether no measurement came for so long that the change fades. */
 static int axis_lost(axis_data *self)
 {
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    const double timeout = *axis_value(self, HSEP_VR_measurement_timeout), T_s = *axis_value(self, HSEP_VR_T_s);
-    return timeout > 0.0 && (double)self->missing * T_s >= timeout;
-#else
-    (void)self;
-    return 0;
-#endif
+    const double timeout = axis_timeout(self);
+    return timeout > 0.0 && (double)self->missing * *axis_value(self, HSEP_VR_T_s) >= timeout;
 }
 
-/* Limits of the change. A predictor makes none, and knows no limits of the drive: those of a slow one. */
-static void axis_limit(axis_data *self)
+/* Whether the model may make plans. */
+static int axis_plans(axis_data *self)
 {
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    const double v_max = *axis_value(self, HSEP_VR_v_max), a_max = *axis_value(self, HSEP_VR_a_max);
-    const double j_max = *axis_value(self, HSEP_VR_j_max);
-#else
-    const double v_max = 0.1, a_max = 1.0, j_max = 1e3;
-#endif
-    const double T_s = *axis_value(self, HSEP_VR_T_s);
-    self->limit[0] = v_max * T_s;
-    self->limit[1] = a_max * T_s * T_s;
-    self->limit[2] = j_max * T_s * T_s * T_s;
+    return *self->pins->enable && !self->ending && self->fast == 0 && !axis_lost(self);
 }
 
 static double axis_within(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
@@ -183,24 +167,13 @@ static void axis_fail(axis_data *self)
     self->faulty = 1;
 }
 
-/* Say which model may plan the next windows. */
-static void axis_choose(axis_data *self)
-{
-#if defined(HSEP_MODEL_SEP_COMPENSATOR)
-    const hsep_sep_state model = self->pins->model == 1 ? HSEP_SEP_PHYSICS : HSEP_SEP_HYBRID;
-    const int plans = *self->pins->enable && !self->ending && self->fast == 0 && !axis_lost(self);
-    *axis_value(self, HSEP_VR_compensate) = plans ? (double)model : (double)HSEP_SEP_OFF;
-#else
-    (void)self;
-#endif
-}
-
-/* Let the command be where it rests since look-ahead periods. */
+/* Let the axis be where the command is, at rest since look-ahead periods. */
 static void axis_rest(axis_data *self)
 {
     for (size_t i = 0; i < self->n_ring; i++) {
         self->ring[i] = self->command;
     }
+    self->out = self->command;
     self->still = self->n_ring;
 }
 
@@ -213,34 +186,28 @@ static void axis_activate(axis_data *self)
         high = fmax(high, self->ring[i]);
     }
     if (high - low <= HSEP_NOISE * self->limit[1]) {
-        self->change = self->out[0] - self->command;
-        self->velocity = 0.0;
+        const double out = self->out;
         axis_rest(self);
+        self->out = out;
+        self->change = out - self->command;
     }
 }
 
-/* Move the origin: what is remembered stays where it is. */
-static void axis_move_origin(axis_data *self, double by)
-{
-    double *const remembered[] = {&self->command, &self->feedback[0], &self->feedback[1], &self->measured,
-                                  &self->out[0],  &self->out[1],      &self->out[2],      &self->out[3]};
-    for (size_t i = 0; i < sizeof remembered / sizeof remembered[0]; i++) {
-        *remembered[i] -= by;
-    }
-    self->origin += by;
-}
-
-/* Begin a run at rest at the last command; what the weights hold is kept. */
+/* Begin a run at rest at the last command, whole turns taken off; what the weights hold is kept. */
 static void axis_begin(axis_data *self)
 {
     hsep_instance *instance = &self->instance;
-    const double command = self->command + self->origin;
-    axis_move_origin(self, (instance->context.angular ? HSEP_TURN * rint(command / HSEP_TURN) : 0.0) - self->origin);
+    const double turns = rint((self->command + self->origin) / HSEP_TURN);
+    const double origin = instance->context.angular ? HSEP_TURN * turns : 0.0, by = origin - self->origin;
+    self->origin = origin;
+    self->command -= by;
+    self->measured -= by;
+    self->feedback[0] = self->feedback[1] = self->feedback[0] - by;
     axis_rest(self);
     self->k = 0;
     self->ending = 0;
     *axis_value(self, HSEP_VR_x_d_ahead) = *axis_value(self, HSEP_VR_x_meas) = self->command;
-    axis_choose(self);
+    axis_choose(self, axis_plans(self));
     memset(instance->state, 0, instance->state_size);
     axis_message[0] = '\0';
     self->runs = hsep_model_initialise(
@@ -258,7 +225,7 @@ static void axis_process(axis_data *self)
     const int predicted = isnan(self->feedback[0]) && !(*axis_value(self, HSEP_VR_averaging) > 0.0);
     *axis_value(self, HSEP_VR_x_d_ahead) = self->command;
     *axis_value(self, HSEP_VR_x_meas) = predicted ? *axis_value(self, HSEP_VR_x_h) : self->feedback[0];
-    axis_choose(self);
+    axis_choose(self, axis_plans(self));
     axis_message[0] = '\0';
     if (hsep_model_step(&self->instance.context, self->instance.state, self->instance.values, t, T_s, axis_message) ==
         HSEP_REFUSED) {
@@ -281,13 +248,22 @@ static void axis_fade(axis_data *self)
     const double *limit = self->limit, size = fabs(self->change), gone = HSEP_GONE * fmin(limit[1], limit[2]);
     const double rate =
         fmin(fmin(HSEP_FADE, limit[0] / size), fmin(sqrt(limit[1] / size), cbrt(limit[2] / size))); /* 1/0: inf */
-    const double velocity = axis_within(-rate / 3.0 * self->change, limit[0]);
-    const double acceleration = axis_within(rate * (velocity - self->velocity), limit[1]);
-    const double jerk = axis_within(3.0 * rate * (acceleration - self->acceleration), limit[2]);
-    axis_change(self, self->change + (self->velocity + (self->acceleration + jerk)));
+    const double velocity = axis_within(self->velocity, limit[0]);
+    const double acceleration = axis_within(self->acceleration, limit[1]);
+    const double to_velocity = axis_within(-rate / 3.0 * self->change, limit[0]);
+    const double to_acceleration = axis_within(rate * (to_velocity - velocity), limit[1]);
+    const double jerk = axis_within(3.0 * rate * (to_acceleration - acceleration), limit[2]);
+    axis_change(self, self->change + axis_within(velocity + (acceleration + jerk), limit[0]));
     if (size < gone && fabs(self->change) < gone) {
         self->change = self->velocity = self->acceleration = 0.0;
     }
+}
+
+/* Whether a pin is a position; axis_message says why not. */
+static int axis_is_position(const axis_data *self, const char *pin, double value)
+{
+    axis_message[0] = '\0';
+    return hsep_check_position(&self->instance.context, pin, value, "", 0.0, axis_message) == HSEP_OK;
 }
 
 /* Take in the pins cmd and fb; return the command of look-ahead periods ago. */
@@ -295,19 +271,20 @@ static double axis_take_in(axis_data *self)
 {
     const axis_pins *pins = self->pins;
     double command = *pins->cmd / self->scale - self->origin, feedback = *pins->fb / self->scale - self->origin;
-    if (!isfinite(command)) {
-        if (!self->unknown) {
+    self->held = !axis_is_position(self, "cmd", command);
+    if (self->held) {
+        if (!self->said) {
             rtapi_print_msg(
-                RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: cmd must be finite: the last one is held\n", self->instance.name);
+                RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s; the last one is held\n", self->instance.name, axis_message);
         }
-        self->unknown = 1;
+        self->said = 1;
         command = self->command;
     }
     const double step = command - self->command, jump = step - self->step;
     /* Another origin: both step alike (fb maybe a period earlier, as LinuxCNC answers to it), the drive does not. */
     const double alike = HSEP_ALIKE * fabs(jump);
     if (fabs(jump) > HSEP_ORIGIN * self->limit[0] && fabs(feedback - self->feedback[1] - jump) <= alike &&
-        fabs(self->out[0] - self->out[3]) <= alike) {
+        self->moved <= alike) {
         self->origin += jump;
         command -= jump;
         feedback -= jump;
@@ -318,8 +295,7 @@ static double axis_take_in(axis_data *self)
     const int is_fast = fabs(self->step) > HSEP_FAST * self->limit[0];
     self->fast = is_fast ? self->n_ring + 4 : self->fast - (self->fast > 0);
     self->still = self->step != 0.0 ? 0 : self->still + (self->still < self->n_ring);
-    const int is_missing =
-        hsep_check_position(&self->instance.context, "fb", feedback, "", 0.0, axis_message) != HSEP_OK;
+    const int is_missing = !axis_is_position(self, "fb", feedback);
     self->missing = is_missing ? self->missing + 1 : 0;
     self->measured = is_missing ? self->measured : feedback;
     self->feedback[1] = self->feedback[0];
@@ -335,8 +311,8 @@ static void axis_write(axis_data *self, double delayed, int state)
 {
     axis_pins *pins = self->pins;
     const double scale = self->scale, origin = self->origin, out = delayed + self->change;
-    memmove(&self->out[1], &self->out[0], 3 * sizeof self->out[0]);
-    self->out[0] = out;
+    self->moved = fmax(HSEP_REMEMBERED * self->moved, fabs(out - self->out));
+    self->out = out;
     *pins->out = scale * (out + origin);
     *pins->delayed = scale * (delayed + origin);
     *pins->predicted = scale * ((self->runs ? *axis_value(self, HSEP_VR_x_h) : out) + origin);
@@ -352,12 +328,14 @@ static void axis_write(axis_data *self, double delayed, int state)
 static int axis_meet(axis_data *self)
 {
     const double command = *self->pins->cmd / self->scale, feedback = *self->pins->fb / self->scale;
-    self->begun = isfinite(command);
+    const double out = *self->pins->out / self->scale;
+    const int is_first = self->still == 0;
+    self->begun = axis_is_position(self, "cmd", command);
     self->command = self->begun ? command : 0.0;
-    self->measured = isfinite(feedback) ? feedback : self->command;
+    self->measured = axis_is_position(self, "fb", feedback) ? feedback : self->command;
     self->feedback[0] = self->feedback[1] = self->measured;
-    self->out[0] = self->out[1] = self->out[2] = self->out[3] = self->command;
     axis_rest(self);
+    self->out = is_first ? self->command : out;
     return self->begun;
 }
 
@@ -379,19 +357,18 @@ static void axis_step(void *data, long period)
         return;
     }
     if (!*pins->active) {
-        self->runs = self->ending = self->faulty = self->unknown = 0;
+        self->runs = self->ending = self->faulty = self->said = 0;
         const double delayed = axis_take_in(self);
         axis_change(self, self->measured - delayed);
-        self->velocity = axis_within(self->velocity, self->limit[0]);
-        self->acceleration = 0.0;
         axis_write(self, delayed, AXIS_INACTIVE);
         return;
     }
-    if (*pins->state == AXIS_INACTIVE) {
+    const int was_inactive = *pins->state == AXIS_INACTIVE;
+    if (was_inactive) {
         axis_activate(self);
     }
     if (resets) {
-        self->faulty = self->unknown = 0;
+        self->faulty = self->said = 0;
     }
     self->ending |= resets || is_wrong;
     if ((!self->runs || self->ending) && !self->faulty && !is_wrong && self->still >= self->n_ring &&
@@ -401,11 +378,14 @@ static void axis_step(void *data, long period)
     const double delayed = axis_take_in(self);
     if (self->runs) {
         axis_change(self, axis_planned(self));
+    } else if (was_inactive) {
+        axis_change(self, self->out - delayed); /* out stays, and fades from there */
+        self->acceleration = 0.0;
     } else {
         axis_fade(self);
     }
     const int works = self->runs ? axis_lost(self) ? AXIS_NO_MEASUREMENT : axis_state(self) : AXIS_DELAYS;
-    axis_write(self, delayed, is_wrong ? AXIS_WRONG_PERIOD : self->faulty ? AXIS_FAULT : works);
+    axis_write(self, delayed, is_wrong ? AXIS_WRONG_PERIOD : self->faulty || self->held ? AXIS_FAULT : works);
     if (self->runs) {
         axis_process(self);
     }
@@ -505,7 +485,10 @@ static int axis_open(axis_data *self, const char *folder)
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: no memory for its commands\n", name);
         return 0;
     }
-    axis_limit(self);
+    const double T_s = *axis_value(self, HSEP_VR_T_s);
+    self->limit[0] = HSEP_LIMIT(self, v_max, 0.1) * T_s;
+    self->limit[1] = HSEP_LIMIT(self, a_max, 1.0) * T_s * T_s;
+    self->limit[2] = HSEP_LIMIT(self, j_max, 1e3) * T_s * T_s * T_s;
     return 1;
 }
 

@@ -95,6 +95,9 @@ void stub_parameters(double scale, int model)
     axis_all[0].pins->model = (hal_u32_t)model;
 }
 
+/* Let the model refuse the next sample. */
+void stub_break(void) { axis_all[0].k += 1000; }
+
 double stub_scale(void) { return axis_all[0].pins->scale; }
 int stub_look_ahead(void) { return (int)axis_all[0].pins->look_ahead; }
 int stub_messages(void) { return n_messages; }

@@ -147,30 +147,37 @@ def test_states_and_what_they_end_with(folder: Path) -> None:
     assert run.component.messages == 0
 
 
+@pytest.mark.parametrize(("cmd", "said"), [(math.nan, "finite, got nan"), (2e6, "within ±1000 m, got 2000")])
+def test_a_command_that_is_none_is_held(folder: Path, cmd: float, said: str) -> None:
+    run = Run(Component(load_machine(X), folder))
+    run.stay(100)
+    run.move(30.0, V)
+    for _ in range(100):
+        assert run.step(cmd)[STATE] == -1
+    assert (run.component.messages, f"cmd must be {said}; the last one is held" in run.component.message) == (1, True)
+    assert run.shown[-1][[OUT, DELAYED]] == pytest.approx(30.0, abs=1e-3)
+    run.cmd[-1] = 30.0
+    run.stay(100)
+    assert run.shown[-1][STATE] >= 2
+    run.step(cmd)
+    assert run.component.messages == 1
+
+
 def test_a_fault_is_said_once_and_ends_with_reset(folder: Path) -> None:
     run = Run(Component(load_machine(X), folder))
     run.stay(100)
     run.move(30.0, V)
-    run.stay(100)
-    for _ in range(50):
-        run.step(math.nan)
-    assert run.component.messages == 1
-    assert "cmd must be finite: the last one is held" in run.component.message
-    assert np.max(np.abs(run.column(OUT)[-50:] - 30.0)) < 1e-3
-    run.cmd[-1] = 30.0
-    assert run.shown[-1][STATE] >= 2
-    for _ in range(50):
-        run.step(2e6)
-    assert run.component.messages == 2
-    assert "x_d_ahead must be within ±1000 m, got 2000" in run.component.message
-    assert run.shown[-1][STATE] == -1
+    run.component.break_model()
+    run.move(60.0, V)
     run.stay(200)
-    run.step(30.0)
-    run.stay(100)
     assert run.shown[-1][STATE] == -1
-    run.step(30.0, reset=True)
-    assert run.shown[-1][STATE] == 2
-    assert run.component.messages == 2
+    assert run.component.messages == 1
+    assert "hsep.x: the communication point must be" in run.component.message
+    change = run.column(OUT) - run.column(DELAYED)
+    assert np.max(np.abs(change)) > 0.1
+    assert change[-1] == 0.0
+    assert_no_step(run)
+    assert run.step(60.0, reset=True)[STATE] == 2
 
 
 def test_reset_in_motion_waits_for_rest(folder: Path) -> None:
@@ -248,7 +255,14 @@ def test_nothing_but_numbers_is_written(folder: Path) -> None:
     assert component.step(4.0, math.nan, active=False)[OUT] == pytest.approx(3.0)
     shown = np.array([component.step(4.0, math.nan) for _ in range(2000)])
     assert np.isfinite(shown).all()
+    assert np.max(np.abs(np.diff(shown[:, OUT], prepend=3.0))) <= V
     assert shown[-1, OUT] == pytest.approx(4.0)
+    late = Component(load_machine(X), folder)
+    shown = np.array([late.step(4.0 if k else math.nan, 3.0) for k in range(500)])
+    assert shown[0, OUT] == pytest.approx(3.0)
+    assert np.max(np.abs(np.diff(shown[:, OUT]))) <= V
+    component = Component(load_machine(X), folder)
+    component.step(4.0, 4.0)
     component.set(scale=0.0)
     assert component.step(4.0, 4.0)[OUT] == pytest.approx(4.0)
     assert component.step(4.0, 4.0, active=False)[OUT] == pytest.approx(4.0)
@@ -263,7 +277,7 @@ EVENTS = st.tuples(
     st.sampled_from(
         [
             *("move", "move", "move", "lurch", "stay", "jump", "glitch", "origin", "cmd NaN", "fb NaN", "fb inf"),
-            *("enable", "reset", "off", "period", "model", "scale"),
+            *("enable", "reset", "off", "period", "model", "scale", "far", "break"),
         ]
     ),
     st.integers(1, 150),
@@ -287,14 +301,14 @@ def test_nothing_steps(
     def step(position: float, fb: float | None = None, **pins: float) -> None:
         measured = run.fb + run.origin + 2e-4 * rng.standard_normal() if fb is None else fb
         run.step(position, measured, enable=enable, **pins)
-        held.append(position if math.isfinite(position) else held[-1])
+        held.append(position if abs(position) < 1e6 else held[-1])
         origins.append(run.origin)
         n_active.append(bool(pins.get("active", True)))
 
     step(0.0)
     for what, periods, amount in events:
         if what == "origin":  # behind a rest, so that nothing else explains it
-            for _ in range(100):
+            for _ in range(250):
                 step(held[-1])
             run.origin += math.copysign(5.0 + 20.0 * abs(amount), amount)
             step(held[-1] + run.origin - origins[-1])
@@ -303,6 +317,10 @@ def test_nothing_steps(
             step(held[-1] + 20.0 * amount)
         elif what == "glitch":
             step(held[-1], run.fb + run.origin + 20.0 * amount)
+        elif what == "break":
+            component.break_model()
+        elif what == "far":
+            step(math.copysign(2e6, amount))
         elif what == "enable":
             enable = not enable
         elif what == "reset":

@@ -101,6 +101,10 @@ class Component:
         self._loaded.stub_step(ns, self._inputs.ctypes.data, self._outputs.ctypes.data)
         return np.array(self._outputs)
 
+    def break_model(self) -> None:
+        """Let the model refuse the next sample."""
+        self._loaded.stub_break()
+
     @property
     def messages(self) -> int:
         """Number of messages since it was loaded."""
