@@ -131,7 +131,6 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w').write(sys.argv[-1])"
     compiler = Compiler((sys.executable, "-c", program), ZIG)
     monkeypatch.setattr(module, "compiler_for", lambda target: compiler)
-    monkeypatch.setattr("hybridsep.fmi.compile._understands", lambda command, flag: False)
     wanted = [(kind, target) for target in ALL_TARGETS[:3] for kind in ("FeedDrive", "StageDrive")]
     began: list[tuple[str, str]] = []
     paths = library_paths(wanted, began.append)
@@ -144,7 +143,6 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
 def test_a_library_is_kept_where_a_later_one_is_interrupted(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w')"
     monkeypatch.setattr(module, "compiler_for", lambda target: Compiler((sys.executable, "-c", program), ZIG))
-    monkeypatch.setattr("hybridsep.fmi.compile._understands", lambda command, flag: False)
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     wanted = [("FeedDrive", target) for target in ALL_TARGETS[:3]]
 
