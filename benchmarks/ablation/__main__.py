@@ -63,11 +63,11 @@ NO_DOUBTING: Changes = {
         ("predicted[HSEP_FRESH_START] = predicted[self->leading]", "predicted[HSEP_FRESH_START] = 0"),
     ],
     STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);\n", "")],
-    **constants(doubt=2.0),
+    **constants(discard_above=2.0),
 }
 
 NO_STATIC = together(
-    constants(first_lagged=1.0, first_static=0.0),
+    constants(first_arx_residual=1.0, first_static=0.0),
     {
         FORECAST: [
             (
@@ -83,10 +83,10 @@ NO_STATIC = together(
 VARIANTS: Mapping[str, Changes] = {
     "no static expert S": NO_STATIC,
     "no doubting expert D": NO_DOUBTING,
-    "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(carried=3.0)),
-    "earlier runs never forgotten": constants(doubt=2.0),
+    "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(warm_windows_max=3.0)),
+    "earlier runs never forgotten": constants(discard_above=2.0),
     "A's bound does not grow": {FORECAST: [("    if (!(learned->largest_step > 0.0 &&", "    if (!(0 &&")]},
-    "features never begin anew": constants(outgrown=1e300),
+    "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no first differences of disturbances": constants(difference_share=1e-6),
     "first differences as large": constants(difference_share=1.0),
@@ -108,8 +108,8 @@ VARIANTS: Mapping[str, Changes] = {
     },
     "A: 20 lags": constants(lags_of_command=20),
     "runs begin at rest": {START: [("return known >= HSEP_START_SAMPLES", "return known < 0 * HSEP_START_SAMPLES")]},
-    "L from the first": constants(first_lagged=1.0, first_static=0.0),
-    "S from the first": constants(first_lagged=0.0, first_static=1.0),
+    "L from the first": constants(first_arx_residual=1.0, first_static=0.0),
+    "S from the first": constants(first_arx_residual=0.0, first_static=1.0),
     "kappa 0.3": constants(kappa=0.3),
     "kappa 3": constants(kappa=3.0),
     "gamma 0.9": constants(gamma=0.9),
