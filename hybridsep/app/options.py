@@ -71,7 +71,7 @@ TargetOption = Annotated[
     ),
 ]
 TsOption = Annotated[
-    float | None, typer.Option("--T_s", help="Sampling interval [s], for a file without a time column.")
+    float | None, typer.Option("--T_s", help="Interval between the rows [s], where no column of times tells it.")
 ]
 UnitOption = Annotated[
     str | None,

@@ -174,13 +174,14 @@ def check(log: Log) -> tuple[Finding, ...]:
     if hopeless:
         return hopeless
     part = _liveliest(log)
-    x_d, x = log.x_d[part], log.x_meas[part]
+    x_d, x = log.x_d[part], log.x_meas[part].copy()
+    x[_spikes(x, _travel(x_d))[0]] = np.nan
     given = following(x_d, x) if np.isfinite(x).sum() >= _SAMPLES_MIN else None
-    refused = (*_unit(log), *(_meaning(log, part, given) if given else ()))
+    refused = (*_unit(log), *(_meaning(log, x_d, x, given) if given else ()))
     if refused:
         return refused
     notes = [note for notes in _NOTES for note in notes(log)]
-    return (*notes, *(_note_relation(log, part, given) if given else ()))
+    return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
 # What is refused
@@ -260,14 +261,14 @@ def following(u: Array, x: Array) -> Following:
     A = np.stack([u[np.maximum(k - lag, 0)] for lag in lags], axis=1)[known]
     A, y = A - A.mean(axis=0), x[known] - x[known].mean()
     scale, total = float(np.abs(A).max()), float(np.abs(y).max())
-    if not (scale > 0.0 and total > 0.0):
+    if not (0.0 < scale < math.inf and 0.0 < total < math.inf):
         return Following(1.0, 0.0, 0.0, 0.0, 0)
     A, y = A / scale, y / total
     squares, products = (A * A).sum(axis=0), A.T @ y
     alone = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
     one = int(np.argmax(alone))
     basis, R = np.linalg.qr(A)
-    h, _ = nnls(R, basis.T @ y, maxiter=len(u))
+    h, _ = nnls(R, basis.T @ y, maxiter=len(lags) ** 2)
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))
     gain = float(h.sum())
     return Following(
@@ -287,18 +288,17 @@ def runs_against(x_d: Array, x: Array) -> bool:
     return _BETTER * following(x_d, -x).left < following(x_d, x).left
 
 
-def _meaning(log: Log, part: slice, given: Following) -> Iterator[Finding]:
+def _meaning(log: Log, x_d: Array, x: Array, given: Following) -> Iterator[Finding]:
     """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis.
 
     Parameters
     ----------
     log : Log
-    part : slice
-        Its liveliest samples.
+    x_d, x : (n,) array
+        Its liveliest samples, NaN where missing.
     given : Following
         How the measured position follows the commanded one there.
     """
-    x_d, x = log.x_d[part], log.x_meas[part]
     known = np.isfinite(x)
     picture = _over_time(log, "Command and measurement")
     evidence = given._asdict()
@@ -442,9 +442,8 @@ def _note_rate(log: Log) -> Iterator[Finding]:
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, picture, options=options)
 
 
-def _note_relation(log: Log, part: slice, found: Following) -> Iterator[Finding]:
+def _note_relation(log: Log, x_d: Array, x: Array, found: Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
-    x_d, x = log.x_d[part], log.x_meas[part]
     picture = _over_time(log, "Command and measurement")
     if found.lag * log.T_s > _LATE:
         words = (
@@ -480,18 +479,24 @@ def _note_jumps(log: Log) -> Iterator[Finding]:
 def _note_outliers(log: Log) -> Iterator[Finding]:
     """Note samples of a column that leave it for one sample."""
     for name, x in (("commanded", log.x_d), ("measured", log.x_meas)):
-        steps = np.diff(x)
-        spikes = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
-        usual = float(np.nanquantile(np.abs(steps), _USUAL))
-        wrong = np.flatnonzero(spikes > max(_ALONE * usual, _SIZE * _travel(log.x_d))) + 1
+        wrong, heights = _spikes(x, _travel(log.x_d))
         if len(wrong):
-            height = float(spikes[wrong - 1].max())
+            height = float(heights.max())
             words = (
                 f"{len(wrong)} {name} position{'s leave' if len(wrong) > 1 else ' leaves'} the signal for one sample, "
                 f"by up to {log.shown.words(height)}, first sample {wrong[0] + 1}"
             )
             evidence = {"n": float(len(wrong)), "largest": height}
             yield Finding("outliers", words, evidence, _over_time(log, "Outliers", wrong))
+
+
+def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
+    """Return the samples that leave a signal, (n,), and come back, and by how much."""
+    steps = np.diff(x)
+    heights = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
+    usual = float(np.nanquantile(np.abs(steps), _USUAL))
+    wrong = np.flatnonzero(heights > max(_ALONE * usual, _SIZE * travel))
+    return wrong + 1, heights[wrong]
 
 
 def _note_held(log: Log) -> Iterator[Finding]:

@@ -204,6 +204,19 @@ def test_what_is_noted_has_a_statistic_and_a_picture_and_changes_nothing(name: s
     assert str(found[name]).startswith(f"note: {name}: ")
 
 
+def test_large_outliers_are_noted_and_do_not_hide_the_axis() -> None:
+    log, numbers = moves(), np.random.default_rng(7)
+    x = log.x_meas.copy()
+    x[20 + 100 * np.arange(30) + numbers.integers(0, 90, 30)] += 10.0 * np.ptp(log.x_d)
+    (finding,) = check(replace(log, x_meas=x))
+    assert (finding.name, finding.refused, finding.evidence["n"]) == ("outliers", False, 30.0)
+
+
+def test_numbers_without_bounds_are_checked() -> None:
+    log = moves()
+    assert check(replace(log, x_meas=1e300 * log.x_meas))[0].refused
+
+
 def test_rows_that_are_lost_between_even_times_are_noted() -> None:
     log = sines()
     keep = np.delete(np.arange(3000), np.arange(100, 3000, 150))
