@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import struct
-from pathlib import Path
 
 import c_core
 import pytest
-import staircase_data as staircase
-from c_core import TS, CModel, write_trajectory
 
 from hybridsep.plants.plant import Encoder
 
@@ -21,18 +18,3 @@ def test_the_encoder_draws_the_librarys_numbers(seed: int) -> None:
     core = (ctypes.c_uint64 * 3)(*struct.unpack("<Q", struct.pack("<d", 1.0)), seed, 0)
     for _ in range(2000):
         assert measure(core, ctypes.c_double(0.0)) == pytest.approx(encoder.measure(0.0), rel=1e-15, abs=1e-15)
-
-
-def test_a_trajectory_is_played_and_held_at_its_end(tmp_path: Path) -> None:
-    samples = staircase.commanded()[:300] + 0.02
-    write_trajectory(tmp_path, samples)
-    model = CModel("trajectory", resources=tmp_path)
-    model.start_values()
-    assert model["r"] == samples[0]
-    model.initialise(1.0)
-    assert model["r"] == samples[0]
-    for k in range(400):
-        model.step(1.0 + k * TS, TS / 2)
-        assert model["r"] == samples[min(k, 299)]
-        model.step(1.0 + (k + 0.5) * TS, TS / 2)
-        assert model["r"] == samples[min(k + 1, 299)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import c_core
 import numpy as np
 import pytest
-from c_core import CModel, refusal, write_trajectory, write_weights
+from c_core import CModel, refusal, write_trajectory
 
 
 def test_a_number_that_is_not_whole_is_refused() -> None:
@@ -51,19 +51,3 @@ def test_memory_of_another_size_is_refused(name: str, tmp_path: Path) -> None:
             f"the state must have {size} bytes, got memory for {other}; its file in the resources has changed "
             "meanwhile: initialise again"
         )
-
-
-def test_weights_that_do_not_fit_are_refused(tmp_path: Path) -> None:
-    factor = np.triu(np.ones((13, 13)))
-    model = CModel("predictor", {"p": 7}, tmp_path)
-    write_weights(tmp_path, "predictor", factor, 5, p=7)
-    model.initialise()
-    good = (tmp_path / "weights.bin").read_bytes()
-    for bad in (b"", good[:-8], b"X" + good[1:]):
-        (tmp_path / "weights.bin").write_bytes(bad)
-        assert "it is damaged or truncated" in refusal(model.initialise)
-    write_weights(tmp_path, "predictor", np.eye(12), 5, p=7)
-    assert "it is damaged or truncated" in refusal(model.initialise)
-    factor[3, 3] = 0.0
-    write_weights(tmp_path, "predictor", factor, 5, p=7)
-    assert "it is damaged or truncated" in refusal(model.initialise)

@@ -2,57 +2,11 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
-import staircase_data as staircase
-from c_core import TS, CModel, RefusedError, write_trajectory
-
-
-def steppable(name: str, folder: Path) -> tuple[CModel, Callable[[int], None]]:
-    """Return an initialised model and what steps it at sample k with inputs of its own."""
-    write_trajectory(folder, staircase.commanded()[:2000])
-    model = CModel(name, resources=folder).initialise()
-
-    def step(k: int) -> None:
-        for key, values in (("x_d_ahead", staircase.commanded()), ("x_d", staircase.commanded())):
-            if key in model.place and not (key == "x_d" and "x_d_ahead" in model.place):
-                model[key] = float(values[k])
-        if "x_d_ahead" in model.place:
-            model["x_meas"] = float(staircase.measured(0)[k])
-        model.step(k * TS)
-
-    return model, step
-
-
-@pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive", "trajectory"])
-def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: Path) -> None:
-    model, step = steppable(name, tmp_path)
-    step(0)
-    blob = model.state.tobytes()
-    with pytest.raises(RefusedError, match=f"must have {len(blob)} bytes, got {len(blob) - 8}; it is truncated"):
-        model.check_state(blob[:-8])
-    with pytest.raises(RefusedError, match=r"must have \d+ bytes, got 0"):
-        model.check_state(b"")
-    with pytest.raises(RefusedError, match="belongs to another model"):
-        model.check_state(b"\x00" + blob[1:])
-    with pytest.raises(RefusedError, match="must be of version 29, got 30"):
-        model.check_state(blob[:8] + struct.pack("<Q", 30) + blob[16:])
-    with pytest.raises(RefusedError, match="saved with other parameters"):
-        model.check_state(blob[:24] + struct.pack("<Q", 2) + blob[32:])
-    if name != "feed_drive":  # its state has no numbers that must fit together
-        middle = {
-            "predictor": 32 + 40 + 16,
-            "compensator": 32 + 40 + 16,
-            "stage_drive": 32 + 8 + 24 + 64 + 40 + 32,
-            "trajectory": 32 + 40,
-        }[name]
-        with pytest.raises(RefusedError, match="the state is inconsistent: it is damaged"):
-            model.check_state(blob[:middle] + struct.pack("<Q", 2**60) + blob[middle + 8 :])
+from c_core import TS, CModel, RefusedError
 
 
 def test_a_state_of_other_parameters_is_refused() -> None:

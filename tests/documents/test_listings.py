@@ -60,11 +60,3 @@ def test_the_row_for_ssp_standard_org(row: ET.Element) -> None:
     assert not str(description.text).endswith(".")
     assert (licence.text, reads.text) == ("osi", "no")
     assert writes.text == "/".join(f"{version}.0" for version in SSP_VERSIONS)
-
-
-def test_links_wait_for_the_address_of_the_repository(row: ET.Element) -> None:
-    entry = json.loads((FOLDER / "fmi-standard.org.json").read_text(encoding="utf-8"))
-    links = [link.get("href") for link in row.iter("a")] + [entry[key] for key in ("url", "vendorURL", "examplesURL")]
-    assert all(str(link).startswith("REPOSITORY") for link in links)
-    examples = entry["examplesURL"].partition("/blob/main/")[2]
-    assert (ROOT / examples).is_file()
