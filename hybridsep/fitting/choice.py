@@ -17,7 +17,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .replay import Recording, Replay, replay
+from .replay import Recording, replay
 
 __all__ = [
     "WORTH",
@@ -117,8 +117,8 @@ def window_sizes(Np: int, n_samples: int) -> list[int]:
 def window_scores(
     model: ModalModel,
     recordings: Sequence[Recording],
-    judged: Replay,
     settings: PredictorSettings,
+    offset: float = 0.0,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> dict[int, list[float]]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
@@ -127,8 +127,8 @@ def window_scores(
     ----------
     model, recordings, settings, progress
         As for :func:`choose_settings`.
-    judged : Replay
-        With the controller's window.
+    offset : float
+        As of :class:`~hybridsep.fitting.replay.Replay`, m.
 
     Returns
     -------
@@ -138,9 +138,7 @@ def window_scores(
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = {}
     for i, Np in enumerate(sizes):
-        found = judged
-        if Np != settings.Np:
-            found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
-        scores[Np] = replace(found, offset=judged.offset).rms()
+        found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
+        scores[Np] = replace(found, offset=offset).rms()
         progress((i + 1) / len(sizes))
     return scores

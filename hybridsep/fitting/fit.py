@@ -38,7 +38,7 @@ from .choice import choose_settings, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, estimated_limits, expected_tracking
 from .period import period_finding
 from .plant import commands_to_try, identified_plant, plant_words
-from .replay import Recording, Replay, around_the_split, replay, split_log
+from .replay import Recording, Replay, beginnings, replay, split_log
 
 __all__ = ["SAMPLES_MAX", "Fit", "FitOptions", "fit", "fit_files", "sha256_of", "step_times"]
 
@@ -46,8 +46,8 @@ _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
 
 _TRIED_MAX = 20_000
-"""Samples around the split on which settings, look-aheads and a plant are tried, 20 s at 1 kHz, and a compensator on
-half of them: a fit of a minute's log took twice as long without."""
+"""Leading samples on which settings and look-aheads are tried and a plant is fitted, 20 s at 1 kHz, and a compensator
+on half of them: a fit of a minute's log took twice as long without."""
 
 Progress = Callable[[str, float], object]
 
@@ -209,7 +209,7 @@ def fit(
     default = replace(default, input_hold=found["input_hold"])
     progress("look for what repeats with the position", 0.33)
     found["findings"] = [*found["findings"], *period_finding(model, recordings, default, logs[0].shown)]
-    tried = around_the_split(recordings, _TRIED_MAX)
+    tried = beginnings(recordings, _TRIED_MAX)
     settings, errors = choose_settings(model, tried, default, within(0.35, 0.6, "choose p and q"))
     choice = [
         {"p": one.p, "q": one.q, "rms_h": _known(rms_h), "chosen": one == settings} for one, rms_h in errors.items()
@@ -217,11 +217,11 @@ def fit(
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=within(0.6, 0.65, "judge on the second half"))
     judged = replace(replayed, offset=found["offset"]).with_peers(within(0.65, 0.68, "peers on the second half"))
-    over_windows = window_scores(model, tried, judged, settings, within(0.68, 0.8, "error over Np"))
+    over_windows = window_scores(model, tried, settings, found["offset"], within(0.68, 0.8, "error over Np"))
     names = ("rms_pb", "rms_hold", "rms_h")
     windows = [{"Np": size, **dict(zip(names, map(_known, rms), strict=True))} for size, rms in over_windows.items()]
     progress("a plant to try with", 0.8)
-    plant = identified_plant(model, settings, tried)
+    plant = identified_plant(model, settings, recordings, tried)
     limits: dict[str, Any] = dict(options.drive_limits)
     estimated = estimated_limits(recordings, T_s)
     if not limits:
@@ -236,7 +236,7 @@ def fit(
     tracking: dict[str, Any] = {}
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
-        tracking = expected_tracking(machine, around_the_split(recordings, _TRIED_MAX // 2), estimate)
+        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate)
     if not fmus:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
     written = tuple(files.values())

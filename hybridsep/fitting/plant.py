@@ -105,7 +105,9 @@ class _Piece:
         return np.asarray(self.x - discrete.forced_response(discrete.rest(), self.u - disturbance)[0])
 
 
-def identified_plant(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> dict[str, Any]:
+def identified_plant(
+    model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording], fitted: Sequence[Recording]
+) -> dict[str, Any]:
     """Return the plant of a fit as plain values.
 
     Parameters
@@ -115,6 +117,9 @@ def identified_plant(model: ModalModel, settings: PredictorSettings, recordings:
     settings : PredictorSettings
         For sampling interval, hold and delay of the measurement.
     recordings : sequence of Recording
+        Which choose, and judge.
+    fitted : sequence of Recording
+        What it is fitted to: they, or their beginnings.
 
     Returns
     -------
@@ -128,9 +133,11 @@ def identified_plant(model: ModalModel, settings: PredictorSettings, recordings:
     except ParameterError as error:
         return {"entries": {}, "rms": None, "rms_pb": None, "reason": str(error)}
     discrete = model.discretise(settings.T_s, settings.input_hold)
-    pieces = [_Piece(discrete, one, settings.n_late) for one in recordings if len(one.x_d) > 1]
+    pieces, begun = (
+        [_Piece(discrete, one, settings.n_late) for one in given if len(one.x_d) > 1] for given in (recordings, fitted)
+    )
     alone = _Disturbed(model, 0.0, 0.0, PARAMETERS["v_friction"].default)
-    candidates = [alone, *_refined(alone, settings, pieces)]
+    candidates = [alone, *_refined(alone, settings, begun)]
     errors = [_rms_of(settings, one, pieces, "choosing") for one in candidates]
     least = [math.inf if error is None else error for error in errors]
     best = int(np.argmin(least))

@@ -26,7 +26,7 @@ __all__ = [
     "Recording",
     "Replay",
     "Scored",
-    "around_the_split",
+    "beginnings",
     "knew",
     "replay",
     "replay_log",
@@ -101,23 +101,22 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
     return settled if 2 * left >= most else found
 
 
-def around_the_split(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
-    """Return the samples nearest to the split of recordings: half of ``n_most`` before it, and as many after it.
+def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
+    """Return the beginnings of recordings, ``n_most`` samples in all, half of them for training at most.
 
-    Each begins at rest where its command rests within as many samples before.
+    They begin where the recordings do, as what is learned of the position counts from there, and end at rest where the
+    command rests in the last quarter.
     """
     n = sum(len(one.x) for one in recordings)
     if n <= n_most:
         return list(recordings)
     found = []
     for one in recordings:
-        half = max(n_most * len(one.x) // (2 * n), 1)
-        begin = max(one.n_train - half, 0)
-        at_rest = np.flatnonzero(np.diff(one.x_d[max(begin - half, 0) : begin + 1]) == 0.0)
-        begin -= min(begin, half) - int(at_rest[-1]) if len(at_rest) else 0
-        part = slice(begin, one.n_train + half)
-        settling = max(one.n_settling - begin, 0)
-        found.append(Recording(one.x_d[part], one.x[part], one.n_train - begin, settling))
+        end = max(n_most * len(one.x) // n, 2)
+        at_rest = np.flatnonzero(np.diff(one.x_d[3 * end // 4 : end]) == 0.0)
+        last = 3 * end // 4 + int(at_rest[-1]) + 2 if len(at_rest) else end
+        settling = min(one.n_settling, last)
+        found.append(Recording(one.x_d[:last], one.x[:last], min(one.n_train, end // 2), settling))
     return found
 
 

@@ -64,7 +64,7 @@ def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
 def test_errors_over_the_window() -> None:
     recordings, settings = ringing(), settings_for(40, 1e-3, "zoh")
     judged = replay(HybridPredictor(MODEL, settings), recordings)
-    scores = window_scores(MODEL, recordings, judged, settings)
+    scores = window_scores(MODEL, recordings, settings)
     assert list(scores) == [8, 20, 40, 80]
     assert scores[40] == judged.rms()
     assert scores[8][1] < scores[40][1]

@@ -36,7 +36,7 @@ def recorded(plant: StageDrive) -> Recording:
 def test_friction_and_stiffness_are_found_and_the_plant_follows_the_drive() -> None:
     recording = recorded(StageDrive(ModalModel([MODE]), 8e-6, 0.05, T_S, v_friction=4e-3))
     biased = ModalModel([Mode(34.0, 0.43, 0.99 * (68 * np.pi) ** 2)])  # as identified where friction is not known
-    found = identified_plant(biased, SETTINGS, [recording])
+    found = identified_plant(biased, SETTINGS, [recording], [recording])
     entries = found["entries"]
     assert entries["f"] == pytest.approx(8e-6, rel=0.03)
     assert entries["kappa"] == pytest.approx(0.05, rel=0.1)
@@ -51,13 +51,15 @@ def test_friction_and_stiffness_are_found_and_the_plant_follows_the_drive() -> N
 
 def test_a_linear_drive_keeps_its_model_alone() -> None:
     model = ModalModel([MODE])
-    found = identified_plant(model, SETTINGS, [recorded(StageDrive(model, T_s=T_S))])
+    recording = recorded(StageDrive(model, T_s=T_S))
+    found = identified_plant(model, SETTINGS, [recording], [recording])
     assert set(found["entries"]) == {"noise_std"}
     assert found["rms"] == found["rms_pb"] == pytest.approx(5e-7, rel=0.05)
 
 
 def test_a_model_that_is_too_fast_for_a_plant_has_none() -> None:
-    found = identified_plant(ModalModel([Mode(5e4, 0.5, 1.0)]), SETTINGS, [recorded(StageDrive(ModalModel([MODE])))])
+    recording = recorded(StageDrive(ModalModel([MODE])))
+    found = identified_plant(ModalModel([Mode(5e4, 0.5, 1.0)]), SETTINGS, [recording], [recording])
     assert found["entries"] == {}
     assert "must be at most 100000 1/s in a plant" in found["reason"]
 

@@ -11,7 +11,7 @@ import pytest
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fitting.replay import Recording, around_the_split, replay, split_log
+from hybridsep.fitting.replay import Recording, beginnings, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -38,14 +38,15 @@ def test_a_log_is_split_by_its_samples_across_its_gaps() -> None:
     assert len(x_d) == len(x) == 200
 
 
-def test_what_is_tried_of_a_long_log_is_around_its_split_and_begins_at_rest() -> None:
+def test_what_is_tried_of_a_long_log_is_its_beginning_to_where_it_rests() -> None:
     x_d = np.arange(1000.0)
-    x_d[440:446] = 440.0
-    [one] = around_the_split([Recording(x_d, x_d + 1, 500)], 100)
-    np.testing.assert_array_equal(one.x_d, x_d[444:550])
-    np.testing.assert_array_equal(one.x, x_d[444:550] + 1)
-    assert one.n_train == 56
-    assert around_the_split([one], 106) == [one]
+    [one] = beginnings([Recording(x_d, x_d + 1, 500)], 100)
+    np.testing.assert_array_equal((one.x_d, one.x), (x_d[:100], x_d[:100] + 1))
+    assert one.n_train == 50
+    assert beginnings([one], 100) == [one]
+    x_d[80:86] = 80.0
+    [one] = beginnings([Recording(x_d, x_d + 1, 500)], 100)
+    np.testing.assert_array_equal(one.x_d, x_d[:86])
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 1e-9])
