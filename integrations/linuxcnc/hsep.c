@@ -49,7 +49,7 @@ MODULE_LICENSE("Dual BSD/GPL");
 #define HSEP_FAST 1.000001   /* of the largest velocity: a command above it is faster, for more than its rounding */
 #define HSEP_ORIGIN 1.5      /* of the largest step: cmd and fb that both step by more are at another origin */
 #define HSEP_ALIKE 0.25      /* of such a step: what fb may differ by from cmd, and out may have moved by itself */
-#define HSEP_REMEMBERED 0.99 /* of a step of out, a period later: the drive may still be on its way */
+#define HSEP_REMEMBERED 0.97 /* of a step of out, a period later: the drive may still be on its way */
 #define HSEP_FADE 0.2        /* 1/periods, rate at which a change without a model fades, if the limits allow it */
 #define HSEP_GONE 1e-3       /* of the largest acceleration and jerk: a change that may end by a step */
 #define HSEP_NOISE 4.0       /* of the largest acceleration, a period: what a command at rest may move by */
