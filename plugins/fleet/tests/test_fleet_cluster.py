@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
+import gc
 import json
 import os
 import socket
 import ssl
+import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -104,15 +104,29 @@ def test_a_cluster_listens_at_this_machine_alone(engine: Engine) -> None:
     assert listening == {"127.0.0.1"}
 
 
-def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def waits_in_vain(_: object) -> None:
-        await asyncio.sleep(3600)
+NOT_CLOSING = """
+import asyncio, multiprocessing, os
+import distributed
+from hybridsep_fleet import engine
 
-    monkeypatch.setattr("hybridsep_fleet.engine._CLOSED", 0.5)
-    with cluster(1) as engine:
-        (done,) = engine.run(squared, [(2, "")])
-        monkeypatch.setattr("distributed.LocalCluster._close", waits_in_vain)
-    until(lambda: not psutil.pid_exists(done.result[1]), 10)
+async def waits_in_vain(_):
+    await asyncio.sleep(3600)
+
+if __name__ == "__main__":
+    engine._CLOSED = 0.5
+    with engine.cluster(1):
+        workers = multiprocessing.active_children()
+        distributed.LocalCluster._close = waits_in_vain
+    for one in workers:
+        one.join(10.0)
+    print([one.exitcode for one in workers], flush=True)
+    os._exit(0)  # a thread waits in vain
+"""
+
+
+def test_the_workers_of_a_cluster_that_does_not_close_are_killed() -> None:
+    done = subprocess.run([sys.executable, "-c", NOT_CLOSING], capture_output=True, text=True)
+    assert done.stdout == "[-9]\n", done.stderr
 
 
 def test_a_cluster_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,6 +136,7 @@ def test_a_cluster_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
         cluster(scheduler="tcp://127.0.0.1:9"),
     ):
         pass
+    gc.collect()  # the client's thread ends when it is collected, which must not be while another one starts
     with pytest.raises(ParameterError, match="--workers and --scheduler exclude each other"), cluster(1, "tls://x:1"):
         pass
 
@@ -139,11 +154,3 @@ def test_a_fleet_on_a_cluster(hybridsep: Run, tmp_path: Path, monkeypatch: pytes
     found = json.loads(out)
     assert (found["logs"], found["unchanged"]) == (2, 1)
     assert "column 'x_d' must be a number, got 'a'" in found["rows"][0]["message"]
-
-
-def until(true: Callable[[], object], most: float = 20.0) -> None:
-    """Wait until something is true."""
-    end = time.monotonic() + most
-    while not true():
-        assert time.monotonic() < end, "it took too long"
-        time.sleep(0.005)
