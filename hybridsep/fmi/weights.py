@@ -154,10 +154,10 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     ----------
     path : str or Path
     machine : Machine
-        Machine that it must have been trained for: ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
-        ``dead_time`` and modes.
+        Machine that it must have been trained for: with its ``Np``, ``input_hold``, modes, and all settings on which
+        weights depend (:func:`learned_settings`).
     model : {"HybridPredictor", "SepCompensator"}
-        Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
+        Which of the machine's two sets of settings is meant.
 
     Raises
     ------

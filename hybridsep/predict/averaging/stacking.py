@@ -88,7 +88,7 @@ class Stack:
 
     @property
     def leader(self) -> int:
-        """COMMAND, if it has more of the weights than ARX_RESIDUAL and STATIC together, else ARX_RESIDUAL."""
+        """ARX_COMMAND, if it has more of the weights than ARX_RESIDUAL and STATIC together, else ARX_RESIDUAL."""
         return (
             ARX_COMMAND
             if self.weights[ARX_COMMAND] > self.weights[ARX_RESIDUAL] + self.weights[STATIC]

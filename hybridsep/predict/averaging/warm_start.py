@@ -61,16 +61,16 @@ class WarmStartRows:
         everything = self.all()
         return replace(self.forget(), earlier=everything.discount(most / max(everything.n_rows, most)))
 
-    def all(self, forgetting_factor: float = 1.0) -> RidgeRegression:
-        """Return all rows, the rows of earlier runs weighed by ``forgetting_factor``."""
+    def all(self, weight: float = 1.0) -> RidgeRegression:
+        """Return all rows, the rows of earlier runs weighed by ``weight``."""
         if self.earlier.n_rows == 0.0:
             return self.this
-        earlier = self.earlier.discount(forgetting_factor)
+        earlier = self.earlier.discount(weight)
         return earlier if self.this.n_rows == 0.0 else self.this.add(earlier)
 
-    def target_square(self, forgetting_factor: float = 1.0) -> float:
-        """Return the sum of the squares of the targets, m², earlier runs' weighed by ``forgetting_factor``."""
-        return self.this.target_square + forgetting_factor * self.earlier.target_square
+    def target_square(self, weight: float = 1.0) -> float:
+        """Return the sum of the squares of the targets, m², earlier runs' weighed by ``weight``."""
+        return self.this.target_square + weight * self.earlier.target_square
 
     def learn(self, rows: Array, lagged: Array, target: Array) -> WarmStartRows:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""

@@ -3,7 +3,7 @@
 #include "hsep_math.h"
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static hsep_real evidence_lay_out(hsep_warm_start *self, hsep_int n)
+static hsep_real warm_start_lay_out(hsep_warm_start *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_warm_start);
     self->of_run = hsep_take_block(&end, hsep_gram_size(n));
@@ -11,11 +11,11 @@ static hsep_real evidence_lay_out(hsep_warm_start *self, hsep_int n)
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_warm_start_size(hsep_int n) { return evidence_lay_out(&(hsep_warm_start){0}, n); }
+HSEP_API hsep_real hsep_warm_start_size(hsep_int n) { return warm_start_lay_out(&(hsep_warm_start){0}, n); }
 
 HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n)
 {
-    (void)evidence_lay_out(self, n);
+    (void)warm_start_lay_out(self, n);
     hsep_gram_init(hsep_warm_start_of_run(self), n);
     hsep_gram_init(hsep_warm_start_earlier(self), n);
 }
@@ -23,7 +23,7 @@ HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n)
 HSEP_API int hsep_warm_start_valid(const void *block, hsep_int n)
 {
     hsep_warm_start got;
-    return HSEP_LAID_OUT(got, block, evidence_lay_out(&got, n)) &&
+    return HSEP_LAID_OUT(got, block, warm_start_lay_out(&got, n)) &&
            hsep_gram_valid(hsep_at_bytes(block, got.of_run), n) &&
            hsep_gram_valid(hsep_at_bytes(block, got.earlier), n);
 }
