@@ -27,8 +27,8 @@
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
  * Costs are multiply-adds; n: features, p + q, with averaging p and a few more, 74 at least; s: 38 of them at most,
- * without lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples 4
- * n^2 become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the
+ * without lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples
+ * 4 n^2 become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the
  * 10^9th sample, but for a first window that begins in motion: its last sample has Np n^2 + n^3 / 6 for each expert.
  */
 #ifndef HSEP_H

@@ -117,10 +117,10 @@ static char axis_message[HSEP_MESSAGE_SIZE];
 
 static double *axis_value(axis_data *self, size_t place) { return &self->instance.values[place]; }
 
-/* What the two components differ in: the model's change of the command in this sample; the model that may plan until the
- * parameter is set, the machine file's; the pin state while the model has measurements; the time without a measurement,
- * s, after which the change fades, 0: never; which model may plan the next windows; and limits of the drive, of which a
- * predictor, that changes nothing, knows none: those of a slow one. */
+/* What the two components differ in: the model's change of the command in this sample; the model that may plan until
+ * the parameter is set, the machine file's; the pin state while the model has measurements; the time without a
+ * measurement, s, after which the change fades, 0: never; which model may plan the next windows; and limits of the
+ * drive, of which a predictor, that changes nothing, knows none: those of a slow one. */
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
 static double axis_planned(axis_data *self) { return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d); }
 static unsigned axis_first_model(axis_data *self) { return *axis_value(self, HSEP_VR_compensate) > 1.0 ? 2 : 1; }

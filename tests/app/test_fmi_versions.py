@@ -66,10 +66,11 @@ def test_another_version_is_refused_before_any_work(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    log = write_rows(tmp_path / "axis.csv", commanded()[:800], measured(0)[:800])
     status, _, err = hybridsep(*command, "--fmi", "1")
     assert status == 2
     assert "--fmi must be one of 2, 3, both, got '1'" in err
-    assert not list(tmp_path.iterdir())
+    assert list(tmp_path.iterdir()) == [log]
 
 
 @pytest.mark.slow

@@ -51,5 +51,6 @@ def test_the_lines_that_fit_prints_end_in_a_compensated_run(
     status, _, err = hybridsep(*lines[2][1:], "--target", "host")
     assert status == 0, err
     assert "resources/FeedDrive_axis.fmu" in zipfile.ZipFile("axis.ssp").namelist()
-    # What fit writes it overwrites, as long as it is as written.
-    assert hybridsep(*lines[2][1:], "--target", "host")[0] == 0
+    # A file that exists is overwritten with --force only.
+    assert hybridsep(*lines[2][1:], "--target", "host")[0] == 2
+    assert hybridsep(*lines[2][1:], "--target", "host", "--force")[0] == 0

@@ -257,6 +257,7 @@ def test_a_sampled_log_is_read_as_it_is(hybridsep: Run, tmp_path: Path) -> None:
     n = 4000
     command = 10.0 * np.sin(2e-3 * np.arange(n))
     table = np.column_stack([np.arange(n), *[command] * (len(sampled_columns.COLUMNS) - 1)])
+    table[:, sampled_columns.COLUMNS.index("x_fb")] = 10.0 * np.sin(2e-3 * (np.arange(n) - 5))
     np.savetxt(tmp_path / "samples.txt", table, header=" ".join(sampled_columns.COLUMNS), comments="", fmt="%.6f")
     reading = ("--x_d", "x_out", "--x", "x_fb", "--unit", "mm", "--T_s", "0.001")
     status, _, err = hybridsep("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading)
