@@ -60,24 +60,34 @@ def test_nothing_is_advised_where_the_axis_rests() -> None:
     assert advice.endswith("record moves in both halves.")
 
 
-def test_no_ratio_is_formed_to_an_error_that_the_resolution_does_not_show() -> None:
-    """It was "71545304172.46 × lag + hold"."""
+def judged_of_rounded(peer: float) -> Judged:
+    """Return a judged log that is rounded to 1 µm, with the error of its peer, m."""
     moving = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))
-    found = judged(moving, 2e-6, 1e-12)
+    found = judged(moving, 2e-6, peer)
     rounded = 1e-6 * np.round(moving / 1e-6)
-    [result], [peer] = found.replay.results, found.replay.peers
+    [result], [of_peer] = found.replay.results, found.replay.peers
     shifted = SimpleNamespace(**{name: getattr(result, name) + rounded for name in ("x_pb", "x_hold", "x_h")})
-    peers = (replace(peer, predictions=(peer.predictions[0] + rounded,)),)
+    peers = (replace(of_peer, predictions=(of_peer.predictions[0] + rounded,)),)
     of_rounded = Recording(moving, rounded, N // 2)
-    found = replace(
+    return replace(
         found, replay=replace(found.replay, recordings=(of_rounded,), results=(cast(Any, shifted),), peers=peers)
     )
+
+
+def test_no_ratio_is_formed_to_an_error_that_the_resolution_does_not_show() -> None:
+    """It was "71545304172.46 × lag + hold"."""
+    found = judged_of_rounded(1e-12)
     assert recommendation(found) == (
         "There is nothing to gain in the half: the log's resolution does not show the error of ARX20 (refitted)."
     )
     words = str(found.replay.verdict())
     assert "Better than hold: 0.667 × its RMS error" in words
     assert "Not compared with ARX20 (refitted): its error is below what the log's resolution shows." in words
+
+
+def test_an_axis_that_dwells_may_have_less_error_than_rounding_alone() -> None:
+    """A milling machine's log in whole millimetres has 0.1 mm: at rest both positions are rounded alike."""
+    assert "Worse than ARX20 (refitted)" in str(judged_of_rounded(1e-7).replay.verdict())
 
 
 def test_what_would_help_is_said() -> None:
