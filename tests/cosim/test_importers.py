@@ -1,23 +1,19 @@
-"""Closed system of native FMUs in other projects' importers, and another project's checker."""
+"""Closed system of native FMUs in other projects' importers."""
 
 from __future__ import annotations
 
-import logging
 import os
 import shutil
 import subprocess
 import sys
-import zipfile
 from collections.abc import Callable
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
-import fmpy
 import importers_closed_system as closed_system
 import numpy as np
 import pytest
-from built_once import FMI3, NATIVE, BuiltFmus, each_kind
+from built_once import BuiltFmus
 from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 from places import SUPPORT
 
@@ -42,10 +38,11 @@ N_MOVED = 800
 
 @pytest.fixture(scope="module")
 def folder(fmus: BuiltFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with all native FMUs of all machines and both versions of FMI, built for this machine."""
+    """A folder with the FMUs of the closed systems, of both versions of FMI."""
     folder = tmp_path_factory.mktemp("importers")
-    for name in (*NATIVE, *FMI3):
-        shutil.copy(fmus(name), folder)
+    for system in (*SYSTEMS.values(), *closed_system.FMI3_SYSTEMS.values()):
+        for name in system.components.values():
+            shutil.copy(fmus(name), folder)
     return folder
 
 
@@ -183,25 +180,6 @@ def test_fmi_3_fmus_come_to_the_same_figures(
 
 
 @pytest.mark.slow
-def test_fmpy_reads_arrays_and_sets_enumerations(folder: Path) -> None:
-    rows = [(k * 1e-3, position, position) for k, position in enumerate(staircase()[:600])]
-    inputs = np.array(rows, dtype=[(name, np.float64) for name in ("time", "x_d_ahead", "x_meas")])
-    how = {"stop_time": 0.5, "step_size": 1e-3, "output_interval": 1e-3, "input": inputs}
-    result = fmpy.simulate_fmu(
-        str(folder / "HybridPredictorFmi3.fmu"),
-        output=["x_d", "x_d_window", "hybrid_active"],
-        start_values={"input_hold": "1", "averaging": "true", "mode[1].zeta": "0.06"},
-        **how,
-    )
-    assert result["x_d_window"].shape == (501, 100)
-    np.testing.assert_array_equal(result["x_d_window"][200:301:100].ravel(), staircase()[100:300])
-    result = fmpy.simulate_fmu(
-        str(folder / "SepCompensatorFmi3.fmu"), output=["sep_state"], start_values={"compensate": "1"}, **how
-    )
-    assert set(result["sep_state"]) == {1}
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values[0] not in UNCARRIED])
 def test_the_start_goes_round_in_initialization_mode(
     system: ClosedSystem, expected: Array, apart: Apart, importer: str
@@ -235,36 +213,3 @@ def test_the_figures_of_the_guide(system: ClosedSystem, expected: Array) -> None
     if system.look_ahead == "predictor":  # its drive follows x_d itself
         of = columns(system, expected)
         assert f"(without compensation: {1e6 * np.sqrt(np.mean((of['x_d'] - of['x']) ** 2)):.1f})" in guide
-
-
-# The fmu-manipulation-toolbox's check ------------------------------------------------------------------------------
-
-
-def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
-    """Return what the toolbox's checkers complain about."""
-    checkers = import_module("fmu_manipulation_toolbox.checker").get_checkers()
-    assert {"OperationGenericCheck", "OperationSemanticCheck"} <= {checker.__name__ for checker in checkers}
-    caplog.clear()
-    with (
-        caplog.at_level(logging.INFO, "fmu_manipulation_toolbox"),
-        import_module("fmu_manipulation_toolbox.operations").FMU(str(path)) as fmu,
-    ):
-        for checker in checkers:
-            fmu.apply_operation(checker())
-    assert caplog.records
-    return [record.getMessage() for record in caplog.records if record.levelno > logging.INFO]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", each_kind([*NATIVE, *FMI3]))
-def test_the_toolbox_has_no_finding(folder: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
-    assert findings(folder / f"{name}.fmu", caplog) == []
-
-
-@pytest.mark.slow
-def test_the_toolbox_would_find_something(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    broken = tmp_path / "broken.fmu"
-    with zipfile.ZipFile(folder / "FeedDrive.fmu") as archive, zipfile.ZipFile(broken, "w") as copy:
-        description = archive.read("modelDescription.xml").decode()
-        copy.writestr("modelDescription.xml", description.replace('name="v"', 'name="x"'))
-    assert any("'x' is used by several variables" in finding for finding in findings(broken, caplog))

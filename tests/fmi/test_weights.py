@@ -324,7 +324,10 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
         (("-m", "emps", "--weights", "TRAINED"), "trained.state was not trained for machine emps: it has "),
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
-        (("FeedDrive", "--target", "sparc"), "no target sparc; there are host, all, x86_64-linux, "),
+        (
+            ("SepCompensator", "--no-windows"),
+            "--no-windows is for a HybridPredictor, this would build SepCompensator; ",
+        ),
         (("--flavour", "python", "--target", "host"), "--target is for native FMUs; with --flavour python leave it"),
     ],
 )

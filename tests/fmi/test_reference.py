@@ -1,0 +1,194 @@
+"""Reference experiment of each archive (LS-REF), by fmpy and by the library; a run with all defaults; the origin."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import fmpy
+import numpy as np
+import pytest
+from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, each_kind
+from fmpy.util import read_csv, read_ref_opt_file
+from library_stream import LookAheadStream, PlantStream
+from stream import OUTPUTS
+
+from hybridsep.base.signals import Array
+from hybridsep.fmi.archive import build_fmu
+from hybridsep.fmi.extras import EXPERIMENT_FILE, MANIFEST_FILE, RELATED_FOLDER, RESOURCE_DATA_FILE
+from hybridsep.fmi.spec import FmuSpec, fmu_names
+from hybridsep.machines.machine import load_machine, machine_names
+from hybridsep.plants.trajectory import staircase
+
+MACHINE = load_machine("spring_mass_damper")
+RUN = [*NATIVE, *(name for name in (*FMI3, *PYTHON) if "_" not in name)]
+LIBRARY = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
+LIBRARY = [pair for pair in LIBRARY if pair[1] not in ("ReferenceTrajectory", "SepCompensator_als25010_x")]
+
+
+def content(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", each_kind(RUN))
+def test_fmpy_reruns_the_experiment_to_the_stated_tolerance(fmus: BuiltFmus, tmp_path: Path, name: str) -> None:
+    """From the manifest alone, as a tool would that knows nothing of the FMU."""
+    fmpy.extract(str(fmus(name)), unzipdir=str(tmp_path))
+    folder = tmp_path / RELATED_FOLDER
+    related = {one.get("source"): one.attrib for one in ET.parse(folder / "fmi-ls-manifest.xml").getroot()}
+    assert {path.name for path in folder.iterdir()} == {*related, "fmi-ls-manifest.xml"}
+    roles = [one["role"] for one in related.values()]
+    assert roles.count("experiment/smoke-test") == roles.count("result") == 1
+    (source,) = (place for place, one in related.items() if one["type"] == "application/x-ma-hs-experiments")
+    one = ET.parse(folder / str(source)).getroot()[0]
+    parts = {part.tag: part.attrib for part in one}
+    tables = {tag: read_csv(str(folder / parts[tag]["source"])) for tag in parts if tag != "TransientSimulation"}
+    expected, times = tables["References"], parts["TransientSimulation"]
+    options = read_ref_opt_file(f"{folder}/{name}_ref.opt")  # as FMI's cross-check had them
+    assert [float(times[key]) for key in ("startTime", "stopTime", "stepSize")] == [*options.values()][:3]
+    outputs = [v.name for v in fmpy.read_model_description(str(tmp_path)).modelVariables if v.causality == "output"]
+    assert list(expected.dtype.names or ()) == ["time", *outputs]
+    result: Any = fmpy.simulate_fmu(
+        str(fmus(name)),
+        start_time=float(times["startTime"]),
+        stop_time=float(times["stopTime"]),
+        output_interval=float(times["stepSize"]),
+        input=tables.get("Stimuli"),
+        output=outputs,
+    )
+    assert len(result) == len(expected)
+    tolerance = float(str(one.get("tolerance")))
+    (agreement,) = map(float, re.findall(r"within (\S+) m ", str(one.get("description"))))
+    assert agreement == (1e-9 if name.startswith("Sep") else 1e-11)
+    for output in outputs:
+        found = result[output].astype(float)
+        np.testing.assert_allclose(found, expected[output], rtol=0, atol=agreement, err_msg=output)
+        assert np.abs(found - expected[output]).max() <= tolerance * np.abs(expected[output]).max(), output
+    if "sep_state" in outputs:
+        assert set(expected["sep_state"]) == {1.0, 2.0}
+        assert 0 < expected["rms_h"][-1] < 3e-4
+    elif "hybrid_active" in outputs:
+        last = (folder / f"{name}_ref.csv").read_text(encoding="utf-8").splitlines()[-1].split(",")
+        assert last[1 + outputs.index("hybrid_active")] == "1"  # as fmi-standard.org has it
+        assert 0 < expected["rms_h"][-1] < 1e-4
+    documentation = tmp_path / "documentation"
+    page = (documentation / "index.html").read_text(encoding="utf-8")
+    assert f"<sup>−{-np.log10(agreement):.0f}</sup> m" in page
+    links = re.findall(r'href="([^"]+)"', page)
+    assert len(links) >= 4
+    assert all((documentation / link).is_file() for link in links)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("machine", "name"), each_kind(LIBRARY))
+def test_the_library_gives_the_reference_result(fmus: BuiltFmus, machine: str, name: str) -> None:
+    """The files hold what the FMU gave when it was built."""
+    files, table = content(fmus(name)), FmuSpec.of(load_machine(machine), name.partition("_")[0]).table
+    stream = (PlantStream if "FeedDrive" in name else LookAheadStream)(name)
+    stream.initialise({v.name: v.start for v in table.variables if v.start is not None})
+    expected, given = (table_in(files[f"{RELATED_FOLDER}/{name}_{end}.csv"]) for end in ("ref", "in"))
+    found, inputs = [], list(table.named("input"))
+    for t, *row in given.tolist():
+        found.append(stream.outputs())
+        for one, value in zip(inputs, row, strict=True):
+            stream.set(one, value)
+        stream.step(t, load_machine(machine).T_s)
+    tolerance = 1e-9 if name.startswith("Sep") else 1e-11
+    np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=tolerance)
+    assert len(OUTPUTS[name.partition("_")[0]]) == expected.shape[1] - 1
+
+
+def table_in(content: bytes) -> Array:
+    return np.array([line.split(",") for line in content.decode().splitlines()[1:]], dtype=np.float64)
+
+
+@pytest.mark.slow
+def test_the_reference_is_short_and_that_of_a_late_measurement_is_late(fmus: BuiltFmus, tmp_path: Path) -> None:
+    """Its compensator does as well as without delay: it is told what it gets."""
+    files = content(fmus("HybridPredictor"))
+    assert b"StopTime, 0.6\n" in files[f"{RELATED_FOLDER}/HybridPredictor_ref.opt"]
+    assert sum(len(data) for file, data in files.items() if file.startswith(RELATED_FOLDER)) < 120_000
+    late = MACHINE.changed("compensator", {"measurement_delay": 5})
+    paths = fmus("SepCompensator"), build_fmu(late, "SepCompensator", tmp_path, targets=("host",))
+    rms = [table_in(content(path)[f"{RELATED_FOLDER}/SepCompensator_ref.csv"])[-1, 1 + RMS_E] for path in paths]
+    assert rms[1] == pytest.approx(rms[0], rel=0.2)
+
+
+RMS_E = OUTPUTS["SepCompensator"].index("rms_e")
+
+
+@pytest.mark.slow
+def test_windows_that_no_short_run_can_show_have_no_reference(tmp_path: Path) -> None:
+    large = MACHINE.changed("predictor", {"Np": 1001})
+    files = content(build_fmu(large, "HybridPredictor", tmp_path, targets=("host",)))
+    assert [file for file in files if file.startswith(RELATED_FOLDER)] == [MANIFEST_FILE]
+    assert "documentation/fmi-ls-ref.txt" not in files
+    assert Path(EXPERIMENT_FILE).name.encode() not in files["documentation/index.html"]
+
+
+def test_a_fitted_fmu_says_where_it_comes_from(tmp_path: Path) -> None:
+    origin = {"log": [{"file": "my_axis.csv", "sha256": "ab" * 32}], "settings": {"Np": 100}, "judged": {"rms_h": 7e-7}}
+    path = build_fmu(load_machine("emps"), "HybridPredictor_emps", tmp_path, targets=("host",), origin=origin)
+    files = content(path)
+    root = ET.fromstring(files[RESOURCE_DATA_FILE])
+    spaces = "{http://ssp-standard.org/SSPTraceability1/"
+    assert root.tag == f"{spaces}SimulationResourceMetaData}}SimulationResourceMetaData"
+    assert root.get("version") == "1.0.0"
+    (classified,) = root
+    assert classified.tag == f"{spaces}SSPTraceabilityCommon}}Classification"
+    assert {entry.get("keyword"): entry.text for entry in classified} == {
+        "model.guid": fmpy.read_model_description(str(path)).guid,
+        "log.1.file": "my_axis.csv",
+        "log.1.sha256": "ab" * 32,
+        "settings.Np": "100",
+        "judged.rms_h": "7e-07",
+    }
+    assert f"../{Path(RESOURCE_DATA_FILE).parent.name}/{Path(RESOURCE_DATA_FILE).name}".encode() in files[MANIFEST_FILE]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", each_kind([*NATIVE, *(name for name in PYTHON if "_" not in name)]))
+def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: BuiltFmus, name: str) -> None:
+    stop = float(fmpy.read_model_description(str(fmus(name))).defaultExperiment.stopTime)
+    end = {"emps": 10.0}.get(name.rpartition("_")[2], 6.0 + (0.2 if "Sep" in name else 0.1))
+    assert stop == pytest.approx(end, abs=0.011)
+    # The same clock in Python, and with other modes: suite/test_timing.py
+    for interval in (None, stop / 500) if name in NATIVE and "als" not in name else (None,):
+        result = fmpy.simulate_fmu(str(fmus(name)), output_interval=interval)
+        assert result["time"][-1] == pytest.approx(stop, abs=1e-9)
+        assert len(result) >= 500
+        assert all(np.isfinite(result[column].astype(float)).all() for column in result.dtype.names)
+
+
+@pytest.mark.slow
+def test_the_default_step_of_an_importer_does_no_harm(fmus: BuiltFmus) -> None:
+    """fmpy's step for a run of 4 s is 4 ms; the paper's model goes to 20 mm then, on a sine of 10 mm."""
+    t = np.arange(0.0, 4.1, 1e-3)
+    signals = np.zeros(len(t), dtype=[("time", float), ("x_d_ahead", float), ("x_meas", float)])
+    signals["time"], signals["x_d_ahead"] = t, 0.01 * np.sin(2 * np.pi * t)
+    signals["x_meas"] = np.where(t > 0.1, 0.0101 * np.sin(2 * np.pi * (t - 0.1) - 0.02), 0.0)
+    result = fmpy.simulate_fmu(str(fmus("HybridPredictor")), stop_time=4.0, input=signals, output=["x_h"])
+    assert 9.9e-3 < np.abs(result["x_h"]).max() < 10.2e-3
+
+
+@pytest.mark.slow
+def test_fmpy_reads_arrays_and_sets_enumerations(fmus: BuiltFmus) -> None:
+    rows = [(k * 1e-3, position, position) for k, position in enumerate(staircase()[:600])]
+    inputs = np.array(rows, dtype=[(name, np.float64) for name in ("time", "x_d_ahead", "x_meas")])
+    how = {"stop_time": 0.5, "step_size": 1e-3, "output_interval": 1e-3, "input": inputs}
+    result = fmpy.simulate_fmu(
+        str(fmus("HybridPredictorFmi3")),
+        output=["x_d", "x_d_window", "hybrid_active"],
+        start_values={"input_hold": "1", "averaging": "true", "mode[1].zeta": "0.06"},
+        **how,
+    )
+    assert result["x_d_window"].shape == (501, 100)
+    np.testing.assert_array_equal(result["x_d_window"][200:301:100].ravel(), staircase()[100:300])
+    fmu = str(fmus("SepCompensatorFmi3"))
+    result = fmpy.simulate_fmu(fmu, output=["sep_state"], start_values={"compensate": "1"}, **how)
+    assert set(result["sep_state"]) == {1}
