@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import os
-import signal
 import stat
-import subprocess
 import sys
-import textwrap
-import time
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from hybridsep import HybridPredictor, ModalModel, build_fmu, load_machine
-from hybridsep.base import files
 from hybridsep.base.files import written_text, written_whole
 from hybridsep.cosim.run import save_columns
 from hybridsep.evaluate.figures import save_figure
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")
 OLD = b"what was there before"
-
-
-def left_over(folder: Path) -> list[str]:
-    return [path.name for path in folder.iterdir() if path.name.startswith(".hybridsep")]
 
 
 def test_new_content_appears_at_the_end(tmp_path: Path) -> None:
@@ -162,76 +152,3 @@ def test_a_full_disk_costs_the_new_file_only(tmp_path: Path, name: str) -> None:
     assert caught.value.filename == str(path)
     assert path.read_bytes() == OLD
     assert list(tmp_path.iterdir()) == [path]
-
-
-def in_a_namespace(*command: object) -> SimpleNamespace:
-    """Run a command with its own mounts, or skip where that is not allowed."""
-    unshare = ["unshare", "--user", "--map-root-user", "--mount", "--", *map(str, command)]
-    try:
-        return SimpleNamespace(**vars(subprocess.run(unshare, capture_output=True, text=True, check=False)))
-    except OSError:
-        pytest.skip("there is no unshare")
-
-
-@pytest.mark.slow
-def test_a_full_tmpfs_costs_the_new_file_only(tmp_path: Path) -> None:
-    if in_a_namespace("mount", "-t", "tmpfs", "none", tmp_path).returncode:
-        pytest.skip("a user may not mount a tmpfs here")
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    script = textwrap.dedent(f"""\
-        import sys
-        sys.path.insert(0, {str(Path(__file__).parent)!r})
-        import errno, pathlib
-        from test_files import OLD, WRITERS, left_over
-        disk = pathlib.Path({str(disk)!r})
-        for name, write in WRITERS.items():
-            (disk / name).write_bytes(OLD)
-        try:
-            (disk / "filler").write_bytes(bytes(1000000))
-        except OSError:
-            pass
-        for name, write in WRITERS.items():
-            try:
-                write(disk / name)
-            except OSError as error:
-                assert error.errno == errno.ENOSPC, error
-                assert error.filename == str(disk / name)
-            else:
-                raise SystemExit(name + " fits on the disk")
-            assert (disk / name).read_bytes() == OLD, name
-        assert not left_over(disk)
-        """)
-    shell = 'mount -t tmpfs -o size=32k none "$1" && exec "$2" -c "$3"'
-    done = in_a_namespace("sh", "-c", shell, "sh", disk, sys.executable, script)
-    assert done.returncode == 0, done.stderr
-
-
-WRITE_FOR_EVER = """
-import runpy, sys
-written_whole = runpy.run_path(sys.argv[1])["written_whole"]
-print("ready", flush=True)
-while True:
-    with written_whole(sys.argv[2]) as file:
-        for _ in range(200):
-            file.write(bytes([65]) * 5000)
-            file.flush()
-"""
-
-
-@pytest.mark.slow
-@POSIX
-def test_a_killed_process_leaves_a_whole_file(tmp_path: Path) -> None:
-    path = tmp_path / "result.csv"
-    path.write_bytes(OLD)
-    whole = {OLD, b"A" * 1_000_000}
-    assert files.__file__ is not None
-    for moment in np.random.default_rng(0).uniform(0.0, 0.05, 12):
-        process = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, files.__file__, path], stdout=subprocess.PIPE)
-        assert process.stdout is not None
-        process.stdout.readline()
-        time.sleep(moment)
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-        assert path.read_bytes() in whole
-    assert set(left_over(tmp_path)) == {other.name for other in tmp_path.iterdir()} - {path.name}

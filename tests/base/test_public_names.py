@@ -65,19 +65,7 @@ def loaded(code: str, status: int = 0) -> set[str]:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        [],
-        ["--help"],
-        ["--version"],
-        ["cosim", "--help"],
-        *(
-            pytest.param([name, "--help"], marks=pytest.mark.nightly)
-            for name in ("demo", "build", "backtest", "identify", "init", "tune")
-        ),
-    ],
-)
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["cosim", "--help"]])
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
     command = f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()"
     modules = loaded(command if arguments else "import hybridsep")
