@@ -39,13 +39,11 @@ def with_member(path: Path, header: str, values: bytes = bytes(400)) -> Path:
 @pytest.mark.parametrize(
     ("header", "message"),
     [
-        (HEADER.replace("{", "("), "is truncated, damaged or not an array: "),
         (HEADER.replace("'shape'", "'shale'"), "is truncated, damaged or not an array: "),
         (HEADER.replace("(50,)", "(" * 3000 + ")" * 3000), "is truncated, damaged or not an array: "),
         (HEADER.replace("'<f8'", "'<f7'"), "is truncated, damaged or not an array: "),
         (HEADER.replace("'<f8'", "'|O'"), "must be numbers, got object"),
         (HEADER.replace("'<f8'", "[('a', '<f8')]"), "must be numbers, got .*'a'"),
-        (" " * 20_000 + HEADER, "is truncated, damaged or not an array: "),
         (HEADER.replace("(50,)", "(51,)"), "is truncated: 408 bytes were expected, got 400"),
         (HEADER.replace("(50,)", "(10_000_000_000,)"), "is truncated: 80000000000 bytes were expected, got 400"),
     ],
@@ -56,11 +54,12 @@ def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> No
     assert len(str(caught.value)) < 400
 
 
-def test_zeros_that_fill_the_memory(tmp_path: Path) -> None:
-    """Half a gigabyte of zeros in half a megabyte."""
-    header = HEADER.replace("(50,)", "(50_000_000,)")
-    path = with_member(tmp_path / "log.npz", header, bytes(400_000_000))
-    with pytest.raises(LogError, match=r"has 400000000 bytes of values in a file of \d{6}: is truncated, damaged or"):
+def test_zeros_that_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten megabytes of zeros in ten kilobytes."""
+    monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)
+    header = HEADER.replace("(50,)", "(1_250_000,)")
+    path = with_member(tmp_path / "log.npz", header, bytes(10_000_000))
+    with pytest.raises(LogError, match=r"has 10000000 bytes of values in a file of \d{5}: is truncated, damaged or"):
         read_log(path)
 
 
@@ -93,9 +92,7 @@ def test_version_4_of_matlab(tmp_path: Path) -> None:
 
 def test_structs(tmp_path: Path) -> None:
     io.savemat(tmp_path / "log.mat", {"rec": columns(), "name": "axis"})
-    with pytest.raises(
-        LogError, match=r"columns 't', 'x_d', 'x' are missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'"
-    ):
+    with pytest.raises(LogError, match=r"are missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'"):
         read_log(tmp_path / "log.mat")
     names = {role: f"rec.{role}" for role in ("t", "x_d", "x")}
     assert len(read_log(tmp_path / "log.mat", columns=names).t) == 50
@@ -113,16 +110,6 @@ def test_mat_that_is_not_a_plain_matrix(tmp_path: Path, value: object, message: 
         read_log(write(tmp_path / "log.mat", columns() | {"x": value}))
 
 
-def test_another_librarys_error_is_named(tmp_path: Path) -> None:
-    """It was "error: Error -3", as zlib calls its exception error."""
-    log = tmp_path / "log.mat"
-    io.savemat(log, {"x": np.random.default_rng(0).normal(size=500)}, do_compression=True)
-    content = log.read_bytes()
-    log.write_bytes(content[:300] + bytes(200) + content[500:])
-    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB file: zlib\.error: Error -3"):
-        read_log(log)
-
-
 @pytest.mark.parametrize("suffix", [".npz", ".mat"])
 @pytest.mark.parametrize(
     ("bad", "message"),
@@ -132,7 +119,6 @@ def test_another_librarys_error_is_named(tmp_path: Path) -> None:
         ({"x": np.zeros(49)}, r"same number of samples, got: .*'x_d' has 50, 'x' has 49"),
         ({"x": np.zeros(50) * 1j}, r"column 'x' must be real, got complex numbers \(complex128\)"),
         ({"x": np.zeros((25, 2))}, r"column 'x' must have shape \(n,\), \(n, 1\) or \(1, n\), got \(25, 2\)"),
-        ({"x": np.zeros((5, 5, 2))}, r"column 'x' must have shape .* got \(5, 5, 2\)"),
         ({"x": np.array(["a"] * 50)}, r"column 'x' must be numbers, got <U1"),
     ],
 )
@@ -182,10 +168,9 @@ def test_durations_and_times_of_day(name: str) -> None:
     np.testing.assert_allclose(log.t, 1e-3 * np.arange(6000), atol=1e-9)
 
 
-def test_a_parquet_that_fills_the_memory(tmp_path: Path) -> None:
-    """A third of a gigabyte in a few kilobytes, as a value that repeats is written once."""
-    one = pa.array(np.zeros(1_000_000))
-    table = pa.table({name: pa.chunked_array([one] * 14) for name in ("t", "x_d", "x")})
-    pq.write_table(table, tmp_path / "log")
-    with pytest.raises(LogError, match=r"has 336000000 bytes of values in a file of \d{4,6}: "):
+def test_a_parquet_that_fills_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Megabytes in a few kilobytes, as a value that repeats is written once."""
+    monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)
+    pq.write_table(pa.table({name: np.zeros(500_000) for name in ("t", "x_d", "x")}), tmp_path / "log")
+    with pytest.raises(LogError, match=r"has 12000000 bytes of values in a file of \d{4,5}: "):
         read_log(tmp_path / "log")

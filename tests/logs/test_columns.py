@@ -16,16 +16,6 @@ from hybridsep.logs.formats import open_source
 from hybridsep.logs.log import read_log
 
 
-def test_named_columns_unit_and_ts(tmp_path: Path) -> None:
-    data = columns()
-    path = write(tmp_path / "log.npz", {"extra": data["t"], "qg": data["x_d"] * 1e3, "qm": data["x"] * 1e3})
-    log = read_log(path, columns={"x_d": "qg", "x": "qm"}, unit="mm", T_s=2e-3)
-    np.testing.assert_allclose(log.x_d, data["x_d"], rtol=1e-15)
-    np.testing.assert_allclose(log.x_meas, data["x"], rtol=1e-15)
-    np.testing.assert_array_equal(log.t, np.arange(50) * 2e-3)
-    assert log.T_s == 2e-3
-
-
 @pytest.mark.parametrize(
     ("measured", "names", "read"),
     [
@@ -49,10 +39,8 @@ def test_which_column_is_the_measured_position(
 def test_missing_columns(tmp_path: Path) -> None:
     data = columns()
     path = write(tmp_path / "log.npz", {"x_d": data["x_d"], "qm": data["x"]})
-    with pytest.raises(
-        LogError,
-        match=r"columns 't', 'x' are missing, the file has 'x_d', 'qm'; name them: --t NAME --x NAME \(or --T_s",
-    ):
+    message = r"columns 't', 'x' are missing, the file has 'x_d', 'qm'; name them: --t NAME --x NAME \(or --T_s"
+    with pytest.raises(LogError, match=message):
         read_log(path)
     with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; name it: --x NAME"):
         read_log(path, T_s=1e-3)
@@ -62,20 +50,12 @@ def test_missing_columns(tmp_path: Path) -> None:
         read_log(path, columns={"y": "qm"})
 
 
-def test_csv_without_names(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "0,1,2\n1,2,3\n")
-    with pytest.raises(LogError, match=r"has no line of names, its first line is numbers \('0', '1', '2'\)"):
-        read_log(path)
-
-
 def test_column_named_twice(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x,x_d,x\n0,1,2,1\n1,3,4,\n2,5,6,7\n")
     with pytest.raises(LogError, match=r"line 3: column 'x' occurs 2 times, with different values, 3 and nan; rename"):
         read_log(path)
     path = write_csv(tmp_path / "log.csv", "t;x_d;t;x\n0;1;0;3\n1;1;1;3\n2;1;2,5;3\n")
-    with pytest.raises(
-        LogError, match=r"line 4: column 't' occurs 2 times, .* 2 and 2.5; export all channels with one common time, or"
-    ):
+    with pytest.raises(LogError, match=r"line 4: column 't' occurs 2 times, .* 2 and 2.5; export all channels with"):
         read_log(path)
     assert read_log(path, columns={"t": "t#2"}).t.tolist() == [0.0, 1.0, 2.5]
     twice = {"t": np.arange(3.0), "x_d": np.arange(3.0), "x": np.arange(3.0)}
@@ -94,41 +74,29 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
         log = read_log(write_csv(tmp_path / "log.csv", head + header + rows), columns=names)
         assert log.T_s == 1e-3
         np.testing.assert_array_equal(log.x_meas, np.arange(30) / 4)
-    path = write_csv(tmp_path / "log.csv", f"{head}Time;SetPos;Time;ActPos\n{rows}")
-    with pytest.raises(LogError, match=r"counts samples: it is an index, or a time in ms; give T_s"):
-        read_log(path, columns=names)
-    assert read_log(path, columns=names, T_s=1e-3).T_s == 1e-3
     stamps = "".join(f"12:00:0{k}.5;{k};12:00:0{k}.5;{k}\n" for k in range(9))
     path = write_csv(tmp_path / "log.csv", f"Uhr;x_d;Uhr;x\n{stamps}")
     assert read_log(path).T_s == 1.0
 
 
-def test_millimetres_taken_for_metres(tmp_path: Path) -> None:
-    data = columns()
-    data["x_d"], data["x"] = np.linspace(-60, 60, 50), np.linspace(-60, 60, 50)
-    path = write(tmp_path / "log.npz", data)
-    with pytest.raises(LogError, match=r"'x_d' read in m spans 120 m, .*unit='mm' \(--unit mm\)"):
-        read_log(path)
-    assert read_log(path, unit="mm").x_d[-1] == pytest.approx(0.06)
-    with pytest.raises(LogError, match=r"unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'cm'"):
-        read_log(path, unit="cm")
-    data["x_d"] = data["x_d"] * 1e3
-    with pytest.raises(LogError, match=r"read in mm spans 120 m, .*--unit um"):
-        read_log(write(path, data), unit="mm")
-
-
-def test_encoder_counts(tmp_path: Path) -> None:
-    data = columns()
-    data["x_d"], data["x"] = np.linspace(-6e5, 6e5, 50), np.linspace(-6e5, 6e5, 50)
-    path = write(tmp_path / "log.npz", data)
-    with pytest.raises(LogError, match=r"spans 1.2e\+06 m, .* in encoder counts, the length of one, .*--unit 0\.1um"):
-        read_log(path)
-    assert read_log(path, unit="0.1um").x_d[-1] == pytest.approx(0.06)
+@pytest.mark.parametrize(
+    ("half", "unit", "message"),
+    [
+        (60, None, r"'x_d' read in m spans 120 m, .*unit='mm' \(--unit mm\)"),
+        (6e4, "mm", r"read in mm spans 120 m, .*--unit um"),
+        (6e5, None, r"spans 1.2e\+06 m, .* in encoder counts, the length of one, .*--unit 0\.1um"),
+        (6e5, "0.5mm", r"'x_d' read in 0\.5 mm spans 600 m"),
+        (60, "cm", r"unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'cm'"),
+        (60, "0um", r"unit must be one of m, .*, got '0um'; a multiple of one is said as 0\.1um"),
+    ],
+)
+def test_positions_in_a_unit_that_no_axis_has(tmp_path: Path, half: float, unit: str | None, message: str) -> None:
+    line = np.linspace(-half, half, 50)
+    path = write(tmp_path / "log.npz", columns() | {"x_d": line, "x": line})
+    with pytest.raises(LogError, match=message):
+        read_log(path, unit=unit)
+    assert read_log(path, unit="0.1um").x_d[-1] == pytest.approx(half * 1e-7)
     assert read_log(path, unit="1e-4 deg").unit == "rad"
-    with pytest.raises(LogError, match=r"unit must be one of m, .*, got '0um'; a multiple of one is said as 0\.1um"):
-        read_log(path, unit="0um")
-    with pytest.raises(LogError, match=r"'x_d' read in 0\.5 mm spans 600 m"):
-        read_log(path, unit="0.5mm")
 
 
 @pytest.mark.parametrize(
@@ -152,17 +120,13 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
     assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3
     assert read_log(write_csv(path, "t [s],x_d,x\n" + rows)).T_s == 1.0
     assert read_log(write_csv(path, "index,x_d,x\n" + rows), T_s=2e-3).T_s == 2e-3
-    with pytest.raises(
-        LogError, match=r"column 't' is missing, the file has 'index', 'x_d', 'x'; name it: --t NAME \(or --T_s"
-    ):
+    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'index', 'x_d', 'x'; name it: --t NAME"):
         read_log(path)
 
 
 def test_a_given_unit_must_not_contradict_the_names(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d [mm],x [mm]\n0,1,2\n1,3,4\n")
-    with pytest.raises(
-        LogError, match=r"unit='um' \(--unit um\) was given, but column 'x_d \[mm\]' states 'mm'; leave"
-    ):
+    with pytest.raises(LogError, match=r"unit='um' \(--unit um\) was given, but column 'x_d \[mm\]' states 'mm'"):
         read_log(path, unit="um")
     assert read_log(path, unit="mm").x_d[1] == read_log(path, unit="millimetre").x_d[1] == 3e-3
     assert read_log(path, columns={"x": "x"}).x_meas[1] == 4e-3

@@ -15,50 +15,33 @@ from properties import examples
 
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.base.signals import Array
+from hybridsep.logs.checks import check
 from hybridsep.logs.log import read_log
 
 
 @EVERY_FORMAT
-def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
-    data = columns()
-    log = read_log(write(tmp_path / f"log{suffix}", data))
+def test_every_format_gives_the_same_log_by_its_content(tmp_path: Path, suffix: str) -> None:
+    data, own = columns(), tmp_path / f"log{suffix}"
+    other = tmp_path / ("other.mat" if suffix in (".csv", ".csv.gz", ".json") else "other.csv")
+    shutil.copy(write(own, data), other)
     rounding = 1e-15 if suffix == ".scope" else 0.0  # which has its times in ms
-    np.testing.assert_allclose(log.t, data["t"], rtol=rounding)
-    np.testing.assert_allclose(log.x_d, data["x_d"], rtol=rounding)
-    np.testing.assert_allclose(log.x_meas, data["x"], rtol=rounding)
-    assert log.T_s == 1e-3
-    assert log.path == tmp_path / f"log{suffix}"
-
-
-@EVERY_FORMAT
-def test_content_and_not_the_name_decides(tmp_path: Path, suffix: str) -> None:
-    name = "log.mat" if suffix in (".csv", ".csv.gz", ".json") else "log.csv"
-    shutil.move(write(tmp_path / f"file{suffix}", columns()), tmp_path / name)
-    assert len(read_log(tmp_path / name).t) == 50
+    for path in (own, other):
+        log = read_log(path)
+        for found, name in ((log.t, "t"), (log.x_d, "x_d"), (log.x_meas, "x")):
+            np.testing.assert_allclose(found, data[name], rtol=rounding)
+        assert (log.T_s, log.path) == (1e-3, path)
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         (b"ARROW1..", r"is Arrow or Feather, .*; import pandas; pandas\.read_feather\('file'\)\.to_csv"),
-        (
-            b"\x89HDF\r\n\x1a\n",
-            r"is HDF5, or MATLAB 7\.3, .* these three lines .*\nimport h5py, numpy\n",
-        ),
-        (
-            b"MATLAB 7.3 MAT-file, Platform",
-            r"is HDF5, or MATLAB 7.*\n.*\nwith h5py\.File\('file'\) as f:\n    numpy",
-        ),
+        (b"\x89HDF\r\n\x1a\n", r"is HDF5, or MATLAB 7\.3, .* these three lines .*\nimport h5py, numpy\n"),
+        (b"MATLAB 7.3 MAT-file, Platform", r"is HDF5, or MATLAB 7.*\n.*\nwith h5py\.File\('file'\) as f:\n    numpy"),
         (b"MDF     4.10", "is ASAM MDF, which is not read; docs/howto/recorders.md has three lines of Python"),
         (b"TDSm", "is NI TDMS, which is not read; docs/howto/recorders.md has"),
-        (
-            b"PK\x03\x04" + bytes(30),
-            "is an Excel workbook, or another zip .*; save its columns .* in Excel, or",
-        ),
-        (
-            b'{"a": 1}',
-            r"is JSON of another kind than Siemens Capture, .*; import pandas; pandas\.read_json",
-        ),
+        (b"PK\x03\x04" + bytes(30), "is an Excel workbook, or another zip .*; save its columns .* in Excel, or"),
+        (b'{"a": 1}', r"is JSON of another kind than Siemens Capture, .*; import pandas; pandas\.read_json"),
         (b"<?xml version='1.0'?>", r"is XML of another kind than a SINUMERIK trace, .*; save its columns t"),
         (b"\x93NUMPY\x01\0", r"is a NumPy \.npy array, which is not read; numpy\.savez\('log\.npz', t=a"),
         (b"BZh91AY", r"is compressed, which is not read; unpack it, or compress it by gzip"),
@@ -69,9 +52,6 @@ def test_formats_without_a_reader(tmp_path: Path, content: bytes, message: str) 
     (tmp_path / "file").write_bytes(content)
     with pytest.raises(LogError, match=message):
         read_log(tmp_path / "file")
-
-
-def test_binary_rubbish_under_a_known_name(tmp_path: Path) -> None:
     (tmp_path / "log.mat").write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB"):
         read_log(tmp_path / "log.mat")
@@ -96,7 +76,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("suffix", "kept"),
-    [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.3, 0.7, 0.99)],
+    [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.99)],
 )
 def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
     path = write(tmp_path / f"log{suffix}", columns(500))
@@ -133,20 +113,14 @@ def time_at(i: int, value: float, n: int = 25_000) -> Array:
         (time_at(7, np.nan), r"sample 8 \(the first is 1\): column 't' must be finite, got nan"),
         (time_at(7, 1e20), r"sample 8 .*: time 't' must be within ±1e\+19, got 1e\+20"),
         (np.zeros(50), r"log.npz: time 't' must increase, it never does"),
-        (
-            np.arange(50) // 4 * 0.01,
-            r"rounded too coarsely, 75\.5 % .*, about 0\.0025 s \(--T_s 0\.0025\)$",
-        ),
+        (np.arange(50) // 4 * 0.01, r"rounded too coarsely, 75\.5 % .*, about 0\.0025 s \(--T_s 0\.0025\)$"),
         (np.arange(50) * 1e-3 % 0.002, r"time 't' is rounded too coarsely, 49 % of the times are not above the one"),
         (1e6 + np.arange(50, dtype=np.float32) / 16, r"time 't' is rounded too coarsely, 0 % .*, about 0\.062 s"),
         (np.arange(50) * 4.0, r"has an interval of 4, no axis's in s, or a time in ms; give T_s"),
+        (1.7e12 + np.arange(50), r"it is an index, or a time in ms since 1970; give T_s \(--T_s 0.001\), or"),
         (
-            1.7e12 + np.arange(50),
-            r"it is an index, or a time in ms since 1970; give T_s \(--T_s 0.001\), or",
-        ),
-        (
-            46_000 + np.arange(50) / 86_400 / 1e2,
-            r"an interval of 1\.15741e-07, .* in d since 1970; give T_s \(--T_s 0.01\)",
+            46_000 + np.arange(50) / 8_640_000,
+            r"an interval of 1\.15741e-07, .* in d since 1970; .*\(--T_s 0.01\)",
         ),
     ],
 )
@@ -169,16 +143,6 @@ def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
 def test_interval_is_the_mean_rounded_sensibly(tmp_path: Path, T_s: float) -> None:
     path = write(tmp_path / "log.npz", columns(2000, T_s) | {"t": 17.0 + np.arange(2000) * T_s * (1 + 3e-9)})
     assert read_log(path).T_s == T_s
-
-
-@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 30_000))
-@examples(20)
-def test_jitter_of_a_clock_does_not_move_the_interval(
-    seed: int, n: int, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    t = np.arange(n) * 1e-3 + np.random.default_rng(seed).uniform(-1e-5, 1e-5, n)
-    path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
-    assert read_log(path).T_s == pytest.approx(1e-3, rel=2e-5)
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 20_000), rows_lost=st.sampled_from([0, 100]))
@@ -218,5 +182,6 @@ def test_recorded_axis() -> None:
     if not EMPS.is_file():
         pytest.skip("the recorded axis is not here: ../shared/data/emps/DATA_EMPS.mat, beside the repository")
     log = read_log(EMPS, columns={"t": "t", "x_d": "qg", "x": "qm"})
+    assert check(log) == ()
     assert (len(log.x_meas), log.T_s) == (24_841, 1e-3)
     assert 1e6 * np.sqrt(np.mean((log.x_d - log.x_meas) ** 2)) == pytest.approx(577.8, abs=0.1)

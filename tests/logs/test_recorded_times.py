@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from log_files import write
 from numpy.typing import NDArray
-from places import CASES
 
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.logs.log import Log, read_log
@@ -19,8 +18,6 @@ Array = NDArray[np.floating[Any]]
 N = 600
 X_D = np.cumsum(np.sin(np.arange(N) / 50.0)) * 1e-5
 X = np.concatenate((np.zeros(6), X_D[:-6])) + 1e-9 * np.arange(N) ** 0.5
-
-needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases beside the repository")
 
 
 def read(folder: Path, t: Array, *, x: Array = X, name: str = "t", **how: float) -> Log:
@@ -151,26 +148,3 @@ def test_whole_turns_are_unwrapped(tmp_path: Path, unit: str) -> None:
     log = read_log(write(tmp_path / "log.npz", data))
     np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)
     assert "jumps of a whole turn, the first at sample " in log.remarks[0]
-
-
-@needs_cases
-@pytest.mark.parametrize(
-    ("name", "how", "n", "starts"),
-    [
-        ("appended_other.csv.gz", {}, 6000, (0, 3000)),
-        ("wrap32us.csv.gz", {}, 6000, (0,)),
-        ("round10ms.csv.gz", {"T_s": 1e-3}, 6000, (0,)),
-        ("f4late.npz", {"T_s": 1e-3}, 6000, (0,)),
-        ("epoch_ms_nounit.csv.gz", {"T_s": 1e-3}, 6000, (0,)),
-        ("hs_index_jump_t.csv.gz", {"T_s": 1e-3, "unit": "mm"}, 5960, (0, 3000)),
-        ("rot_200turns.csv.gz", {}, 20_000, (0,)),
-        ("rot_modulo_60s.csv.gz", {}, 60_000, (0,)),
-    ],
-)
-def test_recorded_cases(name: str, how: dict[str, float | str], n: int, starts: tuple[int, ...]) -> None:
-    log = read_log(CASES / name, **how)  # type: ignore[arg-type]
-    assert (len(log.t), log.T_s, log.starts) == (n, 1e-3, starts)
-    if how and "unit" not in how:
-        with pytest.raises(LogError) as caught:
-            read_log(CASES / name)
-        assert caught.value.options[0][0] == "--T_s 0.001"
