@@ -55,13 +55,6 @@ PLANS: Declared = {
 """Modules of plans, likewise."""
 
 PLACES = (
-    "HOLD",
-    "ARX_RESIDUAL",
-    "STATIC",
-    "ARX_COMMAND",
-    "FRESH_START",
-    "N_EXPERTS",
-    "N_JUDGED",
     "MODEL_RESIDUAL",
     "COMMAND_RESIDUAL",
     "N_RESIDUALS",
@@ -69,7 +62,7 @@ PLACES = (
 )
 """Constants without a prefix in C."""
 
-OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE")
+OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE", "REGRESSIONS")
 """Constants of these modules that C has not."""
 
 
@@ -151,15 +144,34 @@ def ranges_header() -> str:
 
 def constants_header() -> str:
     """Return the C header of the constants of predictions, which the library declares with their reasons."""
-    defines = _defines(PREDICTIONS)
+    defines = [_experts(), *_defines(PREDICTIONS)]
     averaging = [f"#define HSEP_AVERAGING_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
     defines.append("\n".join(["/* hybridsep/predict/averaging/constants.py */", *averaging]))
     settings = PredictorSettings(period=1.0)
-    averaged = model.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
+    averaged = model.AveragedModel.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
     records = {"LEARNED": averaged.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
     ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
     defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
     return _constants("HSEP_PREDICT_CONSTANTS_H", "predictions and their errors", defines)
+
+
+def _experts() -> str:
+    """Return the places of the experts in the stack, and what they are."""
+    rows = [f"#define HSEP_{one.name.upper()} {one.place}" for one in experts.EXPERTS]
+    places = [one.place for one in experts.REGRESSIONS]
+    numbers = {"N_EXPERTS": len(experts.EXPERTS), "REGRESSIONS": places[0], "REGRESSIONS_END": places[-1] + 1}
+    numbers["N_REGRESSIONS"] = len(places)
+    rows += [f"#define HSEP_{name} {number}" for name, number in numbers.items()]
+    table = ", ".join(
+        f"{{{one.first_weight}, {one.target}, {int(one.has_lags)}, {int(one.is_fresh)}}}"
+        if isinstance(one, experts.Regression)
+        else f"{{{one.first_weight}, 0, 0, 0}}"
+        for one in experts.EXPERTS
+    )
+    rows.append(f"/* First weight, target, whether it has lags, whether it is fresh */\n#define HSEP_EXPERTS {table}")
+    return "\n".join(
+        ["/* hybridsep/predict/averaging/experts.py: EXPERTS; those that rows train are in a row */", *rows]
+    )
 
 
 def plan_constants_header() -> str:

@@ -60,7 +60,10 @@ def without_component(i: int) -> Changes:
 
 NO_DOUBTING: Changes = {
     FORECAST: [
-        ("predicted[HSEP_FRESH_START] = predicted[self->leading]", "predicted[HSEP_FRESH_START] = 0"),
+        (
+            "known[hsep_averaged_kind_of(self, i)] &&",
+            "known[hsep_averaged_kind_of(self, i)] && i != HSEP_FRESH_START &&",
+        ),
     ],
     STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);\n", "")],
     **constants(discard_above=2.0),
@@ -71,8 +74,8 @@ NO_STATIC = together(
     {
         FORECAST: [
             (
-                "predicted[HSEP_ARX_RESIDUAL] = predicted[HSEP_STATIC] = known[HSEP_MODEL_RESIDUAL] && !outgrown;",
-                "predicted[HSEP_ARX_RESIDUAL] = known[HSEP_MODEL_RESIDUAL] && !outgrown;",
+                "known[hsep_averaged_kind_of(self, i)] &&",
+                "known[hsep_averaged_kind_of(self, i)] && i != HSEP_STATIC &&",
             ),
             ("    if (self->predicted[HSEP_STATIC]) {", "    if (self->predicted[HSEP_ARX_RESIDUAL]) {"),
             ("hsep_averaged_expert(self, HSEP_STATIC);", "hsep_averaged_expert(self, HSEP_ARX_RESIDUAL);"),

@@ -27,7 +27,6 @@ from ..base.state import Saved, pack, unpack
 from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead, PublishedWindow
 from ..predict.averaging.features import Disturbance
-from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview, SepState
@@ -77,7 +76,7 @@ class SepCompensator:
         self._basis = SplineBasis(self.preview, self.spacing)
         bounds = self._bounds(settings)
         self._planning: Planning
-        if isinstance(predictor.residual, AveragedModel):
+        if predictor.settings.averaging:
             self._planning = AveragedPlanning(self._basis, bounds, settings, Np)
         else:
             self._planning = PaperPlanning(self._basis, bounds, settings, Np)

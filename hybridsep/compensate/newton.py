@@ -25,10 +25,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
-from ..predict.averaging.experts import ExpertPrediction, SolvedExpert
+from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, ExpertPrediction, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, StaticFeatures, StaticState
-from ..predict.averaging.model import COMMAND_RESIDUAL, AveragedForecast, AveragedModel, forecast_by, scales_of, solved
-from ..predict.averaging.stacking import STATIC
+from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve, solve_again
 from .splines import N_DECIDED, PlanCost, SplineBasis
@@ -115,12 +114,12 @@ class PlanModel:
         self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
         self._state, self._late, self._start = state, late, start
         window = self._window(x_d)
-        self.scales = scales_of(model, window, path)
-        self._solved = solved(model, self.scales)
+        self.scales = model.scales_of(window, path)
+        self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.fixed.settings.Np :]
         behind -= np.arange(len(behind)) % _APART
-        self.of_previous_plan = forecast_by(model, self._solved, window, self.scales, counts=counts)
+        self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the preview under commands ``x_d``, and what is late before it."""
@@ -135,7 +134,7 @@ class PlanModel:
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
-        return forecast_by(self._model, self._solved, self._window(x_d), self.scales, self.of_previous_plan.predictions)
+        return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan.predictions)
 
     def position(self, at: AveragedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
@@ -160,12 +159,13 @@ class PlanModel:
         slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
         total: Array = passed.copy()
         for expert, one in self._solved.items():
-            if weights[expert] == 0.0:
+            weight = weights[expert.place]
+            if weight == 0.0:
                 continue
-            shrinkage = weights[expert] * _left(at.predictions[expert])[n_late:, None]
-            if self._model.kind_of(expert) == COMMAND_RESIDUAL:
+            shrinkage = weight * _left(at.predictions[expert])[n_late:, None]
+            if expert.like(self._model).target == COMMAND_RESIDUAL:
                 acted = self._late_changes(changes)
-                total += shrinkage * self._of_command(one, acted) + weights[expert] * (acted - passed)
+                total += shrinkage * self._of_command(one, acted) + weight * (acted - passed)
             else:
                 total += shrinkage * self._of_disturbances(one, slopes, changes, passed)
         return total

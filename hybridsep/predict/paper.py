@@ -16,9 +16,9 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..base.state import FIXED
 from .regression import RidgeRegression, lags
-from .window import Forecast, ResidualWindow
+from .window import FeatureScales, Forecast, ResidualWindow
 
-__all__ = ["PaperModel", "forecast", "free_run", "impulse_response", "init", "learn", "restart"]
+__all__ = ["PaperModel"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +36,18 @@ class PaperModel:
     n_rejected: ClassVar[int] = 0
     farthest: ClassVar[float] = 0.0
     learned: ClassVar[tuple[()]] = ()
+    n_scaled: ClassVar[int] = 0
 
     settings: PredictorSettings = field(metadata=FIXED)
     x_pb: Array
     e_pb: Array
     regression: RidgeRegression
+
+    @classmethod
+    def init(cls, settings: PredictorSettings) -> PaperModel:
+        """Return the model at rest, with nothing learned."""
+        p, q = settings.p, settings.q
+        return cls(settings, np.zeros(q), np.zeros(p), RidgeRegression.init(2 + q + p, settings.lam))
 
     @property
     def regressions(self) -> tuple[RidgeRegression, ...]:
@@ -62,75 +69,78 @@ class PaperModel:
         """Whether the numbers, which are in range, fit each other."""
         return self.regression.is_sound
 
+    def restart(self) -> PaperModel:
+        """Return the model at the beginning of another run, at rest; what was learned is kept."""
+        return replace(self, x_pb=np.zeros_like(self.x_pb), e_pb=np.zeros_like(self.e_pb))
 
-def init(settings: PredictorSettings) -> PaperModel:
-    """Return the model at rest, with nothing learned."""
-    p, q = settings.p, settings.q
-    return PaperModel(settings, np.zeros(q), np.zeros(p), RidgeRegression.init(2 + q + p, settings.lam))
+    def plan_ahead(self) -> PaperModel:
+        """Return the model where a compensator decides the commands: the same."""
+        return self
 
+    def take_over(self, learned: tuple[()], regressions: tuple[RidgeRegression, ...]) -> PaperModel:
+        """Return the model with what another one has learned."""
+        return replace(self, regression=regressions[0])
 
-def restart(state: PaperModel) -> PaperModel:
-    """Return the model at the beginning of another run, at rest; what was learned is kept."""
-    return replace(state, x_pb=np.zeros_like(state.x_pb), e_pb=np.zeros_like(state.e_pb))
+    def begin_in_motion(self, window: ResidualWindow) -> PaperModel:
+        """Return the model at the beginning of a run in motion: the same, a run of the paper's begins at rest."""
+        return self
 
+    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> tuple[PaperModel, NDArray[np.bool_]]:
+        """Learn from the measurement of a window; every sample is accepted.
 
-def learn(
-    state: PaperModel, forecast: Forecast, x: Array, *, fold: bool = True
-) -> tuple[PaperModel, NDArray[np.bool_]]:
-    """Learn from the measurement of a window; every sample is accepted.
+        Parameters
+        ----------
+        forecast : Forecast
+        x : (m,) array, m
+            Measured positions of its first ``m`` samples, relative to the start.
+        fold : bool
+            Whether they are learned; the next window starts from them in any case.
 
-    Parameters
-    ----------
-    state : PaperModel
-    forecast : Forecast
-    x : (m,) array, m
-        Measured positions of its first ``m`` samples, relative to the start.
-    fold : bool
-        Whether they are learned; the next window starts from them in any case.
+        Returns
+        -------
+        PaperModel, (m,) array of bool
+        """
+        m, Np = len(x), self.settings.Np
+        measured, regression = forecast.window.x_pb[:m], self.regression
+        x_pb, e_pb = np.concatenate((self.x_pb, measured)), np.concatenate((self.e_pb, x - measured))
+        p, q = len(self.e_pb), len(self.x_pb)
+        for k in range(0, m, Np) if fold else ():
+            n = min(Np, m - k)
+            rows = np.column_stack(  # [φ(k) | e_pb(k)], eq. (5)
+                (
+                    np.ones(n),
+                    lags(x_pb[k : k + q + n], q + 1),
+                    lags(e_pb[k : k + p + n - 1], p),
+                    e_pb[k + p : k + p + n],
+                )
+            )
+            regression = regression.update_stacked(rows)
+        return replace(self, x_pb=x_pb[m:], e_pb=e_pb[m:], regression=regression), np.ones(m, dtype=np.bool_)
 
-    Returns
-    -------
-    PaperModel, (m,) array of bool
-    """
-    m, Np = len(x), state.settings.Np
-    measured, regression = forecast.window.x_pb[:m], state.regression
-    x_pb, e_pb = np.concatenate((state.x_pb, measured)), np.concatenate((state.e_pb, x - measured))
-    p, q = len(state.e_pb), len(state.x_pb)
-    for k in range(0, m, Np) if fold else ():
-        n = min(Np, m - k)
-        rows = np.column_stack(  # [φ(k) | e_pb(k)], eq. (5)
-            (np.ones(n), lags(x_pb[k : k + q + n], q + 1), lags(e_pb[k : k + p + n - 1], p), e_pb[k + p : k + p + n])
-        )
-        regression = regression.update_stacked(rows)
-    return replace(state, x_pb=x_pb[m:], e_pb=e_pb[m:], regression=regression), np.ones(m, dtype=np.bool_)
+    def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
+        """Predict the residual over the next window."""
+        return Forecast(window, self._free_run(window.x_pb), np.zeros(len(window.x_pb)), scales)
 
+    def operator(self, g_pb: Array, free_pb: Array) -> tuple[Array, Array]:
+        """Return the first column of ``G_h`` and the free response of eq. (3), ``(n,)`` each, from ``G_pb``'s."""
+        # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
+        w, w_e = self.regression.weights, self.lag_weights
+        g_h = g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb)
+        return np.asarray(g_h), free_pb + self._free_run(free_pb)
 
-def forecast(state: PaperModel, window: ResidualWindow) -> Forecast:
-    """Predict the residual over the next window."""
-    return Forecast(window, free_run(state, window.x_pb), np.zeros(len(window.x_pb)))
+    def _free_run(self, x_pb: Array) -> Array:
+        """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
 
-
-def free_run(state: PaperModel, x_pb: Array) -> Array:
-    """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
-
-    Parameters
-    ----------
-    state : PaperModel
-    x_pb : (n,) array, m
-        Physics-based prediction, relative to the start.
-    """
-    w, w_e = state.regression.weights, state.lag_weights
-    # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
-    drive = w[0] + np.convolve(np.concatenate((state.x_pb, x_pb)), w[1 : -len(w_e)], "valid")
-    # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
-    # its state is z_j = Σ_m w_e,j+m e(−m)
-    before = np.correlate(w_e, state.e_pb[::-1], "full")[len(w_e) - 1 :]
-    e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=before)
-    return np.asarray(e_h)
-
-
-def impulse_response(state: PaperModel, g_pb: Array) -> Array:
-    """Return the hybrid model's impulse response, ``(n,)``, from ``G_pb``'s: the first column of ``G_h`` of eq. (3)."""
-    # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
-    w, w_e = state.regression.weights, state.lag_weights
-    return np.asarray(g_pb + lfilter(w[1 : -len(w_e)], np.concatenate(([1.0], -w_e)), g_pb))
+        Parameters
+        ----------
+        x_pb : (n,) array, m
+            Physics-based prediction, relative to the start.
+        """
+        w, w_e = self.regression.weights, self.lag_weights
+        # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
+        drive = w[0] + np.convolve(np.concatenate((self.x_pb, x_pb)), w[1 : -len(w_e)], "valid")
+        # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
+        # its state is z_j = Σ_m w_e,j+m e(−m)
+        before = np.correlate(w_e, self.e_pb[::-1], "full")[len(w_e) - 1 :]
+        e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=before)
+        return np.asarray(e_h)

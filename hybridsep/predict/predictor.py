@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,9 +22,8 @@ from ..base.signals import Array, as_measured, as_samples
 from ..base.state import Saved, arrays_of, pack, restored, unpack
 from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
-from . import paper, residual_model
 from .averaging.features import Disturbance
-from .averaging.model import AveragedForecast, AveragedModel, begin_in_motion
+from .averaging.model import AveragedModel
 from .averaging.start import motion_before
 from .paper import PaperModel
 from .regression import RidgeRegression
@@ -53,7 +52,8 @@ class PredictorState:
         State of ``G_pb`` behind the measured samples.
     late : (n_late,) array, m
         Commands that are predicted and not measured yet.
-    residual : PaperModel or AveragedModel
+    residual : ResidualModel
+        PaperModel or AveragedModel.
     uncertainty : Uncertainty
     """
 
@@ -118,7 +118,11 @@ class HybridPredictor:
         for i, one in enumerate(self.disturbances):
             if not callable(one):
                 raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
-        residual = residual_model.init(settings, self.discrete, self.disturbances)
+        residual = (
+            AveragedModel.init(settings, self.discrete, self.disturbances)
+            if settings.averaging
+            else PaperModel.init(settings)
+        )
         late, uncertainty = np.zeros(settings.n_late), Uncertainty.init(first_variance(settings))
         self.state = PredictorState(0, 0, None, self.discrete.rest(), late, residual, uncertainty)
         self.restart(start, t_init=settings.warm_up)
@@ -141,7 +145,7 @@ class HybridPredictor:
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
         n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
-        residual, late = residual_model.restart(self.state.residual), np.zeros(self.settings.n_late)
+        residual, late = self.residual.restart(), np.zeros(self.settings.n_late)
         physics = self.discrete.rest()
         self.state = PredictorState(0, n_init, rest, physics, late, residual, self.state.uncertainty)
         self.pending: PredictedWindow | None = None
@@ -149,7 +153,7 @@ class HybridPredictor:
     def plan_ahead(self) -> None:
         """Adapt to a compensator, which moves the drive as it commands, from rest."""
         self.planned = True
-        self.state = replace(self.state, residual=residual_model.plan_ahead(self.residual))
+        self.state = replace(self.state, residual=self.residual.plan_ahead())
 
     def rest_at(self, start: float) -> None:
         """Begin the run at ``start``, m, as soon as it is known."""
@@ -169,7 +173,7 @@ class HybridPredictor:
         SignalError
             If it is inconsistent. Nothing is changed.
         """
-        residual = residual_model.take_over(self.residual, learned, regressions)
+        residual = self.residual.take_over(learned, regressions)
         if not residual.is_sound:
             raise SignalError("what was learned must be in range, and its factors triangles")
         self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
@@ -203,7 +207,7 @@ class HybridPredictor:
         start = float(command[0]) if state.start is None else state.start
         command = np.concatenate((state.late, command - start))
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
-        forecast = residual_model.forecast(state.residual, ResidualWindow(command, x_pb, start), scales)
+        forecast = state.residual.forecast(ResidualWindow(command, x_pb, start), scales)
         self.pending = self._with_error(forecast)
         std = np.maximum(self.pending.error.std[late:], state.residual.farthest)
         return Prediction(x_pb[late:] + start, forecast.e_h[late:], std, self._warm_up(n))
@@ -243,15 +247,15 @@ class HybridPredictor:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m, start, late = len(measured), forecast.window.start, len(state.late)
         e_pb = measured - start - forecast.window.x_pb[:m]
-        if state.k == 0 and isinstance(residual, AveragedModel) and not self.planned:
+        if state.k == 0 and residual.may_miss and not self.planned:
             # The run may have begun in motion.
             x_d, x_pb, _ = forecast.window
             before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)
             if before is not None:
                 window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start)
                 physics, e_pb = physics + before.state, e_pb - before.x_pb[:m]
-                forecast, residual = replace(forecast, window=window), begin_in_motion(residual, window)
-        residual, accepted = residual_model.learn(residual, forecast, measured - start, fold=learn)
+                forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window)
+        residual, accepted = residual.learn(forecast, measured - start, fold=learn)
         uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
         x_d = forecast.window.x_d
         _, physics = self.discrete.forced_response(physics, x_d[:m])
@@ -272,14 +276,13 @@ class HybridPredictor:
         SignalError
             If ``n < 1``, or the initial position is neither given nor known from a predicted window.
         """
-        residual = self.state.residual
-        if not isinstance(residual, PaperModel):
+        if self.settings.averaging:
             raise ParameterError("the operator needs the paper's model, averaging = false")
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
         g_pb, free_pb, start = self._physics_from_rest(length)
-        g_h, free = paper.impulse_response(residual, g_pb), free_pb + paper.free_run(residual, free_pb)
+        g_h, free = cast(PaperModel, self.residual).operator(g_pb, free_pb)
         late = len(self.state.late)
         return WindowOperator(
             g_h=g_h,
@@ -366,12 +369,11 @@ class HybridPredictor:
             forecast = self.pending.forecast
             arrays |= {"pending_x_d": forecast.window.x_d, "pending_x_pb": forecast.window.x_pb}
             meta["pending_start"] = forecast.window.start
-            if isinstance(forecast, AveragedForecast):  # a compensator has its scales from its preview
-                scales = forecast.scales
+            if (scales := forecast.scales) is not None:  # a compensator has them from its preview
                 arrays["pending_scales"] = np.array(
                     [scales.velocity, scales.step, scales.command_step, scales.command_square]
                 )
-                arrays["pending_largest"] = forecast.scales.largest
+                arrays["pending_largest"] = scales.largest
         return pack(_KIND, meta, arrays)
 
     @classmethod
@@ -412,14 +414,14 @@ class HybridPredictor:
         x_d, scales, residual = saved.array("pending_x_d", None), None, self.residual
         if not len(self.state.late) < len(x_d):
             raise saved.error("the pending window must have samples")
-        if isinstance(residual, AveragedModel):
+        if residual.n_scaled:
             velocity, *others = saved.array("pending_scales", 4).tolist()
-            scales = FeatureScales(velocity, saved.array("pending_largest", residual.fixed.static.n), *others)
+            scales = FeatureScales(velocity, saved.array("pending_largest", residual.n_scaled), *others)
             if min(velocity, *others, *scales.largest) < 0.0:
                 raise saved.error("the scales of the pending window must be ≥ 0")
         window = ResidualWindow(x_d, saved.array("pending_x_pb", len(x_d)), saved.real("pending_start"))
         with np.errstate(all="ignore"):
-            forecast = residual_model.forecast(residual, window, scales)
+            forecast = residual.forecast(window, scales)
             if residual.may_miss and not np.isfinite(forecast.e_h).all():
                 raise saved.error("the prediction of the pending window must be finite")
             return self._with_error(forecast)

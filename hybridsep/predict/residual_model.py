@@ -1,71 +1,79 @@
-"""Model of the residual ``e_pb = x − x_pb``: the paper's, or with averaging the averaged one.
+"""Model of the residual ``e_pb = x − x_pb``: what the paper's and the averaged one have in common.
 
-Each function calls its counterpart for the model that a state is of. A state is a record; a function returns another.
+A state is a record; a method returns another.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.settings import PredictorSettings
 from ..base.signals import Array
-from ..model.discrete import DiscreteModel
-from . import paper
-from .averaging import model as averaging
-from .averaging.features import Disturbance
-from .averaging.model import AveragedModel
-from .paper import PaperModel
 from .regression import RidgeRegression
 from .window import FeatureScales, Forecast, ResidualWindow
 
-__all__ = ["ResidualModel", "forecast", "init", "learn", "plan_ahead", "restart", "take_over"]
-
-ResidualModel: TypeAlias = PaperModel | AveragedModel
-"""State of either model."""
+__all__ = ["ResidualModel"]
 
 
-def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...]) -> ResidualModel:
-    """Return the model at rest, with nothing learned: of ``G_pb``, with averaging with the user's own disturbances."""
-    return averaging.init(settings, discrete, own) if settings.averaging else paper.init(settings)
+class ResidualModel(Protocol):
+    """State of either model."""
 
+    @property
+    def may_miss(self) -> bool:
+        """Whether a measurement may be missing, and a run begin in motion."""
 
-def plan_ahead(state: ResidualModel) -> ResidualModel:
-    """Return the model where a compensator decides the commands."""
-    return averaging.plan_ahead(state) if isinstance(state, AveragedModel) else state
+    @property
+    def learned(self) -> Any:
+        """What has been learned besides the rows: a record of the numbers of a weights file."""
 
+    @property
+    def regressions(self) -> tuple[RidgeRegression, ...]:
+        """All regressions that another run begins with."""
 
-def take_over(state: ResidualModel, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
-    """Return the model with what another one of its kind has learned."""
-    if isinstance(state, AveragedModel):
-        return averaging.take_over(state, learned, regressions)
-    return replace(state, regression=regressions[0])
+    @property
+    def lag_weights(self) -> Array:
+        """Autoregressive weights, ``(p,)``."""
 
+    @property
+    def n_scaled(self) -> int:
+        """Features with scales; 0 if it has none."""
 
-def restart(state: ResidualModel) -> ResidualModel:
-    """Return the model at the beginning of another run, at rest; what was learned is kept."""
-    return averaging.restart(state) if isinstance(state, AveragedModel) else paper.restart(state)
+    @property
+    def last(self) -> float:
+        """Last residual that counts, m."""
 
+    @property
+    def farthest(self) -> float:
+        """Largest residual among the last samples, m, where these were rejected; else 0."""
 
-def forecast(state: ResidualModel, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
-    """Predict the residual over the next window; with averaging a compensator gives the ``scales`` of its preview."""
-    if isinstance(state, AveragedModel):
-        return averaging.forecast(state, window, scales)
-    return paper.forecast(state, window)
+    @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible."""
 
+    @property
+    def is_sound(self) -> bool:
+        """Whether the numbers, which are in range, fit each other."""
 
-def learn(
-    state: ResidualModel, forecast: Forecast, x: Array, *, fold: bool = True
-) -> tuple[ResidualModel, NDArray[np.bool_]]:
-    """Return the model that has learned from a window measured at ``x``, and which samples it accepted, ``(m,)`` bool.
+    def restart(self) -> ResidualModel:
+        """Return the model at the beginning of another run, at rest; what was learned is kept."""
 
-    Positions, m, are relative to the start, NaN where missing. Without ``fold`` they are not learned; the next window
-    starts from them in any case.
-    """
-    if isinstance(state, AveragedModel):
-        assert isinstance(forecast, averaging.AveragedForecast)
-        return averaging.learn(state, forecast, x, fold=fold)
-    return paper.learn(state, forecast, x, fold=fold)
+    def plan_ahead(self) -> ResidualModel:
+        """Return the model where a compensator decides the commands."""
+
+    def take_over(self, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
+        """Return the model with what another one of its kind has learned."""
+
+    def begin_in_motion(self, window: ResidualWindow) -> ResidualModel:
+        """Return the model at the beginning of a run whose first window has motion before it."""
+
+    def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
+        """Predict the residual over the next window; a compensator gives the ``scales`` of its preview."""
+
+    def learn(self, forecast: Any, x: Array, *, fold: bool = True) -> tuple[ResidualModel, NDArray[np.bool_]]:
+        """Return the model that has learned from a window measured at ``x``, and which samples it accepted, ``(m,)``.
+
+        Positions, m, are relative to the start, NaN where missing. Without ``fold`` they are not learned; the next
+        window starts from them in any case.
+        """

@@ -73,11 +73,14 @@ class Forecast:
         Predicted residual.
     variance : (n,) array, m²
         What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 without experts.
+    scales : FeatureScales, optional
+        With averaging.
     """
 
     window: ResidualWindow
     e_h: Array
     variance: Array
+    scales: FeatureScales | None
 
 
 @dataclass(frozen=True)

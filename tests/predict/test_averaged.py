@@ -13,8 +13,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.model import MODEL_RESIDUAL
-from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, STATIC
+from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, MODEL_RESIDUAL, STATIC
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-7  # m

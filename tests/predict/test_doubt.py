@@ -14,8 +14,7 @@ from random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.model import MODEL_RESIDUAL
-from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, FRESH_START
+from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, MODEL_RESIDUAL
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-6  # m
@@ -71,7 +70,7 @@ def test_what_has_changed_is_relearned_as_cold(factor: float) -> None:
     assert rms((x - found)[2000:]) <= 1.01 * rms((x - cold)[2000:])
     model = averaged_model(warm)
     assert not model.doubts
-    assert model.learned.stack.weights[FRESH_START] == 0.0
+    assert model.learned.stack.weights[FRESH_START.place] == 0.0
     assert model.evidence[MODEL_RESIDUAL].n_rows == len(x_d)
 
 
@@ -94,9 +93,11 @@ def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert
         CONSTANTS.warm_prior_weight * evidence.n_rows
     )
     assert (
-        model.learned.stack.gram[FRESH_START, FRESH_START] == model.learned.stack.gram[ARX_RESIDUAL, ARX_RESIDUAL] > 0.0
+        model.learned.stack.gram[FRESH_START.place, FRESH_START.place]
+        == model.learned.stack.gram[ARX_RESIDUAL.place, ARX_RESIDUAL.place]
+        > 0.0
     )
-    assert model.learned.stack.cross[FRESH_START] == model.learned.stack.cross[ARX_RESIDUAL]
+    assert model.learned.stack.cross[FRESH_START.place] == model.learned.stack.cross[ARX_RESIDUAL.place]
     assert (
         model.learned.errors_of(FRESH_START).noise_variance
         == model.learned.errors_of(ARX_RESIDUAL).noise_variance
@@ -114,7 +115,9 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     model = averaged_model(warm)
     assert model.leading == ARX_COMMAND
     assert (
-        model.learned.stack.gram[FRESH_START, FRESH_START] == model.learned.stack.gram[ARX_COMMAND, ARX_COMMAND] > 0.0
+        model.learned.stack.gram[FRESH_START.place, FRESH_START.place]
+        == model.learned.stack.gram[ARX_COMMAND.place, ARX_COMMAND.place]
+        > 0.0
     )
     assert (
         model.learned.errors_of(FRESH_START).noise_variance == model.learned.errors_of(ARX_COMMAND).noise_variance > 0.0

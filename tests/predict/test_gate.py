@@ -13,8 +13,8 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.experts import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.averaging.gate import InnovationGate, gated
-from hybridsep.predict.averaging.model import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.predictor import HybridPredictor
 
 Array = NDArray[np.float64]

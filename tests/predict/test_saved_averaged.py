@@ -116,7 +116,7 @@ def test_memory_does_not_grow() -> None:
         ("physics", np.zeros(3)),
         ("late", np.zeros(1)),
         ("uncertainty.ratio", np.array(100.0)),
-        ("residual.leading", np.array(0.0)),
+        ("residual.leader", np.array(0.0)),
         ("residual.evidence.0.this.n_rows", np.array(-1.0)),
         ("residual.evidence.1.this.n_rows", np.array(np.nan)),
         ("residual.evidence.0.this.factor", np.eye(9)),

@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 
 from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.experts import EXPERTS
 from hybridsep.predict.averaging.stacking import Stack, simplex_minimum
 
 FIRST = np.array([0.0, 0.5, 0.5, 0.0, 0.0])
@@ -149,11 +150,11 @@ def test_positions_in_another_unit_have_the_same_weights(scale: float, seed: int
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
     stack = Stack.init()
     stack = replayed(stack, (3.0, 0.1, 3.0), 30)
-    stack = stack.copy(1, 0)
+    stack = stack.copy(EXPERTS[1], EXPERTS[0])
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
     stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
     assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
-    stack = stack.forget(0)
+    stack = stack.forget(EXPERTS[0])
     stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
     assert stack.weights[0] < 1e-9

@@ -23,7 +23,7 @@ from streams import StreamMaker, on_all
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.plant import Encoder, simulate
-from hybridsep.predict.averaging.stacking import ARX_COMMAND, ARX_RESIDUAL, N_EXPERTS
+from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, Regression
 
 AVERAGING: dict[str, Value] = {"averaging": True, "t_init": 0.0}
 DELAY = 5
@@ -55,13 +55,13 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
 
 
 @cache
-def learned(model: str, leading: int = ARX_RESIDUAL) -> bytes:
+def learned(model: str, leading: Regression = ARX_RESIDUAL) -> bytes:
     """Return the ``weights.bin`` of the model's predictor with averaging after the staircase in which an expert led."""
     machine = machine_of(model)
     predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True))
     backtest(predictor, *moved(model))
     stack = averaged_model(predictor).learned.stack
-    change_learned(predictor, stack=replace(stack, weights=np.eye(N_EXPERTS)[leading]))
+    change_learned(predictor, stack=replace(stack, weights=np.eye(len(EXPERTS))[leading.place]))
     return weights_file(predictor)
 
 

@@ -22,7 +22,8 @@ from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.averaging.stacking import ARX_COMMAND, N_EXPERTS, Stack
+from hybridsep.predict.averaging.experts import ARX_COMMAND, EXPERTS
+from hybridsep.predict.averaging.stacking import Stack
 
 Trained = Callable[[str], Path]
 
@@ -46,7 +47,7 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a compensator's predictor, saved, in which the command's expert led."""
     path, predictor = tmp_path_factory.mktemp("led") / "command.state", trained_predictor(COMPENSATOR)
     stack = averaged_model(predictor).learned.stack
-    weights, less = np.eye(N_EXPERTS)[ARX_COMMAND], 1e-3
+    weights, less = np.eye(len(EXPERTS))[ARX_COMMAND.place], 1e-3
     change_learned(predictor, stack=Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence))
     predictor.save(path)
     return path

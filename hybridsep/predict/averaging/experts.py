@@ -1,9 +1,15 @@
-"""Expert of the residual: a regression with normal priors, counted as far as its own variance allows."""
+"""Experts of the residual, entries of :data:`EXPERTS`: adding one is its class or its entry here, and its test.
+
+A regression has normal priors, and is counted as far as its own variance allows; hold is the last residual.
+"""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +18,36 @@ from scipy.signal import lfilter
 from ...base.signals import Array
 from ...base.state import bounded
 from ..regression import PenalisedSolution, RidgeRegression, lags
+from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
 
-__all__ = ["ExpertErrors", "ExpertPrediction", "ResidualScale", "SolvedExpert", "solve"]
+if TYPE_CHECKING:
+    from .model import AveragedModel
+
+__all__ = [
+    "ARX_COMMAND",
+    "ARX_RESIDUAL",
+    "COMMAND_RESIDUAL",
+    "EXPERTS",
+    "FRESH_START",
+    "HOLD",
+    "MODEL_RESIDUAL",
+    "N_RESIDUALS",
+    "REGRESSIONS",
+    "STATIC",
+    "Expert",
+    "ExpertErrors",
+    "ExpertPrediction",
+    "ExpertWindow",
+    "Regression",
+    "ResidualScale",
+    "SolvedExpert",
+    "solve",
+]
+
+MODEL_RESIDUAL, COMMAND_RESIDUAL, N_RESIDUALS = range(3)
+"""Residuals that regressions predict, and the rows that they learn: of the physics model, of the command; their
+number."""
 
 _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
@@ -237,3 +270,168 @@ def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
         e, _ = lfilter([1.0], denominator, drive, zi=state)
         response = lfilter([1.0], denominator, impulse)
     return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
+
+
+_LEAST = 1e-150
+"""Magnitude of a feature that counts as 0."""
+
+
+@dataclass(frozen=True)
+class ExpertWindow:
+    """Window as experts predict it.
+
+    Attributes
+    ----------
+    model : AveragedModel
+    window : ResidualWindow
+    solved : mapping
+        Regressions that know something, with their weights.
+    scales : FeatureScales
+    rows : (n, n_static) array
+        Static features.
+    predictions : mapping
+        Of these, of their residuals.
+    """
+
+    model: AveragedModel
+    window: ResidualWindow
+    solved: Mapping[Regression, SolvedExpert]
+    scales: FeatureScales
+    rows: Array
+    predictions: Mapping[Regression, ExpertPrediction]
+
+    @property
+    def bound(self) -> float:
+        """Largest prediction of the physics model's residual, m."""
+        return CONSTANTS.bound * self.model.learned.scales[MODEL_RESIDUAL].largest
+
+    @property
+    def growth(self) -> float:
+        """Largest step of the command relative to that before the window, ≥ 1, where its expert leads.
+
+        What follows the command alone is linear in it: it may be larger than anything so far by as much.
+        """
+        before = self.model.learned.largest_step
+        if not (before > 0.0 and self.model.learned.stack.leader is ARX_COMMAND):
+            return 1.0
+        return min(self.scales.step / before, CONSTANTS.growth)
+
+
+@dataclass(frozen=True)
+class Expert(ABC):
+    """Entry of :data:`EXPERTS`.
+
+    Attributes
+    ----------
+    name : str
+    first_weight : float
+        In the stack, without evidence.
+    """
+
+    name: str
+    first_weight: float = 0.0
+
+    @property
+    def place(self) -> int:
+        """Place in the stack."""
+        return EXPERTS.index(self)
+
+    @abstractmethod
+    def forecast(self, at: ExpertWindow) -> Array | float:
+        """Return what it adds to the physics model, ``(n,)``, m; 0 where it knows nothing."""
+
+
+@dataclass(frozen=True)
+class Hold(Expert):
+    """The last residual."""
+
+    def forecast(self, at: ExpertWindow) -> Array | float:
+        """Return it within the bound."""
+        return min(max(at.model.last, -at.bound), at.bound)
+
+
+@dataclass(frozen=True)
+class Regression(Expert):
+    """Expert by features of a residual.
+
+    Attributes
+    ----------
+    target : int
+        MODEL_RESIDUAL, with static features, or COMMAND_RESIDUAL, with increments of the command.
+    has_lags : bool
+        Whether lags of the residual are among its features.
+    is_fresh : bool
+        Whether it gives earlier runs little weight: a counterpart of the one that led when they ended, whose target it
+        has.
+    """
+
+    target: int = MODEL_RESIDUAL
+    has_lags: bool = True
+    is_fresh: bool = False
+
+    def like(self, model: AveragedModel) -> Regression:
+        """Return the expert whose features it has: itself, or the leader of earlier runs."""
+        return model.leading if self.is_fresh else self
+
+    @property
+    def weight(self) -> float:
+        """Weight of the rows of earlier runs."""
+        return CONSTANTS.warm_prior_weight if self.is_fresh else 1.0
+
+    def solve(self, model: AveragedModel, scales: FeatureScales) -> SolvedExpert | None:
+        """Return the expert with the weights that follow from all rows; None if it knows nothing."""
+        like, settings = self.like(model), model.fixed.settings
+        kind, variance = like.target, model.noise_of(self)
+        square = model.learned.scales[kind].largest_square
+        outgrown = kind == MODEL_RESIDUAL and scales.velocity != model.learned.velocity_scale
+        if square == 0.0 or variance == 0.0 or outgrown or (self.is_fresh and not model.doubts):
+            return None
+        rows = model.evidence[kind].all(self.weight)
+        if rows.n_rows == 0.0:
+            return None
+        if kind == COMMAND_RESIDUAL:
+            command, square = model.fixed.command, scales.command_square
+            p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
+        else:
+            p, shares, largest = settings.p, model.fixed.static.shares, scales.largest
+        effect = settings.effect or math.sqrt(square)
+        priors = effect * shares / np.maximum(largest, _LEAST)
+        return solve(rows, variance, priors, p if like.has_lags else 0)
+
+    def predict(
+        self, at: ExpertWindow, held: ExpertPrediction | None, counts: NDArray[np.intp] | None
+    ) -> ExpertPrediction:
+        """Return the prediction of its residual, once it knows something; parameters as for SolvedExpert.predict."""
+        model, kind, most = at.model, self.like(at.model).target, at.bound
+        scale, rows = model.learned.scales[kind], at.rows
+        if kind == COMMAND_RESIDUAL:
+            scale = scale.grown(at.growth)
+            most = CONSTANTS.bound_of_command * scale.largest
+            rows = model.fixed.command.rows(model.run.commands, at.window.x_d)
+        return at.solved[self].predict(rows, model.run.past[kind], scale.largest_square, most, held, counts)
+
+    def forecast(self, at: ExpertWindow) -> Array | float:
+        """Return what it adds to the physics model, within bounds."""
+        if self not in at.predictions:
+            return 0.0
+        e_h, model = at.predictions[self].e_h, at.model
+        if self.like(model).target == MODEL_RESIDUAL:
+            return e_h
+        follows, most = (
+            model.fixed.command.late(model.run.commands, at.window.x_d) - at.window.x_pb,
+            at.growth * at.bound,
+        )
+        return np.clip(e_h + follows, -most, most)
+
+
+HOLD = Hold("hold")
+ARX_RESIDUAL = Regression("arx_residual", CONSTANTS.first_arx_residual)
+STATIC = Regression("static", CONSTANTS.first_static, has_lags=False)
+ARX_COMMAND = Regression("arx_command", target=COMMAND_RESIDUAL)
+FRESH_START = Regression("fresh_start", is_fresh=True)
+
+EXPERTS: tuple[Expert, ...] = (HOLD, ARX_RESIDUAL, STATIC, ARX_COMMAND, FRESH_START)
+"""All experts, in the order of the stack."""
+
+REGRESSIONS = tuple(one for one in EXPERTS if isinstance(one, Regression))
+"""Those that rows train, whose errors are judged."""

@@ -25,34 +25,28 @@ from ...model.discrete import DiscreteModel
 from ..regression import RidgeRegression, lags
 from ..window import FeatureScales, Forecast, ResidualWindow
 from .constants import CONSTANTS
-from .experts import ExpertErrors, ExpertPrediction, ResidualScale, SolvedExpert, solve
+from .experts import (
+    ARX_COMMAND,
+    ARX_RESIDUAL,
+    COMMAND_RESIDUAL,
+    EXPERTS,
+    FRESH_START,
+    MODEL_RESIDUAL,
+    REGRESSIONS,
+    STATIC,
+    ExpertErrors,
+    ExpertPrediction,
+    ExpertWindow,
+    Regression,
+    ResidualScale,
+    SolvedExpert,
+)
 from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
 from .gate import InnovationGate, gated
-from .stacking import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, HOLD, N_EXPERTS, N_JUDGED, STATIC, Stack
+from .stacking import Stack
 from .warm_start import WarmStartRows
 
-__all__ = [
-    "COMMAND_RESIDUAL",
-    "MODEL_RESIDUAL",
-    "AveragedForecast",
-    "AveragedModel",
-    "Learned",
-    "Parameters",
-    "RunState",
-    "begin_in_motion",
-    "forecast",
-    "forecast_by",
-    "init",
-    "learn",
-    "plan_ahead",
-    "restart",
-    "scales_of",
-    "solved",
-    "take_over",
-]
-
-MODEL_RESIDUAL, COMMAND_RESIDUAL, N_RESIDUALS = range(3)
-"""Residuals that experts predict, and the rows that they learn: of the physics model, of the command; their number."""
+__all__ = ["AveragedForecast", "AveragedModel", "Learned", "Parameters", "RunState"]
 
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
@@ -125,7 +119,7 @@ class Learned:
     scales : pair of ResidualScale
         Sizes of the residuals, of the physics model and of the command.
     errors : tuple of ExpertErrors
-        Of the experts from ARX_RESIDUAL on.
+        Of the regressions.
     stack : Stack
     largest : (n_static,) array
         Largest magnitudes of the static features.
@@ -142,16 +136,16 @@ class Learned:
     @classmethod
     def init(cls, fixed: Parameters) -> Learned:
         """Return that nothing has been learned."""
-        scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * N_JUDGED
+        scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * len(REGRESSIONS)
         return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(fixed.static.n))
 
-    def errors_of(self, expert: int) -> ExpertErrors:
+    def errors_of(self, expert: Regression) -> ExpertErrors:
         """Return what is known of the errors of an expert."""
-        return self.errors[expert - ARX_RESIDUAL]
+        return self.errors[REGRESSIONS.index(expert)]
 
-    def with_errors(self, changed: dict[int, ExpertErrors]) -> Learned:
+    def with_errors(self, changed: Mapping[Regression, ExpertErrors]) -> Learned:
         """Return the same with other errors of some experts."""
-        errors = tuple(changed.get(ARX_RESIDUAL + i, one) for i, one in enumerate(self.errors))
+        errors = tuple(changed.get(one, known) for one, known in zip(REGRESSIONS, self.errors, strict=True))
         return replace(self, errors=errors)
 
     @property
@@ -159,6 +153,27 @@ class Learned:
         """Whether the numbers, which are in range, fit each other."""
         scale = self.velocity_scale
         return (scale == 0.0 or scale >= LEAST_VELOCITY) and float(self.stack.weights.sum()) <= 1.0 + _ROUNDING
+
+
+@dataclass(frozen=True)
+class AveragedForecast(Forecast):
+    """Window predicted by the averaged model.
+
+    Attributes
+    ----------
+    scales : FeatureScales
+    x : (n,) array, m
+        Position that the stiffness acts at.
+    stacked : (n_experts, n) array, m
+        Predictions that are stacked; 0 where an expert knows nothing.
+    predictions : mapping
+        Of the regressions that know something.
+    """
+
+    scales: FeatureScales
+    x: Array
+    stacked: Array
+    predictions: Mapping[Regression, ExpertPrediction]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,11 +187,11 @@ class AveragedModel:
     evidence : pair of WarmStartRows
         Rows of the residuals of the physics model, and of the command.
     noise : tuple of float, m²
-        Of the experts from ARX_RESIDUAL on, variances that the penalties of the next solution come from; 0: none yet.
+        Of the regressions, variances that the penalties of the next solution come from; 0: none yet.
     command_square : float, m²
         Largest mean square of the command's residual, before the last sample of the last window; 0: none yet.
-    leading : int
-        Expert that led when earlier runs ended, ARX_RESIDUAL or ARX_COMMAND: FRESH_START is its counterpart.
+    leader : int
+        Place of the expert that led when earlier runs ended.
     run : RunState
     """
 
@@ -187,20 +202,37 @@ class AveragedModel:
     evidence: tuple[WarmStartRows, WarmStartRows]
     noise: tuple[float, ...] = field(metadata=bounded())
     command_square: float = field(metadata=bounded())
-    leading: int
+    leader: int
     run: RunState
 
-    def kind_of(self, expert: int) -> int:
-        """Return COMMAND_RESIDUAL if an expert predicts the residual of the command, else MODEL_RESIDUAL."""
-        return (
-            COMMAND_RESIDUAL
-            if expert == ARX_COMMAND or (expert == FRESH_START and self.leading == ARX_COMMAND)
-            else MODEL_RESIDUAL
-        )
+    @classmethod
+    def init(
+        cls, settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()
+    ) -> AveragedModel:
+        """Return the model at rest, with nothing learned.
 
-    def noise_of(self, expert: int) -> float:
+        Parameters
+        ----------
+        settings : PredictorSettings
+        discrete : DiscreteModel
+            ``G_pb``.
+        own : tuple of Disturbance
+            Of the user's own.
+        """
+        static = StaticFeatures(discrete, settings.q, settings.period, own)
+        fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
+        evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * fixed.command.p + 2)
+        noise, leader = (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
+        return cls(fixed, Learned.init(fixed), evidence, noise, 0.0, leader, RunState.init(fixed))
+
+    @property
+    def leading(self) -> Regression:
+        """Expert that led when earlier runs ended: FRESH_START is its counterpart."""
+        return ARX_COMMAND if self.leader == ARX_COMMAND.place else ARX_RESIDUAL
+
+    def noise_of(self, expert: Regression) -> float:
         """Return the variance of the noise that an expert's penalties come from, m²; 0: none yet."""
-        return self.noise[expert - ARX_RESIDUAL]
+        return self.noise[REGRESSIONS.index(expert)]
 
     @property
     def early(self) -> int:
@@ -212,15 +244,15 @@ class AveragedModel:
         """Return the model with the variances of the noise that follow from what is learned so far."""
         settings = self.fixed.settings
 
-        def noise(expert: int) -> float:
-            kind = self.kind_of(expert)
+        def noise(expert: Regression) -> float:
+            kind = expert.like(self).target
             square = learned.scales[kind].largest_square
             first = settings.noise_std**2 or CONSTANTS.first_noise * square
             least = min(settings.lam, CONSTANTS.least_noise * square)
-            weight = CONSTANTS.warm_prior_weight if expert == FRESH_START else 1.0
-            return learned.errors_of(expert).variance(self.evidence[kind].target_square(weight), first, least)
+            targets = self.evidence[kind].target_square(expert.weight)
+            return learned.errors_of(expert).variance(targets, first, least)
 
-        return replace(self, noise=tuple(noise(ARX_RESIDUAL + i) for i in range(N_JUDGED)))
+        return replace(self, noise=tuple(noise(one) for one in REGRESSIONS))
 
     @property
     def doubts(self) -> bool:
@@ -250,251 +282,188 @@ class AveragedModel:
     @property
     def lag_weights(self) -> Array:
         """Weights of the lags from all learned samples, ``(p,)``."""
-        return self.regressions[MODEL_RESIDUAL].weights[self.fixed.static.n :]
+        return self.regressions[MODEL_RESIDUAL].weights[self.n_scaled :]
+
+    @property
+    def n_scaled(self) -> int:
+        """Static features, whose scales follow from the commands ahead."""
+        return self.fixed.static.n
 
     @property
     def is_sound(self) -> bool:
         """Whether the numbers, which are in range, fit each other."""
         factors = all(part.is_sound for one in self.evidence for part in (one.this, one.earlier))
-        return factors and self.learned.is_sound and self.leading in (ARX_RESIDUAL, ARX_COMMAND)
+        return factors and self.learned.is_sound and self.leader == self.leading.place
 
+    def restart(self) -> AveragedModel:
+        """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
+        fixed, learned = self.fixed, self.learned
+        most = CONSTANTS.warm_windows_max * fixed.settings.Np
+        evidence = self.evidence[0].begin_run(most), self.evidence[1].begin_run(most)
+        leading, stack, errors = learned.stack.leader, learned.stack.forget(FRESH_START), ExpertErrors()
+        if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
+            stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
+        learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
+        run = RunState.init(fixed)
+        return AveragedModel(fixed, learned, evidence, self.noise, 0.0, leading.place, run).with_noise(learned)
 
-def init(settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()) -> AveragedModel:
-    """Return the model at rest, with nothing learned.
+    def plan_ahead(self) -> AveragedModel:
+        """Return the model where a compensator decides the commands."""
+        return replace(self, fixed=replace(self.fixed, static=replace(self.fixed.static, damping_of_motion=True)))
 
-    Parameters
-    ----------
-    settings : PredictorSettings
-    discrete : DiscreteModel
-        ``G_pb``.
-    own : tuple of Disturbance
-        Of the user's own.
-    """
-    static = StaticFeatures(discrete, settings.q, settings.period, own)
-    fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
-    evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * fixed.command.p + 2)
-    return AveragedModel(
-        fixed, Learned.init(fixed), evidence, (0.0,) * N_JUDGED, 0.0, ARX_RESIDUAL, RunState.init(fixed)
-    )
-
-
-def restart(state: AveragedModel) -> AveragedModel:
-    """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
-    fixed, learned = state.fixed, state.learned
-    most = CONSTANTS.warm_windows_max * fixed.settings.Np
-    of_physics, of_command = (one.begin_run(most) for one in state.evidence)
-    leading, stack, errors = learned.stack.leader, learned.stack.forget(FRESH_START), ExpertErrors()
-    if of_physics.earlier.n_rows > 0.0:
-        stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
-    learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
-    evidence = of_physics, of_command
-    begun = AveragedModel(fixed, learned, evidence, state.noise, 0.0, leading, RunState.init(fixed))
-    return begun.with_noise(learned)
-
-
-def plan_ahead(state: AveragedModel) -> AveragedModel:
-    """Return the model where a compensator decides the commands."""
-    return replace(state, fixed=replace(state.fixed, static=replace(state.fixed.static, damping_of_motion=True)))
-
-
-def take_over(state: AveragedModel, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
-    """Return the model with what another one has learned."""
-    both = zip(state.evidence, regressions, strict=True)
-    of_physics, of_command = (replace(one.forget(), this=rows) for one, rows in both)
-    return replace(state, learned=learned, evidence=(of_physics, of_command))
-
-
-_LEAST = 1e-150
-"""Magnitude of a feature that counts as 0."""
-
-
-@dataclass(frozen=True)
-class AveragedForecast(Forecast):
-    """Window predicted by the averaged model.
-
-    Attributes
-    ----------
-    x : (n,) array, m
-        Position that the stiffness acts at.
-    stacked : (N_EXPERTS, n) array, m
-        Predictions that are stacked; 0 where an expert knows nothing.
-    predictions : mapping
-        Of the experts that know something, by their places in the stack.
-    scales : FeatureScales
-    """
-
-    x: Array
-    stacked: Array
-    predictions: Mapping[int, ExpertPrediction]
-    scales: FeatureScales
-
-
-def scales_of(state: AveragedModel, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
-    """Return the scales of the features, with the next window's.
-
-    Parameters
-    ----------
-    state : AveragedModel
-    window : ResidualWindow
-    path : (m,) array, m, optional
-        Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
-    """
-    static, learned, settings = state.fixed.static, state.learned, state.fixed.settings
-    T_s = settings.T_s
-    before = learned.velocity_scale
-    peak = static.peak_velocity(state.run.static, window.x_d)
-    outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
-    step = max(learned.largest_step, peak * T_s)
-    if path is not None and state.evidence[MODEL_RESIDUAL].n_rows == 0.0:
-        peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
-        outgrown = peak > max(before, LEAST_VELOCITY)
-    velocity = peak if outgrown else before
-    rows, _ = static.rows(state.run.static, window, window.x_pb, velocity)
-    largest = np.zeros(static.n) if outgrown else learned.largest
-    command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
-    if path is None and settings.Np > 1 and state.command_square > 0.0:
-        # A controller solves for the command's expert one sample before the window, as far as its commands are known.
-        known = window.x_d[: settings.n_late + settings.Np - 1]
-        early = max(learned.largest_step, static.peak_velocity(state.run.static, known) * T_s)
-        if early > 0.0 or step == 0.0:
-            command_step, command_square = early, state.command_square
-    largest = np.maximum(largest, np.abs(rows).max(axis=0))
-    return FeatureScales(velocity, largest, step, command_step, command_square)
-
-
-def _solved(state: AveragedModel, expert: int, rows: RidgeRegression, scales: FeatureScales) -> SolvedExpert:
-    """Return an expert with the weights that follow from rows."""
-    settings, kind = state.fixed.settings, state.kind_of(expert)
-    if kind == COMMAND_RESIDUAL:
-        command, square = state.fixed.command, scales.command_square
-        p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
-    else:
-        square = state.learned.scales[kind].largest_square
-        p, shares, largest = 0 if expert == STATIC else settings.p, state.fixed.static.shares, scales.largest
-    effect = settings.effect or math.sqrt(square)
-    priors = effect * shares / np.maximum(largest, _LEAST)
-    return solve(rows, state.noise_of(expert), priors, p)
-
-
-def solved(state: AveragedModel, scales: FeatureScales) -> dict[int, SolvedExpert]:
-    """Return the experts that know something, with their weights."""
-    found: dict[int, SolvedExpert] = {}
-    for kind, experts in ((MODEL_RESIDUAL, (ARX_RESIDUAL, STATIC)), (COMMAND_RESIDUAL, (ARX_COMMAND,))):
-        evidence, outgrown = state.evidence[kind], scales.velocity != state.learned.velocity_scale
-        if evidence.n_rows == 0.0 or state.learned.scales[kind].largest_square == 0.0:
-            continue
-        if kind == COMMAND_RESIDUAL or not outgrown:
-            rows = evidence.all()
-            found |= {expert: _solved(state, expert, rows, scales) for expert in experts if state.noise_of(expert)}
-            if state.doubts and state.leading == experts[0] and state.noise_of(FRESH_START):
-                found[FRESH_START] = _solved(state, FRESH_START, evidence.all(CONSTANTS.warm_prior_weight), scales)
-    return found
-
-
-def _growth(state: AveragedModel, scales: FeatureScales) -> float:
-    """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
-
-    What follows the command alone is linear in it: it may be larger than anything so far by as much.
-    """
-    before = state.learned.largest_step
-    if not (before > 0.0 and state.learned.stack.leader == ARX_COMMAND):
-        return 1.0
-    return min(scales.step / before, CONSTANTS.growth)
-
-
-def forecast_by(
-    state: AveragedModel,
-    experts: Mapping[int, SolvedExpert],
-    window: ResidualWindow,
-    scales: FeatureScales,
-    held: Mapping[int, ExpertPrediction] | None = None,
-    counts: NDArray[np.intp] | None = None,
-) -> AveragedForecast:
-    """Predict as :func:`forecast` by the experts of :func:`solved`.
-
-    Parameters
-    ----------
-    state, experts, window, scales
-    held : mapping, optional
-        Predictions whose shrinking is held.
-    counts : (n,) array, optional
-        As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
-    """
-    x_d, x_pb, _ = window
-    learned, command, run = state.learned, state.fixed.command, state.run
-    bound, growth = CONSTANTS.bound * learned.scales[MODEL_RESIDUAL].largest, _growth(state, scales)
-
-    def predicted(expert: int, features: Array, counts: NDArray[np.intp] | None) -> ExpertPrediction:
-        kind = state.kind_of(expert)
-        scale = (
-            learned.scales[COMMAND_RESIDUAL].grown(growth)
-            if kind == COMMAND_RESIDUAL
-            else learned.scales[MODEL_RESIDUAL]
+    def take_over(self, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
+        """Return the model with what another one has learned."""
+        of_physics, of_command = (
+            replace(one.forget(), this=rows) for one, rows in zip(self.evidence, regressions, strict=True)
         )
-        most = CONSTANTS.bound_of_command * scale.largest if kind == COMMAND_RESIDUAL else bound
-        shrunk = None if held is None else held.get(expert)
-        return experts[expert].predict(features, run.past[kind], scale.largest_square, most, shrunk, counts)
+        return replace(self, learned=learned, evidence=(of_physics, of_command))
 
-    x, rows = x_pb, np.empty((len(x_d), 0))
-    if STATIC in experts:
-        # The stiffness acts at the position, which the physics model alone does not give well enough.
-        rows, _ = state.fixed.static.rows(run.static, window, x_pb, scales.velocity)
-        x = x_pb + predicted(STATIC, rows, None).e_h
-        rows, _ = state.fixed.static.rows(run.static, window, x, scales.velocity)
-    found: dict[int, ExpertPrediction] = {}
-    stacked = np.zeros((N_EXPERTS, len(x_d)))
-    stacked[HOLD] = min(max(state.last, -bound), bound)
-    for expert in experts:
-        if state.kind_of(expert) == COMMAND_RESIDUAL:
-            found[expert] = predicted(expert, command.rows(run.commands, x_d), counts)
-            follows = command.late(run.commands, x_d) - x_pb
-            stacked[expert] = np.clip(found[expert].e_h + follows, -growth * bound, growth * bound)
-        else:
-            found[expert] = predicted(expert, rows, counts)
-            stacked[expert] = found[expert].e_h
-    weights = learned.stack.weights
-    e_h = weights @ stacked
-    second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
-    for expert, prediction in found.items():
-        second[expert] += prediction.variance
-    variance = np.maximum(weights @ second - e_h**2, 0.0)
-    return AveragedForecast(window, e_h, variance, x, stacked, found, scales)
+    def scales_of(self, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
+        """Return the scales of the features, with the next window's.
 
+        Parameters
+        ----------
+        window : ResidualWindow
+        path : (m,) array, m, optional
+            Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
+        """
+        static, learned, settings = self.fixed.static, self.learned, self.fixed.settings
+        T_s = settings.T_s
+        before = learned.velocity_scale
+        peak = static.peak_velocity(self.run.static, window.x_d)
+        outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
+        step = max(learned.largest_step, peak * T_s)
+        if path is not None and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
+            peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
+            outgrown = peak > max(before, LEAST_VELOCITY)
+        velocity = peak if outgrown else before
+        rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
+        largest = np.zeros(static.n) if outgrown else learned.largest
+        command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
+        if path is None and settings.Np > 1 and self.command_square > 0.0:
+            # A controller solves for the command's expert one sample before the window, as far as its commands are
+            # known.
+            known = window.x_d[: settings.n_late + settings.Np - 1]
+            early = max(learned.largest_step, static.peak_velocity(self.run.static, known) * T_s)
+            if early > 0.0 or step == 0.0:
+                command_step, command_square = early, self.command_square
+        largest = np.maximum(largest, np.abs(rows).max(axis=0))
+        return FeatureScales(velocity, largest, step, command_step, command_square)
 
-def forecast(state: AveragedModel, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
-    """Predict the residual over the next window.
+    def solved(self, scales: FeatureScales) -> dict[Regression, SolvedExpert]:
+        """Return the regressions that know something, with their weights."""
+        found = {one: one.solve(self, scales) for one in REGRESSIONS}
+        return {one: weights for one, weights in found.items() if weights is not None}
 
-    Parameters
-    ----------
-    state : AveragedModel
-    window : ResidualWindow
-    scales : FeatureScales, optional
-        By :func:`scales_of` from its commands if left out; a compensator takes its preview's.
-    """
-    scales = scales_of(state, window) if scales is None else scales
-    return forecast_by(state, solved(state, scales), window, scales)
+    def forecast_by(
+        self,
+        solved: Mapping[Regression, SolvedExpert],
+        window: ResidualWindow,
+        scales: FeatureScales,
+        held: Mapping[Regression, ExpertPrediction] | None = None,
+        counts: NDArray[np.intp] | None = None,
+    ) -> AveragedForecast:
+        """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
+
+        Parameters
+        ----------
+        solved, window, scales
+        held : mapping, optional
+            Predictions whose shrinking is held.
+        counts : (n,) array, optional
+            As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
+        """
+        x, held = window.x_pb, {} if held is None else held
+        rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
+        at = ExpertWindow(self, window, solved, scales, rows, {})
+        if STATIC in solved:
+            # The stiffness acts at the position, which the physics model alone does not give well enough.
+            x = x + STATIC.predict(at, held.get(STATIC), None).e_h
+            rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
+            at = replace(at, rows=rows)
+        predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
+        at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
+        for one in EXPERTS:
+            stacked[one.place] = one.forecast(at)
+        weights = self.learned.stack.weights
+        e_h = weights @ stacked
+        second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
+        for one, prediction in predictions.items():
+            second[one.place] += prediction.variance
+        variance = np.maximum(weights @ second - e_h**2, 0.0)
+        return AveragedForecast(window, e_h, variance, scales, x, stacked, predictions)
+
+    def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
+        """Predict the residual over the next window.
+
+        Parameters
+        ----------
+        window : ResidualWindow
+        scales : FeatureScales, optional
+            By :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
+        """
+        scales = self.scales_of(window) if scales is None else scales
+        return self.forecast_by(self.solved(scales), window, scales)
+
+    def begin_in_motion(self, window: ResidualWindow) -> AveragedModel:
+        """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
+
+        Parameters
+        ----------
+        window : ResidualWindow
+            The first one, with the motion before it.
+        """
+        (x_d, x_pb, _), command, static = window, self.fixed.command, self.run.static
+        commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
+        positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
+        late = commands[-1 - command.dead_time :: -1][: command.p]
+        past = self.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
+        static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
+        return replace(self, run=replace(self.run, static=static, commands=commands, past=past))
+
+    def learn(
+        self, forecast: AveragedForecast, x: Array, *, fold: bool = True
+    ) -> tuple[AveragedModel, NDArray[np.bool_]]:
+        """Learn from the measurement of a window.
+
+        Parameters
+        ----------
+        forecast : AveragedForecast
+            Of this state.
+        x : (m,) array, m
+            Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
+        fold : bool
+            Whether they are learned; the next window starts from them in any case.
+
+        Returns
+        -------
+        AveragedModel, (m,) array of bool
+            Which samples are accepted.
+        """
+        m, fixed, run = len(x), self.fixed, self.run
+        window = ResidualWindow(forecast.window.x_d[:m], forecast.window.x_pb[:m], forecast.window.start)
+        fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
+        state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
+        learned, measured = state.learned, x - window.x_pb
+        largest, T_s = learned.scales[MODEL_RESIDUAL].largest, fixed.settings.T_s
+        accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
+        e = _bridged(self.last, measured, accepted)
+        e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
+        rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
+        bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
+        if fold:
+            of_command = fixed.command.rows(run.commands, window.x_d)
+            state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
+            state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
+        past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
+        n_rejected = run.n_rejected + m - int(accepted.sum())
+        commands = np.concatenate((run.commands, window.x_d))[m:]
+        run = RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected)
+        return replace(state, run=run), accepted
 
 
 _BRIDGED = 3
 """Lags of a row that may stand for samples without a measurement."""
-
-
-def begin_in_motion(state: AveragedModel, window: ResidualWindow) -> AveragedModel:
-    """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
-
-    Parameters
-    ----------
-    state : AveragedModel
-    window : ResidualWindow
-        The first one, with the motion before it.
-    """
-    (x_d, x_pb, _), command, static = window, state.fixed.command, state.run.static
-    commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
-    positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
-    late = commands[-1 - command.dead_time :: -1][: command.p]
-    past = state.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
-    static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
-    return replace(state, run=replace(state.run, static=static, commands=commands, past=past))
 
 
 def _with_scales(state: AveragedModel, forecast: AveragedForecast, fastest: float) -> AveragedModel:
@@ -558,7 +527,7 @@ def _judged_experts(
     if not accepted.any():
         return learned
     errors = {
-        expert: learned.errors_of(expert).judge(one, e[state.kind_of(expert)], accepted, given)
+        expert: learned.errors_of(expert).judge(one, e[expert.like(state).target], accepted, given)
         for expert, one in forecast.predictions.items()
     }
     of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
@@ -584,51 +553,10 @@ def _judged(
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[MODEL_RESIDUAL][published], settings.lam)
     learned = replace(learned, stack=stack)
-    if not (state.doubts and stack.weights[FRESH_START] > CONSTANTS.discard_above):
+    if not (state.doubts and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}
     learned = replace(learned.with_errors(anew), stack=Stack.init())
     evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
     return replace(state, learned=learned, evidence=evidence).with_noise(learned)
-
-
-def learn(
-    state: AveragedModel, forecast: AveragedForecast, x: Array, *, fold: bool = True
-) -> tuple[AveragedModel, NDArray[np.bool_]]:
-    """Learn from the measurement of a window.
-
-    Parameters
-    ----------
-    state : AveragedModel
-    forecast : AveragedForecast
-        Of that state.
-    x : (m,) array, m
-        Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
-    fold : bool
-        Whether they are learned; the next window starts from them in any case.
-
-    Returns
-    -------
-    AveragedModel, (m,) array of bool
-        Which samples are accepted.
-    """
-    m, fixed, run = len(x), state.fixed, state.run
-    window = ResidualWindow(forecast.window.x_d[:m], forecast.window.x_pb[:m], forecast.window.start)
-    fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
-    state = _with_scales(state, forecast, max(state.learned.fastest, fastest))
-    learned, measured = state.learned, x - window.x_pb
-    largest, T_s = learned.scales[MODEL_RESIDUAL].largest, fixed.settings.T_s
-    accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
-    e = _bridged(state.last, measured, accepted)
-    e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
-    rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
-    bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-    if fold:
-        of_command = fixed.command.rows(run.commands, window.x_d)
-        state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
-        state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
-    past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
-    n_rejected = run.n_rejected + m - int(accepted.sum())
-    commands = np.concatenate((run.commands, window.x_d))[m:]
-    return replace(state, run=RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected)), accepted

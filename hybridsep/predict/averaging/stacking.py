@@ -10,28 +10,9 @@ import numpy as np
 from ...base.signals import Array
 from ...base.state import bounded
 from .constants import CONSTANTS
+from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, STATIC, Expert, Regression
 
-__all__ = [
-    "ARX_COMMAND",
-    "ARX_RESIDUAL",
-    "FRESH_START",
-    "HOLD",
-    "N_EXPERTS",
-    "N_JUDGED",
-    "STATIC",
-    "Stack",
-    "simplex_minimum",
-]
-
-HOLD, ARX_RESIDUAL, STATIC, ARX_COMMAND, FRESH_START = range(5)
-"""Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
-a counterpart of ARX_RESIDUAL or ARX_COMMAND, whichever led, that gives earlier runs little weight."""
-
-N_EXPERTS = 5
-"""All of them."""
-
-N_JUDGED = N_EXPERTS - ARX_RESIDUAL
-"""Experts from ARX_RESIDUAL on, whose errors are judged."""
+__all__ = ["Stack", "simplex_minimum"]
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
@@ -62,7 +43,8 @@ class Stack:
     @classmethod
     def init(cls) -> Stack:
         """Return the stack without evidence."""
-        return cls(_first_weights(), np.zeros((N_EXPERTS, N_EXPERTS)), np.zeros(N_EXPERTS), np.zeros(2))
+        n = len(EXPERTS)
+        return cls(_first_weights(), np.zeros((n, n)), np.zeros(n), np.zeros(2))
 
     def update(self, predicted: Array, measured: Array, least: float) -> Stack:
         """Return the stack with a measured window more.
@@ -83,34 +65,31 @@ class Stack:
         errors = total - 2.0 * cross + np.diag(gram)
         best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
         ridge = CONSTANTS.kappa * best * n
-        weights = simplex_minimum(gram + ridge * np.eye(N_EXPERTS), cross + ridge * _first_weights())
+        weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * _first_weights())
         return Stack(weights, gram, cross, evidence)
 
     @property
-    def leader(self) -> int:
+    def leader(self) -> Regression:
         """ARX_COMMAND, if it has more of the weights than ARX_RESIDUAL and STATIC together, else ARX_RESIDUAL."""
-        return (
-            ARX_COMMAND
-            if self.weights[ARX_COMMAND] > self.weights[ARX_RESIDUAL] + self.weights[STATIC]
-            else ARX_RESIDUAL
-        )
+        of_residual = self.weights[ARX_RESIDUAL.place] + self.weights[STATIC.place]
+        return ARX_COMMAND if self.weights[ARX_COMMAND.place] > of_residual else ARX_RESIDUAL
 
-    def copy(self, expert: int, to: int) -> Stack:
+    def copy(self, expert: Expert, to: Expert) -> Stack:
         """Return the stack with the evidence of an expert given to another, as if it had predicted the same so far."""
         order = np.arange(len(self.weights))
-        order[to] = expert
+        order[to.place] = expert.place
         return replace(self, gram=self.gram[np.ix_(order, order)], cross=self.cross[order])
 
-    def forget(self, expert: int) -> Stack:
+    def forget(self, expert: Expert) -> Stack:
         """Return the stack without an expert that predicts no more."""
-        others = np.arange(len(self.weights)) != expert
+        others = np.arange(len(self.weights)) != expert.place
         gram = np.where(others[:, None] & others, self.gram, 0.0)
         return Stack(np.where(others, self.weights, 0.0), gram, np.where(others, self.cross, 0.0), self.evidence)
 
 
 def _first_weights() -> Array:
     """Return the weights without evidence, ``π₀``."""
-    return np.array([0.0, CONSTANTS.first_arx_residual, CONSTANTS.first_static, 0.0, 0.0])
+    return np.array([one.first_weight for one in EXPERTS])
 
 
 def simplex_minimum(hessian: Array, linear: Array) -> Array:

@@ -43,7 +43,7 @@ typedef struct {
 static work_experts work_of_experts(hsep_averaged *model)
 {
     work_experts sum = {0.0, 0.0, 0.0, 0.0};
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (model->predicted[i]) {
             const hsep_expert *expert = hsep_averaged_expert(model, i);
             const hsep_real n = (hsep_real)(expert->p + expert->n_static);
@@ -66,7 +66,7 @@ static work_sizes work_of(const hsep_averaged_planner *self, const hsep_averaged
         .free = (hsep_real)(self->n - self->n_pinned),
         .modes = (hsep_real)physics->n_modes,
         .experts = work_of_experts(task->model)};
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (hsep_linearised_counts(task->model, i)) {
             sizes.columns[sizes.n_columns++] = (hsep_real)hsep_averaged_expert(task->model, i)->p;
         }

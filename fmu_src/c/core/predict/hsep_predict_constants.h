@@ -3,6 +3,19 @@
 #define HSEP_PREDICT_CONSTANTS_H
 
 /* clang-format off */
+/* hybridsep/predict/averaging/experts.py: EXPERTS; those that rows train are in a row */
+#define HSEP_HOLD 0
+#define HSEP_ARX_RESIDUAL 1
+#define HSEP_STATIC 2
+#define HSEP_ARX_COMMAND 3
+#define HSEP_FRESH_START 4
+#define HSEP_N_EXPERTS 5
+#define HSEP_REGRESSIONS 1
+#define HSEP_REGRESSIONS_END 5
+#define HSEP_N_REGRESSIONS 4
+/* First weight, target, whether it has lags, whether it is fresh */
+#define HSEP_EXPERTS {0.0, 0, 0, 0}, {0.5, 0, 1, 0}, {0.5, 0, 0, 0}, {0.0, 1, 1, 0}, {0.0, 0, 1, 1}
+
 /* hybridsep/predict/uncertainty.py */
 #define HSEP_UNCERTAINTY_SHARES 4.0, 2.0
 #define HSEP_UNCERTAINTY_N_COMPONENTS 3
@@ -29,19 +42,16 @@
 #define HSEP_START_DAMPING 0.001
 
 /* hybridsep/predict/averaging/stacking.py */
-#define HSEP_HOLD 0
-#define HSEP_ARX_RESIDUAL 1
-#define HSEP_STATIC 2
-#define HSEP_ARX_COMMAND 3
-#define HSEP_FRESH_START 4
-#define HSEP_N_EXPERTS 5
-#define HSEP_N_JUDGED 4
 #define HSEP_STACKING_LEAST_SQUARE HSEP_TINY(1e-300)
 
 /* hybridsep/predict/averaging/experts.py */
+#define HSEP_MODEL_RESIDUAL 0
+#define HSEP_COMMAND_RESIDUAL 1
+#define HSEP_N_RESIDUALS 2
 #define HSEP_EXPERTS_DIVERGED 1000000.0
 #define HSEP_EXPERTS_LAG_BOUND 10.0
 #define HSEP_EXPERTS_RESOLUTION 1e-13
+#define HSEP_EXPERTS_LEAST HSEP_TINY(1e-150)
 
 /* hybridsep/predict/averaging/features.py */
 #define HSEP_FEATURES_N_FRICTION 6
@@ -51,12 +61,8 @@
 #define HSEP_FEATURES_DIFFERENCES 3
 
 /* hybridsep/predict/averaging/model.py */
-#define HSEP_MODEL_RESIDUAL 0
-#define HSEP_COMMAND_RESIDUAL 1
-#define HSEP_N_RESIDUALS 2
 #define HSEP_AVERAGING_AHEAD 20
 #define HSEP_AVERAGING_ROUNDING 1e-06
-#define HSEP_AVERAGING_LEAST HSEP_TINY(1e-150)
 #define HSEP_AVERAGING_BRIDGED 3
 
 /* hybridsep/predict/averaging/constants.py */

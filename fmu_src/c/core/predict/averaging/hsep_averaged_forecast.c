@@ -67,7 +67,7 @@ HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_re
         const hsep_real largest = !of_command ? of_motion : i > 0 ? step : 1.0;
         const hsep_real share = of_command ? hsep_command_share(hsep_averaged_command(self), i)
                                            : hsep_disturbances_share(hsep_averaged_disturbances(self), i);
-        scales[i] = effect * share / hsep_fmax(largest, HSEP_AVERAGING_LEAST);
+        scales[i] = effect * share / hsep_fmax(largest, HSEP_EXPERTS_LEAST);
     }
 }
 
@@ -88,19 +88,16 @@ static void averaged_solve(hsep_averaged *self, hsep_int place, hsep_real weight
 /* Solve for the weights of the experts that know something. */
 static void averaged_solved(hsep_averaged *self, int outgrown)
 {
-    hsep_int *predicted = self->predicted, known[HSEP_N_RESIDUALS];
+    hsep_int known[HSEP_N_RESIDUALS];
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         known[i] = hsep_warm_start_n_rows(hsep_averaged_evidence(self, i)) > 0.0 &&
-                   self->learned.scales[i].largest_square > 0.0;
+                   self->learned.scales[i].largest_square > 0.0 && !(i == HSEP_MODEL_RESIDUAL && outgrown);
     }
-    predicted[HSEP_HOLD] = 1;
-    predicted[HSEP_ARX_RESIDUAL] = predicted[HSEP_STATIC] = known[HSEP_MODEL_RESIDUAL] && !outgrown;
-    predicted[HSEP_ARX_COMMAND] = known[HSEP_COMMAND_RESIDUAL];
-    predicted[HSEP_FRESH_START] = predicted[self->leading] && hsep_averaged_doubts(self);
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
-        predicted[i] = predicted[i] && hsep_averaged_expert(self, i)->variance > 0.0;
-        if (predicted[i]) {
-            averaged_solve(self, i, i == HSEP_FRESH_START ? HSEP_AVERAGING_WARM_PRIOR_WEIGHT : 1.0);
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
+        self->predicted[i] = known[hsep_averaged_kind_of(self, i)] && hsep_averaged_solution(self, i) != NULL &&
+                             hsep_averaged_expert(self, i)->variance > 0.0;
+        if (self->predicted[i]) {
+            averaged_solve(self, i, hsep_expert_weight(i));
         }
     }
 }
@@ -133,7 +130,7 @@ static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hse
     const hsep_real *past_of_command = hsep_at(self, self->e_0) + self->Np, growth = self->growth;
     const hsep_real most = growth * of_command->largest, square = growth * growth * of_command->largest_square;
     hsep_command_take(hsep_averaged_command(self), x_d, self->n);
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_expert *expert = hsep_averaged_expert(self, i);
         if (self->predicted[i] && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL) {
             hsep_expert_begin(expert, past_of_command, square, HSEP_AVERAGING_BOUND_OF_COMMAND * most);
@@ -194,7 +191,7 @@ HSEP_API void hsep_averaged_go_on(
     if (self->predicted[HSEP_ARX_COMMAND]) {
         hsep_command_fill(hsep_averaged_command(self), self->n, first, last);
     }
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (self->predicted[i]) {
             hsep_expert_predict(hsep_averaged_expert(self, i), averaged_rows(self, i), first, last, apart);
             averaged_take(self, i, x_pb, begin, end);

@@ -96,7 +96,7 @@ static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const 
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
-    for (hsep_int i = HSEP_ARX_RESIDUAL; k >= self->early && i < HSEP_N_EXPERTS;
+    for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END;
          i++) { /* their solutions may have begun */
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
@@ -113,11 +113,11 @@ static void averaged_judge_experts(
     const hsep_real *accepted = hsep_at(self, self->accepted);
     const hsep_real *residuals[HSEP_N_RESIDUALS] = {e, hsep_at(self, self->e_0)};
     const hsep_int first = self->Np - n;
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
-                hsep_averaged_expert(self, i), &errors[i - HSEP_ARX_RESIDUAL],
-                residuals[hsep_averaged_kind_of(self, i)], accepted, n, self->given_variance);
+                hsep_averaged_expert(self, i), &errors[i - HSEP_REGRESSIONS], residuals[hsep_averaged_kind_of(self, i)],
+                accepted, n, self->given_variance);
         }
     }
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
@@ -129,7 +129,7 @@ static void averaged_judge_experts(
 static void averaged_prepare_next(hsep_averaged *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
-    hsep_expert_errors errors[HSEP_N_JUDGED];
+    hsep_expert_errors errors[HSEP_N_REGRESSIONS];
     memcpy(scales, self->learned.scales, sizeof scales);
     memcpy(errors, self->learned.errors, sizeof errors);
     if (self->n_accepted > 0.0) {
@@ -172,7 +172,7 @@ static hsep_real averaged_of_beginning(const hsep_solution *solution)
 static hsep_real averaged_left(hsep_averaged *self, hsep_int to_come)
 {
     hsep_real sum = 0.0;
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         const hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL) {
             const hsep_int kind = hsep_averaged_kind_of(self, i);
@@ -193,7 +193,7 @@ static void averaged_advance(hsep_averaged *self, hsep_int last)
     const hsep_real of_rows = averaged_of_rows(self), added = waiting == 1 ? of_rows : 0.0; /* in this sample */
     const hsep_real all = added + of_rows * (hsep_real)adds + averaged_left(self, to_come);
     hsep_real amount = all / (hsep_real)left - added;
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL && (amount > 0.0 || left == 1)) {
             amount -= averaged_of_beginning(solution);
@@ -267,7 +267,7 @@ HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak)
     if (self->followed + 1 != self->Np || !(self->early_square > 0.0)) {
         return;
     }
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         hsep_real scales[HSEP_AVERAGED_MOST];
         if (solution != NULL && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL &&
@@ -324,8 +324,8 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
             hsep_warm_start_forget_earlier(hsep_averaged_evidence(self, i));
         }
-        errors[0] = errors[HSEP_STATIC - HSEP_ARX_RESIDUAL] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_ARX_RESIDUAL] = errors[HSEP_FRESH_START - HSEP_ARX_RESIDUAL];
+        errors[0] = errors[HSEP_STATIC - HSEP_REGRESSIONS] = (hsep_expert_errors){0.0, 1.0};
+        errors[self->leading - HSEP_REGRESSIONS] = errors[HSEP_FRESH_START - HSEP_REGRESSIONS];
         hsep_stack_init(&learned->stack);
         hsep_averaged_prepare_solutions(self, learned->scales, errors);
     }

@@ -17,8 +17,7 @@ static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
 
 HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert)
 {
-    const int doubts_command = expert == HSEP_FRESH_START && self->leading == HSEP_ARX_COMMAND;
-    return expert == HSEP_ARX_COMMAND || doubts_command ? HSEP_COMMAND_RESIDUAL : HSEP_MODEL_RESIDUAL;
+    return hsep_expert_of(hsep_expert_of(expert).is_fresh ? self->leading : expert).target;
 }
 
 static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expert)
@@ -28,8 +27,7 @@ static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expe
         return (hsep_expert_shape){
             self->Np, self->n, HSEP_AVERAGING_LAGS_OF_COMMAND + 2, HSEP_AVERAGING_LAGS_OF_COMMAND, room};
     }
-    const hsep_int p = expert == HSEP_STATIC ? 0 : self->p;
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, p, room};
+    return (hsep_expert_shape){self->Np, self->n, self->n_static, hsep_expert_of(expert).has_lags ? self->p : 0, room};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
@@ -37,7 +35,7 @@ static hsep_real averaged_expert_size(const hsep_averaged *self, hsep_int expert
 {
     const hsep_expert_shape shape = averaged_shape(self, expert), other = averaged_shape(self, HSEP_ARX_COMMAND);
     const hsep_real size = hsep_expert_size(&shape);
-    return expert == HSEP_FRESH_START ? hsep_fmax(size, hsep_expert_size(&other)) : size;
+    return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_size(&other)) : size;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -75,8 +73,7 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         self->evidence[i] = hsep_take_block(&end, hsep_warm_start_size(averaged_n_features(self, i)));
     }
-    self->experts[HSEP_HOLD] = 0;
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         self->experts[i] = hsep_take_block(&end, averaged_expert_size(self, i));
     }
     return end * sizeof(hsep_real);
@@ -98,10 +95,10 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_warm_start_init(hsep_averaged_evidence(self, i), averaged_n_features(self, i));
     }
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         const hsep_expert_shape shape = averaged_shape(self, i);
         hsep_expert_init(hsep_averaged_expert(self, i), &shape);
-        self->learned.errors[i - HSEP_ARX_RESIDUAL].correlation = 1.0;
+        self->learned.errors[i - HSEP_REGRESSIONS].correlation = 1.0;
     }
 }
 
@@ -117,10 +114,9 @@ HSEP_API int hsep_averaged_valid(const void *block, const hsep_residual_paramete
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         sound = sound && hsep_warm_start_valid(hsep_at_bytes(block, got.evidence[i]), averaged_n_features(&got, i));
     }
-    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         const hsep_expert_shape shape = averaged_shape(&got, i);
-        sound = sound && got.predicted[i] <= 1 &&
-                (i == HSEP_HOLD || hsep_expert_valid(hsep_at_bytes(block, got.experts[i]), &shape));
+        sound = sound && got.predicted[i] <= 1 && hsep_expert_valid(hsep_at_bytes(block, got.experts[i]), &shape);
     }
     return sound;
 }
@@ -132,14 +128,9 @@ HSEP_API int hsep_averaged_doubts(hsep_averaged *self)
 
 HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int expert)
 {
-    const int trained = expert != HSEP_HOLD && (expert != HSEP_FRESH_START || hsep_averaged_doubts(self));
-    return trained ? hsep_expert_solution(hsep_averaged_expert(self, expert)) : NULL;
-}
-
-/* Weight of the rows of earlier runs for an expert. */
-static hsep_real averaged_weight(hsep_int expert)
-{
-    return expert == HSEP_FRESH_START ? HSEP_AVERAGING_WARM_PRIOR_WEIGHT : 1.0;
+    return !hsep_expert_of(expert).is_fresh || hsep_averaged_doubts(self)
+               ? hsep_expert_solution(hsep_averaged_expert(self, expert))
+               : NULL;
 }
 
 HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert)
@@ -147,7 +138,7 @@ HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert
     hsep_solution *solution = hsep_averaged_solution(self, expert);
     if (solution != NULL && !solution->begun) {
         hsep_warm_start *evidence = hsep_averaged_evidence(self, hsep_averaged_kind_of(self, expert));
-        hsep_expert_begin_solution(hsep_averaged_expert(self, expert), evidence, averaged_weight(expert));
+        hsep_expert_begin_solution(hsep_averaged_expert(self, expert), evidence, hsep_expert_weight(expert));
     }
     return solution;
 }
@@ -155,15 +146,15 @@ HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert
 HSEP_API void hsep_averaged_prepare_solutions(
     hsep_averaged *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[])
 {
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         const hsep_int kind = hsep_averaged_kind_of(self, i);
-        const hsep_real square = scales[kind].largest_square, weight = averaged_weight(i);
+        const hsep_real square = scales[kind].largest_square, weight = hsep_expert_weight(i);
         const hsep_real first = self->given_variance > 0.0 ? self->given_variance : HSEP_AVERAGING_FIRST_NOISE * square;
         const hsep_real least = hsep_fmin(self->least_variance, HSEP_AVERAGING_LEAST_NOISE * square);
         if (hsep_averaged_solution(self, i) != NULL) {
             hsep_expert_prepare(
                 hsep_averaged_expert(self, i), hsep_averaged_evidence(self, kind), weight,
-                &errors[i - HSEP_ARX_RESIDUAL], first, least);
+                &errors[i - HSEP_REGRESSIONS], first, least);
         }
     }
 }
@@ -188,7 +179,7 @@ HSEP_API int hsep_averaged_sound(const hsep_averaged *self)
 HSEP_API void hsep_averaged_restart(hsep_averaged *self)
 {
     hsep_learned *learned = &self->learned;
-    hsep_expert_errors *doubting = &learned->errors[HSEP_FRESH_START - HSEP_ARX_RESIDUAL];
+    hsep_expert_errors *doubting = &learned->errors[HSEP_FRESH_START - HSEP_REGRESSIONS];
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_warm_start_begin_run(
             hsep_averaged_evidence(self, i), HSEP_AVERAGING_WARM_WINDOWS_MAX * (hsep_real)self->Np);
@@ -203,11 +194,11 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
     self->early_square = 0.0;
     hsep_stack_forget(&learned->stack, HSEP_FRESH_START);
     if (hsep_averaged_doubts(self)) {
-        *doubting = learned->errors[self->leading - HSEP_ARX_RESIDUAL];
+        *doubting = learned->errors[self->leading - HSEP_REGRESSIONS];
         hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);
     }
     hsep_averaged_prepare_solutions(self, learned->scales, learned->errors);
-    for (hsep_int i = HSEP_ARX_RESIDUAL; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_begun(self, i);
         if (solution != NULL) {
             (void)hsep_solution_advance(solution, INFINITY, 0);

@@ -38,7 +38,7 @@ typedef struct {
     hsep_real largest_step;   /* m, largest change from sample to sample, of the command */
     hsep_real fastest;        /* m, and of the physics model */
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
-    hsep_expert_errors errors[HSEP_N_JUDGED]; /* of the experts from HSEP_ARX_RESIDUAL on */
+    hsep_expert_errors errors[HSEP_N_REGRESSIONS]; /* of the regressions */
     hsep_stack stack;
 } hsep_learned;
 
@@ -84,7 +84,7 @@ typedef struct {
     hsep_learned learned;
 } hsep_averaged;
 
-HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_JUDGED + HSEP_STACK_WORDS);
+HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
     35 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_gate) + sizeof(hsep_learned)) / sizeof(hsep_real));
@@ -128,7 +128,7 @@ HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert
 HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[]);
 
 /* Prepare the solutions, with variances of the noise as they are known now. scales: (HSEP_N_RESIDUALS,) of the
- * residuals so far; errors: (HSEP_N_JUDGED,) of the experts from HSEP_ARX_RESIDUAL on. */
+ * residuals so far; errors: (HSEP_N_REGRESSIONS,) of the regressions. */
 HSEP_API void hsep_averaged_prepare_solutions(
     hsep_averaged *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 

@@ -4,13 +4,12 @@
 
 #include <string.h>
 
-static const hsep_real stack_first[HSEP_N_EXPERTS] = {
-    0.0, HSEP_AVERAGING_FIRST_ARX_RESIDUAL, HSEP_AVERAGING_FIRST_STATIC, 0.0, 0.0};
-
 HSEP_API void hsep_stack_init(hsep_stack *self)
 {
     memset(self, 0, sizeof *self);
-    memcpy(self->weights, stack_first, sizeof stack_first);
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->weights[i] = hsep_expert_of(i).first_weight;
+    }
 }
 
 /* Solve A [u v] = [a b] for n unknowns, A positive definite; it is used up. */
@@ -120,7 +119,7 @@ HSEP_API void hsep_stack_update(
     const hsep_real ridge = HSEP_AVERAGING_KAPPA * square * n;
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
-        l[i] = self->cross[i] + ridge * stack_first[i];
+        l[i] = self->cross[i] + ridge * hsep_expert_of(i).first_weight;
     }
     stack_minimise(H, l, self->weights);
 }

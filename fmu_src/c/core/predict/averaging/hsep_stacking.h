@@ -9,6 +9,26 @@
 #include "hsep_layout.h"
 #include "hsep_predict_constants.h"
 
+/* Entry of the tuple of experts, as predict/averaging/experts.py has it; its place there is its place in the stack. */
+typedef struct {
+    hsep_real first_weight; /* without evidence */
+    hsep_int target;        /* residual that a regression predicts and learns */
+    hsep_int has_lags;      /* whether lags of it are among its features */
+    hsep_int is_fresh;      /* whether it gives earlier runs little weight: with the target of the one that led */
+} hsep_expert_entry;
+
+static inline hsep_expert_entry hsep_expert_of(hsep_int place)
+{
+    static const hsep_expert_entry entries[HSEP_N_EXPERTS] = {HSEP_EXPERTS};
+    return entries[place];
+}
+
+/* Weight of the rows of earlier runs for a regression. */
+static inline hsep_real hsep_expert_weight(hsep_int place)
+{
+    return hsep_expert_of(place).is_fresh ? HSEP_AVERAGING_WARM_PRIOR_WEIGHT : 1.0;
+}
+
 typedef struct {
     hsep_real weights[HSEP_N_EXPERTS];               /* pi */
     hsep_real gram[HSEP_N_EXPERTS * HSEP_N_EXPERTS]; /* m2, F' F so far */
