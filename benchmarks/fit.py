@@ -13,16 +13,13 @@ better by 2 %.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from hybridsep.base.errors import HybridSepError
 from hybridsep.evaluate.verdict import ALIKE
-from hybridsep.fitting.advice import recommendation
-from hybridsep.fitting.fit import FitOptions, fit
-from hybridsep.fitting.report import judged_by
+from hybridsep.fitting.fit import fit
 from hybridsep.logs.log import Log, read_log
 from hybridsep.machines.machine import machine_name
 
@@ -102,10 +99,9 @@ def logs(emps: Path | None, recordings: Path | None) -> Iterator[Log]:
 
 def row(log: Log, Np: int) -> Row:
     """Return a row of the table."""
-    with tempfile.TemporaryDirectory() as folder:
-        found = fit([log], Path(folder), FitOptions(Np, machine_name(log.path)), fmus=False)
-    rms = {one.name: 1e6 * one.rms for one in found.judged.scored()}
-    return Row(log.path.stem, Np, rms, recommendation(judged_by(found, log.shown)))
+    found = fit(log, Np=Np, name=machine_name(log.path))
+    rms = {one.name: 1e6 * one.rms for one in found.judged.replay.scored()}
+    return Row(log.path.stem, Np, rms, found.advice)
 
 
 def summary(rows: Sequence[Row]) -> str:

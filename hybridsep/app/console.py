@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import math
 import os
 import shlex
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -21,6 +18,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from ..base.errors import ParameterError, brief
+from ..base.files import plain
 from ..base.metrics import shown_figure
 
 if TYPE_CHECKING:
@@ -37,7 +35,6 @@ __all__ = [
     "check_outputs",
     "console",
     "errors_console",
-    "keep_written",
     "print_channels",
     "print_json",
     "print_run",
@@ -187,15 +184,7 @@ def print_written(*paths: Path | None) -> None:
 
 def print_json(result: Any) -> None:
     """Print JSON; figures that are not finite, such as scores over no sample, are null."""
-    typer.echo(json.dumps(_finite(result), indent=2))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    typer.echo(json.dumps(plain(result), indent=2))
 
 
 _ROLES = {"t": "time", "x_d": "commanded", "x": "measured"}
@@ -215,7 +204,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
 
     found = {str(path): channels(open_source(path)) for path in logs}
     if as_json:
-        print_json({path: [asdict(one) for one in listed] for path, listed in found.items()})
+        print_json(found)
         return
     for path, listed in found.items():
         table = Table("channel", "unit", "samples", "interval [s]", "read as", title=path, box=box.SIMPLE)
@@ -298,9 +287,6 @@ RUNS = (".csv", ".npz")
 Output = tuple[str, Path | None, tuple[str, ...]]
 """Option that names a file, the file where it is given, and the endings that it may have; any where there are none."""
 
-_WRITTEN = "written"
-"""Entry of ``fit.json``: the logs of the fit, and the hash of each file."""
-
 
 def check_outputs(
     outputs: Iterable[Output],
@@ -376,32 +362,12 @@ def _same_file(one: Path, other: Path) -> bool:
 
 def written_before(results: Path, logs: Sequence[Path]) -> set[Path]:
     """Return the files beside a ``fit.json`` that the fit of the same logs wrote, and that nobody has edited since."""
+    from ..fitting.build import sha256_of
+
     try:
-        written = json.loads(results.read_bytes())[_WRITTEN]
-        same = written["logs"] == _absolute(logs)
-        hashes = {results.with_name(name): str(known) for name, known in written["files"].items()}
+        written = json.loads(results.read_bytes())["written"]
+        same = set(written["logs"]) == {os.path.realpath(log) for log in logs}
+        hashes = {results.with_name(name): known for name, known in written["files"].items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return set()
-    return (
-        {results, *(path for path, known in hashes.items() if path.is_file() and _hash(path) == known)}
-        if same
-        else set()
-    )
-
-
-def keep_written(results: Path, logs: Sequence[Path], files: Iterable[Path]) -> None:
-    """Add to a ``fit.json`` which logs it is of, and the hashes of the files that were written beside it."""
-    from ..base.files import written_text
-
-    found = json.loads(results.read_bytes())
-    hashes = {path.name: _hash(path) for path in files if path != results}
-    with written_text(results) as file:
-        file.write(json.dumps({**found, _WRITTEN: {"logs": _absolute(logs), "files": hashes}}, indent=2) + "\n")
-
-
-def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _absolute(logs: Sequence[Path]) -> list[str]:
-    return [os.path.realpath(log) for log in logs]
+    return {results, *(path for path, known in hashes.items() if sha256_of(path) == known)} if same else set()

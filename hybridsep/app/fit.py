@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..base.files import written_text
-from ..base.settings import DRIVE_LIMIT_ENTRIES
-from ..fmi.flavours import FMI_VERSIONS
+from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from .options import (
     KNOWN_ENTRIES,
     AxisOption,
     CommandColumnOption,
-    FmiOption,
     ForceOption,
     JsonOption,
     MeasuredColumnOption,
@@ -33,8 +31,6 @@ if TYPE_CHECKING:
 
     from ..fitting.fit import Fit
     from ..identify.model import IdentifiedModel
-    from ..logs.checks import Finding
-    from ..logs.log import Log
     from ..logs.units import DisplayUnits
 
 __all__ = ["fit", "identify"]
@@ -55,77 +51,63 @@ def fit(
     *,
     reading: ReadingOptions,
     parameters: dict[str, Any],
-    fmi: FmiOption = FMI_VERSIONS[0],
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
     from ..logs.log import read_log
     from ..machines.machine import checked_name, machine_name
-    from .console import check_outputs, keep_written, written_before
+    from .console import check_outputs, written_before
 
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
     found = [read_log(path, **reading.arguments) for path in logs]
     # What computes takes seconds to import: a log that cannot be read is said before
-    from ..fitting.advice import recommendation
+    from ..fitting.build import fit_files
     from ..fitting.compensation import drive_limits
-    from ..fitting.fit import FitOptions, fit_files
     from ..fitting.fit import fit as fit_logs
-    from ..fitting.report import fit_report, judged_by, next_steps
-    from ..logs.checks import checked, findings_table
+    from ..logs.checks import findings_table
     from .console import console, print_json, progress_bar
     from .logs import different_logs, show
 
     folder = out or Path(machine)
-    limits = drive_limits(parameters)
-    files = fit_files(folder, machine, compensator=bool(limits), fmi=fmi)
-    known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
+    files = fit_files(folder, machine, compensator=bool(drive_limits(parameters)))
     outputs = [("--out", path, ()) for path in files.values()]
     check_outputs(outputs, inputs, force=force, ours=written_before(files["results"], logs))
     used = different_logs(found)
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
-    findings = {log.path.name: checked(log) for log in used}
     with progress_bar(as_json) as advance:
-        options = FitOptions(Np, machine, known=known, drive_limits=limits)
-        result = fit_logs(used, folder, options, advance, fmi=fmi)
-        fit_report(result, used, findings).write(files["report"])
-    keep_written(files["results"], logs, files.values())
-    advice = recommendation(judged_by(result, used[0].shown))
+        result = fit_logs(
+            used, Np=Np, name=machine, progress=lambda words, done: advance(words, 0.87 * done), **parameters
+        )
+        built = result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
-        listed = {log_name: findings_table(one) for log_name, one in findings.items()}
+        listed = {log_name: findings_table(one) for log_name, one in result.findings.items()}
         written = {what: str(path) for what, path in files.items()}
-        print_json({**result.summary(), "advice": advice, "findings": listed, "files": written})
+        print_json({**result.results(), "advice": result.advice, "findings": listed, "files": written})
         return
-    _print_fit(result, used, findings)
-    console.print(f"\n{advice}")
+    _print_fit(result)
+    if built.untimed:
+        console.print(f"the FMU's steps are not timed: {built.untimed}")
+    console.print(f"\n{result.advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
-    again = _again(logs, out, Np, name, reading, known)
-    console.print("\n".join(next_steps(result, files, again, fmi)), soft_wrap=True, highlight=False)
+    given = {"out": out, "Np": Np, "name": name, **vars(reading)}
+    given |= {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
+    console.print("\n".join(_next_steps(result, files, _again(logs, given))), soft_wrap=True, highlight=False)
 
 
-def _again(
-    logs: Sequence[Path],
-    out: Path | None,
-    Np: int | None,
-    name: str | None,
-    reading: ReadingOptions,
-    known: Mapping[str, Any],
-) -> str:
-    """Return the command line of this fit, without its other outputs."""
-    given = {"out": out, "Np": Np, "name": name, **vars(reading), **known}
+def _again(logs: Sequence[Path], given: Mapping[str, Any]) -> str:
+    """Return the command line of this fit, with the options that are given."""
     words = ["hybridsep", "fit", *map(str, logs)]
     for option, value in given.items():
-        if value is True:
-            words.append(f"--{option}")
-        elif value:
-            words += [f"--{option}", str(value)]
+        if value:
+            words += [f"--{option}", *([] if value is True else [str(value)])]
     return shlex.join(words)
 
 
-def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
+def _print_fit(found: Fit) -> None:
     """Print what was read and what the checks found, what was identified and how it was judged."""
     import numpy as np
     from rich import box
@@ -133,35 +115,65 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
 
     from ..base.metrics import shown_figure
     from ..fitting.advice import extent
-    from ..fitting.compensation import tracking_lines
     from .console import console
 
-    unit, shown = logs[0].unit, logs[0].shown  # of all of them
-    factor, position = shown.position
-    for log in logs:
+    judged, model, settings = found.judged, found.identification, found.machine.predictor_settings
+    factor, position = judged.shown.position
+    for log in found.logs:
         travel = float(np.ptp(log.x_d))
-        stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
+        stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {log.unit} (--unit)"
         console.print(f"{log.path.name}: {extent([log])}, travel {factor * travel:.4g} {position}{stated}")
-    for name, of_log in findings.items():
+    for name, of_log in found.findings.items():
         for finding in of_log:
             console.print(f"{name}: {finding}")
-    scale, error = shown.error(found.judged.rms()[0])
-    model, settings = found.identification, found.machine.predictor_settings
+    scale, error = judged.unit
     table = Table("prediction by", title=f"Error on held-out samples [{error}]", box=box.SIMPLE, pad_edge=False)
     table.add_column("RMS", justify="right")
-    for one in found.judged.scored():
+    for one in judged.replay.scored():
         table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))
-    console.print(f"{model['structure']}, dead time {model['dead_time']} samples")
-    for line in model["findings"]:
+    console.print(f"{model.structure}, dead time {model.model.dead_time} samples")
+    for line in model.findings:
         console.print(f"  {line}")
     window = f"{1e3 * settings.Np * settings.T_s:.4g} ms"
     console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}")
     console.print(table)
-    console.print(str(found.judged.verdict()))
-    if found.untimed:
-        console.print(f"the FMU's steps are not timed: {found.untimed}")
-    for line in tracking_lines(found.tracking, logs[0].shown) if found.tracking else ():
+    console.print(str(judged.replay.verdict()))
+    for line in found.tracking.lines(judged.shown) if found.tracking else ():
         console.print(line)
+
+
+def _next_steps(found: Fit, files: Mapping[str, Path], again: str) -> list[str]:
+    """Return what to do after a fit that wrote ``files`` and is repeated by a line, as lines to paste."""
+    from ..fmi.archive import other_platforms
+
+    file, state = (shlex.quote(str(files[what])) for what in ("machine file", "trained predictor"))
+    limits = found.machine.drive_limits
+    lines = ["", "Next, to paste:"]
+    if found.machine.plant is None:
+        lines.append(f"  # no plant to try with: {found.plant.reason}")
+    else:
+        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
+        warm = f" --weights {state}" if found.plant.disturbed else ""
+        how = f" --compensate hybrid{warm}" if limits is not None else ""
+        what = "the compensated axis" if limits is not None else "prediction"
+        lines.append(f"  # {what}, on the identified model: to try with, results are optimistic")
+        lines += [f"  hybridsep cosim -m {file} --compensate off"] if limits is not None else []
+        lines += [
+            f"  hybridsep cosim -m {file}{how}",
+            "  # the same as one file for tools that read SSP",
+            f"  hybridsep system -m {file}{how}",
+        ]
+    if limits is not None and limits.estimated:
+        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
+        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
+        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
+        lines.append(f"  {again} {' '.join(known)}")
+    native = files.get("native FMU")
+    if native and (note := other_platforms(native, files["machine file"], files["trained predictor"])):
+        says, _, command = note.rpartition(": ")
+        lines += [f"  # {says}", f"  {command}"]
+    lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
+    return lines
 
 
 def identify(
@@ -256,7 +268,7 @@ def _print_identified(found: IdentifiedModel, title: str, shown: DisplayUnits) -
     table = Table(
         *("", "value", "± (1σ)", "unit"), title=f"{title}: {found.structure}, {found.input_hold}", box=box.SIMPLE
     )
-    for name, value, std, unit in shown_estimates(map(vars, found.parameters), shown):
+    for name, value, std, unit in shown_estimates(found.parameters, shown):
         table.add_row(name, f"{value:.7g}", deviation_words(std), "" if unit == "1" else unit)
     console.print(table)
     console.print(_structures(found, shown))

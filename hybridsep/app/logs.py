@@ -146,7 +146,7 @@ def report(
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
     from ..fitting.advice import Judged, extent, partly_used, recommendation, whole_log_words
-    from ..fitting.fit import SAMPLES_MAX, step_times
+    from ..fitting.build import SAMPLES_MAX, step_times
     from ..fitting.replay import Recording, knew, replay
     from ..fitting.report import write_errors, write_findings, write_use
     from ..fmi.weights import warm_predictor
@@ -171,7 +171,7 @@ def report(
         replayed = replay(predictor, recordings, progress=lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("peers", 0.8 + 0.1 * done))
         advance("time the FMU's steps", 0.95)
-        steps = {}
+        steps = None
         if fmu is not None:
             steps = step_times(fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
@@ -188,7 +188,7 @@ def report(
     write_errors(written, judged, "Errors of the replay", words)
     write_findings(written, [whole], {log.name: findings})
     if fmu is not None:
-        write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
+        write_use(written, fmu.name, steps, whole.T_s, settings.Np)
     written.write(page)
     for line in dict.fromkeys((partly_used(whole), recommendation(judged), words)):
         if line:

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import errno
 import io
+import math
 import os
 import stat
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-__all__ = ["COMMANDS", "DEFAULT_MACHINE", "data_folder", "named_errors", "written_text", "written_whole"]
+__all__ = ["COMMANDS", "DEFAULT_MACHINE", "data_folder", "named_errors", "plain", "written_text", "written_whole"]
 
 DEFAULT_MACHINE = "spring_mass_damper"
 """Machine file of the paper's staircase; its FMUs have no suffix."""
@@ -91,3 +93,14 @@ def written_text(path: str | Path) -> Iterator[IO[str]]:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         yield text
         text.detach()  # what is buffered goes to the file, which stays open
+
+
+def plain(value: Any) -> Any:
+    """Return records as plain values for JSON: fields by their names, None for a figure that is not finite."""
+    if is_dataclass(value):
+        return {one.name: plain(getattr(value, one.name)) for one in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

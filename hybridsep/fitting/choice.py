@@ -1,4 +1,4 @@
-"""Choice of the settings that online model averaging leaves open: the numbers of lags.
+"""Choice of the settings that online model averaging leaves open: the numbers of lags; a hint at a period.
 
 Windows of all that is tried are equally long: a shorter one is always predicted better, by holding the last residual
 best of all, so ``Np`` is the controller's look-ahead and is never chosen.
@@ -8,20 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.metrics import rms
+from ..base.metrics import rms, shown_figure
 from ..base.settings import PARAMETERS, PredictorSettings
+from ..identify.output_error import in_time
+from ..identify.periodic import residual_period
+from ..logs.units import DisplayUnits
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, replay
 
 __all__ = [
     "WORTH",
+    "Tried",
+    "WindowErrors",
     "choose_settings",
+    "period_finding",
     "settings_for",
     "settings_to_try",
     "trained_rms",
@@ -41,6 +47,29 @@ _Q = (1,)
 
 _WINDOWS = (0.2, 0.5, 1.0, 2.0)
 """Lengths of window over which the error is shown, relative to the controller's."""
+
+_GAIN = 0.9
+"""Ratio of the errors with and without a period below which it is worth a hint."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Settings that were tried: lags, and RMS of the hybrid as of :func:`trained_rms`, m, infinite if it diverged."""
+
+    p: int
+    q: int
+    rms_h: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class WindowErrors:
+    """RMS of physics model, hold and hybrid with windows of ``Np`` samples over the test samples, m."""
+
+    Np: int
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
 
 
 def settings_for(Np: int, T_s: float, input_hold: str) -> PredictorSettings:
@@ -68,8 +97,8 @@ def choose_settings(
     recordings: Sequence[Recording],
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
-) -> tuple[PredictorSettings, dict[PredictorSettings, float]]:
-    """Return the settings with the least error of causal replays over the training samples.
+) -> tuple[PredictorSettings, tuple[Tried, ...]]:
+    """Return the settings with the least error of causal replays over the training samples, and all that were tried.
 
     Parameters
     ----------
@@ -77,25 +106,21 @@ def choose_settings(
         ``G_pb``.
     recordings : sequence of Recording
     settings : PredictorSettings
-        The default, which stays unless others are better by 5 %.
+        The default, which is tried first, and stays unless others are better by 5 %.
     progress : callable, optional
         Called with the fraction done.
-
-    Returns
-    -------
-    chosen : PredictorSettings
-    tried : dict
-        All that was tried, the default first → :func:`trained_rms`, infinite where the prediction diverged.
     """
-    candidates, tried = settings_to_try(settings), {}
+    candidates, errors = settings_to_try(settings), []
     for i, candidate in enumerate(candidates):
         try:
-            tried[candidate] = trained_rms(model, candidate, recordings)
+            errors.append(trained_rms(model, candidate, recordings))
         except SignalError:  # it diverges
-            tried[candidate] = math.inf
+            errors.append(math.inf)
         progress((i + 1) / len(candidates))
-    best = min(candidates, key=lambda one: tried[one])
-    return (best if tried[best] < (1.0 - WORTH) * tried[settings] else settings), tried
+    best = min(range(len(errors)), key=errors.__getitem__)
+    chosen = best if errors[best] < (1.0 - WORTH) * errors[0] else 0
+    tried = [Tried(one.p, one.q, errors[i], i == chosen) for i, one in enumerate(candidates)]
+    return candidates[chosen], tuple(tried)
 
 
 def trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
@@ -120,7 +145,7 @@ def window_scores(
     settings: PredictorSettings,
     offset: float = 0.0,
     progress: Callable[[float], object] = lambda _done: None,
-) -> dict[int, list[float]]:
+) -> tuple[WindowErrors, ...]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
 
     Parameters
@@ -129,16 +154,46 @@ def window_scores(
         As for :func:`choose_settings`.
     offset : float
         As of :class:`~hybridsep.fitting.replay.Replay`, m.
-
-    Returns
-    -------
-    dict
-        ``Np`` → RMS of physics model, hold and hybrid over the test samples, m.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
-    scores = {}
+    scores = []
     for i, Np in enumerate(sizes):
         found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
-        scores[Np] = replace(found, offset=offset).rms()
+        scores.append(WindowErrors(Np, *replace(found, offset=offset).rms()))
         progress((i + 1) / len(sizes))
-    return scores
+    return tuple(scores)
+
+
+def period_finding(
+    model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, shown: DisplayUnits
+) -> str:
+    """Return that the residual repeats with the position, and what the predictor would gain by it, in words.
+
+    Empty where a period is given, nothing repeats in the training samples, or the predictor gains little by it.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``.
+    recordings : sequence of Recording
+    settings : PredictorSettings
+    shown : DisplayUnits
+        Units of the words.
+    """
+    late = settings.n_late
+    training = [in_time(*one.training, late) for one in recordings if one.n_train > late + 1]
+    if settings.period or not training:
+        return ""
+    period = residual_period(training, model, settings.T_s, settings.input_hold)
+    if period == 0.0 or period > PARAMETERS["period"].maximum:
+        return ""
+    without, with_it = (trained_rms(model, one, recordings) for one in (settings, replace(settings, period=period)))
+    if not with_it < _GAIN * without:
+        return ""
+    factor, position = shown.position
+    scale, unit = shown.error(without)
+    return (
+        f"the residual repeats every {factor * period:.6g} {position}: with --period {period:g} the hybrid's error "
+        f"would go from {shown_figure(scale * without)} to {shown_figure(scale * with_it)} {unit}, by replays of the "
+        "training half"
+    )

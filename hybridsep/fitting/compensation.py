@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from ..base.errors import ParameterError, SignalError
 from ..base.metrics import peak_derivatives, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
-from ..evaluate.report import Report
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from .replay import Recording
@@ -22,12 +21,11 @@ __all__ = [
     "LIMITS_WORDS",
     "MARGINS",
     "PHYSICS_ALONE",
+    "Tracking",
     "binding_words",
     "drive_limits",
     "estimated_limits",
     "expected_tracking",
-    "tracking_lines",
-    "write_tracking",
 ]
 
 COMPENSATE = "physics"
@@ -98,25 +96,58 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
     return {**found, "estimated": True}
 
 
+@dataclass(frozen=True)
+class Tracking:
+    """Tracking errors to be expected: RMS of commanded minus measured position over the test samples, m.
+
+    Attributes
+    ----------
+    none : float or None
+        As measured; None without a test sample.
+    physics, hybrid : float or None
+        Estimates with each model; None where a plan diverges, too.
+    limits : mapping
+        Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
+    change_max : float
+        Largest change of the command, m.
+    """
+
+    none: float | None
+    physics: float | None
+    hybrid: float | None
+    limits: Mapping[str, Mapping[str, float]]
+    change_max: float | None
+
+    def lines(self, shown: DisplayUnits) -> list[str]:
+        """Return the errors in words, what binds them and, last, how they came about."""
+
+        def figure(value: float | None) -> str:
+            return "not known" if value is None else shown.words(value, ".4g")
+
+        return [
+            f"Tracking error (commanded minus measured, RMS): {figure(self.none)} as recorded; with the compensator "
+            f"about {figure(self.hybrid)} by the hybrid (compensate = hybrid), and about {figure(self.physics)} by the "
+            f"physics model (compensate = {COMPENSATE}), with which the FMU starts.",
+            PHYSICS_ALONE,
+            f"change_max is {figure(self.change_max)}. {binding_words(self.limits.get('hybrid', {}))}",
+            _HOW,
+        ]
+
+
 def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
-) -> dict[str, Any]:
-    """Return the RMS of commanded minus measured position over the test samples, m, and which limits bind.
-
-    ``none`` is measured, ``physics`` and ``hybrid`` are estimates with each model; None where a plan diverges.
-    ``limits`` has the shares of :func:`~hybridsep.compensate.expected.limits_that_bind` by model.
-    """
+) -> Tracking:
+    """Return the tracking errors to be expected with and without a machine's compensator, and which limits bind."""
     settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
     pairs = [(one.x_d, one.x) for one in recordings]
     firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
-    found: dict[str, Any] = {}
+    found: dict[str, float | None] = {}
     bound: dict[str, dict[str, float]] = {}
     for i, model in enumerate(("physics", "hybrid")):
         compensator = replace(machine.compensator_settings, compensate=model)
         try:
             expected = list(expected_errors(machine.model, settings, compensator, pairs))
         except SignalError:
-            found[model] = None
             continue
         parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(expected, firsts, strict=True)]
         judged = Expected(*map(np.concatenate, zip(*parts, strict=True)))
@@ -126,25 +157,8 @@ def expected_tracking(
         if len(judged.x_d):
             bound[model] = limits_that_bind(judged.x_d, judged.x_dm, settings.T_s, compensator)
         progress((i + 1) / 2)
-    return {**found, "limits": bound, "change_max": machine.compensator_settings.change_max}
-
-
-def tracking_lines(tracking: Mapping[str, Any], shown: DisplayUnits) -> list[str]:
-    """Return the expected tracking errors in words, what binds them and how they came about."""
-
-    def figure(name: str) -> str:
-        value = tracking.get(name)
-        return "not known" if value is None else shown.words(value, ".4g")
-
-    return [
-        f"Tracking error (commanded minus measured, RMS): {figure('none')} as recorded; with the compensator about "
-        f"{figure('hybrid')} by the hybrid (compensate = hybrid), and about {figure('physics')} by the physics model "
-        f"(compensate = {COMPENSATE}), with which the FMU starts.",
-        PHYSICS_ALONE,
-        f"change_max is {shown.words(tracking['change_max'], '.4g')}. "
-        + binding_words(tracking["limits"].get("hybrid", {})),
-        _HOW,
-    ]
+    none, physics, hybrid = (found.get(name) for name in ("none", "physics", "hybrid"))
+    return Tracking(none, physics, hybrid, bound, machine.compensator_settings.change_max)
 
 
 def binding_words(shares: Mapping[str, float]) -> str:
@@ -153,13 +167,3 @@ def binding_words(shares: Mapping[str, float]) -> str:
     if not each:
         return "No limit binds the compensated command."
     return f"Limits bind the compensated command: {each} of the samples; within larger ones less error would be left."
-
-
-def write_tracking(report: Report, tracking: Mapping[str, Any], shown: DisplayUnits) -> None:
-    """Write the section on compensation, where there are limits."""
-    if tracking:
-        report.heading("Compensation")
-        *lines, how = tracking_lines(tracking, shown)
-        for line in lines:
-            report.paragraph(line)
-        report.paragraph(how, "dim")

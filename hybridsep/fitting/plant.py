@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from ..model.physics import ModalModel, Mode
 from ..plants.stage_drive import StageDrive
 from .replay import Recording
 
-__all__ = ["commands_to_try", "identified_plant", "plant_words"]
+__all__ = ["IdentifiedPlant", "commands_to_try", "identified_plant"]
 
 _FITTED = 2 / 3
 """Share of the training samples that the fit takes; the others choose."""
@@ -55,6 +55,41 @@ _MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
 
 _SMALLEST_SPREAD = 1e-3
 """Least velocity over which friction changes sign, relative to the largest commanded one."""
+
+
+@dataclass(frozen=True)
+class IdentifiedPlant:
+    """Plant of a fit.
+
+    Attributes
+    ----------
+    entries : mapping
+        Of the section ``[plant]`` of a machine file.
+    rms, rms_pb : float or None
+        RMS of what was measured less the plant and less the physics model, over the test samples, without their offset,
+        m; None where there are none.
+    reason : str
+        Why there is no plant to this model, empty if there is one.
+    """
+
+    entries: Mapping[str, Any]
+    rms: float | None = None
+    rms_pb: float | None = None
+    reason: str = ""
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether it has the friction and the stiffness of the log."""
+        return "mode" in self.entries
+
+    def words(self, shown: DisplayUnits) -> str:
+        """Return what the plant is, and how far it follows the log, in words."""
+        words = "the identified model "
+        words += "refitted with the friction and stiffness of the log" if self.disturbed else "alone"
+        if self.rms is not None and self.rms_pb is not None:
+            words += f"; it follows the held-out half to {shown.words(self.rms)} RMS"
+            words += f" (physics model {shown.words(self.rms_pb)})" if self.disturbed else ""
+        return f"{words}. A plant to try with, no measurement: results on it are optimistic"
 
 
 class _Disturbed(NamedTuple):
@@ -107,8 +142,8 @@ class _Piece:
 
 def identified_plant(
     model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording], fitted: Sequence[Recording]
-) -> dict[str, Any]:
-    """Return the plant of a fit as plain values.
+) -> IdentifiedPlant:
+    """Return the plant of a fit.
 
     Parameters
     ----------
@@ -120,18 +155,11 @@ def identified_plant(
         Which choose, and judge.
     fitted : sequence of Recording
         What it is fitted to: they, or their beginnings.
-
-    Returns
-    -------
-    dict
-        ``entries`` of the section ``[plant]``; ``rms`` and ``rms_pb``, m, RMS of what was measured less the plant and
-        less the physics model, over the test samples, without their offset, None where there are none; ``reason``
-        why there is no plant to this model, empty if there is one.
     """
     try:
         StageDrive(model, T_s=settings.T_s, input_hold=settings.input_hold)
     except ParameterError as error:
-        return {"entries": {}, "rms": None, "rms_pb": None, "reason": str(error)}
+        return IdentifiedPlant({}, reason=str(error))
     discrete = model.discretise(settings.T_s, settings.input_hold)
     pieces, begun = (
         [_Piece(discrete, one, settings.n_late) for one in given if len(one.x_d) > 1] for given in (recordings, fitted)
@@ -146,17 +174,7 @@ def identified_plant(
     chosen = candidates[best]
     entries = {**(chosen.entries() if best else {}), "noise_std": float(f"{_noise(settings, chosen, pieces):.3g}")}
     rms_pb, rms_plant = (_rms_of(settings, one, pieces, "judging") for one in (alone, chosen))
-    return {"entries": entries, "rms": rms_plant, "rms_pb": rms_pb, "reason": ""}
-
-
-def plant_words(plant: Mapping[str, Any], shown: DisplayUnits) -> str:
-    """Return what the plant is, and how far it follows the log, in words."""
-    disturbed = "mode" in plant["entries"]
-    words = "the identified model " + ("refitted with the friction and stiffness of the log" if disturbed else "alone")
-    if plant["rms"] is not None:
-        words += f"; it follows the held-out half to {shown.words(plant['rms'], '.3g')} RMS"
-        words += f" (physics model {shown.words(plant['rms_pb'], '.3g')})" if disturbed else ""
-    return f"{words}. A plant to try with, no measurement: results on it are optimistic"
+    return IdentifiedPlant(entries, rms_plant, rms_pb)
 
 
 def commands_to_try(recordings: Sequence[Recording]) -> Array:

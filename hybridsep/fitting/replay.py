@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.metrics import largest, rms
+from ..base.metrics import largest, rms, rms_ratio
 from ..base.signals import Array, Indices
 from ..cosim.run import Run
 from ..evaluate.backtest import Backtest, Batch, backtest, replayed_run
@@ -22,6 +22,7 @@ from ..predict.predictor import HybridPredictor
 
 __all__ = [
     "PREDICTIONS",
+    "Judgement",
     "LogReplay",
     "Recording",
     "Replay",
@@ -141,6 +142,35 @@ class Scored:
     def rms(self) -> float:
         """RMS of the errors, m; infinite where it diverged, NaN without a measurement."""
         return math.inf if self.diverged else _rms(self.errors)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Figures of a replay over the test samples.
+
+    Attributes
+    ----------
+    rms_pb, rms_hold, rms_h : float
+        RMS of physics model, hold and hybrid, m.
+    peers : mapping
+        Name of a peer → its RMS, m, or ``"diverged"``.
+    best : str
+        Best of physics model, hold and peers.
+    ratio : float
+        The hybrid's RMS relative to its.
+    n_windows : int
+    verdict : str
+        In words.
+    """
+
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+    peers: Mapping[str, float | str]
+    best: str
+    ratio: float
+    n_windows: int
+    verdict: str
 
 
 @dataclass(frozen=True)
@@ -267,6 +297,14 @@ class Replay:
         for x_d, x, predictions, _ in self._windows(peers):
             tally.add(x_d, x, predictions)
         return tally.verdict()
+
+    def judgement(self) -> Judgement:
+        """Return the figures; the physics model is judged with the offset, which the FMU's ``x_pb`` has not."""
+        scored, verdict, best = self.scored(), self.verdict(), self.best()
+        rms_pb, rms_hold, rms_h = self.rms()
+        peers: dict[str, float | str] = {one.name: "diverged" if one.diverged else one.rms for one in scored[2:-1]}
+        ratio = rms_ratio(rms_h, best.rms, self.least)
+        return Judgement(rms_pb, rms_hold, rms_h, peers, best.name, ratio, verdict.n_windows, str(verdict))
 
     def _predictions(self) -> list[list[Array]]:
         """Return what each of :data:`PREDICTIONS` is judged by, of each recording, ``(n,)``, m."""

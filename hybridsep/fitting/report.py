@@ -1,105 +1,50 @@
-"""Report of ``hybridsep fit``: what was found, how good and how sure it is, and how to use it."""
+"""Sections of the reports of a fit and of a replay: how good, how sure, what was found, and how to use it."""
 
 from __future__ import annotations
 
 import math
-import shlex
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.signal import welch
 
 from ..base.metrics import coverage, rms_ratio
-from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
-from ..fmi.archive import other_platforms
-from ..identify.model import deviation_words, shown_estimates
-from ..identify.operation import TOO_LITTLE
+from ..identify.model import IdentifiedModel, deviation_words, shown_estimates
 from ..logs.checks import Finding
 from ..logs.log import Log
-from ..logs.units import DisplayUnits
-from .advice import Judged, extent, peers_in_words, recommendation
-from .choice import WORTH
-from .compensation import write_tracking
-from .fit import Fit
-from .period import REPEATS
+from .advice import Judged, peers_in_words
+from .build import StepTimes
+from .choice import WORTH, Tried, WindowErrors
 
 __all__ = [
-    "COLOURS",
-    "NAMES",
-    "fit_report",
-    "judged_by",
-    "next_steps",
     "write_errors",
     "write_findings",
+    "write_identification",
+    "write_other_windows",
+    "write_settings",
+    "write_tracking",
     "write_use",
 ]
 
-_SETTLING = (
-    " The window after a gap is no test window: no model knows the state of the axis there; a controller has no gaps."
-)
+_NAMES = ("physics model", "hold the last residual", "hybrid")
+"""Names of :data:`~hybridsep.fitting.replay.PREDICTIONS`."""
+
+_COLOURS = (PHYSICS, HOLD, HYBRID)
+"""Their colours."""
+
+_COMMAND = "#1d2733"
 
 
-def judged_by(fit: Fit, shown: DisplayUnits) -> Judged:
-    """Return the replay that judges a fit as it is reported, in the units of its logs."""
-    period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
-    return Judged(
-        *(fit.judged, fit.machine.T_s, shown, "the log's second half"),
-        share=1.0 - fit.share,
-        period=period,
-        unidentified=any(one.startswith(TOO_LITTLE) for one in fit.identification["findings"]),
-    )
-
-
-def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:
-    """Return the report.
-
-    Parameters
-    ----------
-    fit : Fit
-    logs : sequence of Log
-        As they were used.
-    findings : mapping
-        Log's name → findings of its checks.
-    """
-    T_s, Np = fit.machine.T_s, fit.judged.Np
-    judged = judged_by(fit, logs[0].shown)
-    report = Report(
-        f"Axis {fit.machine.name}: from its log to its FMU",
-        f"{', '.join(log.path.name for log in logs)} · {extent(logs)} · look-ahead "
-        f"{Np} samples, {1e3 * Np * T_s:.4g} ms",
-    )
-    report.paragraph(recommendation(judged), "verdict")
-    write_errors(
-        report,
-        judged,
-        "Tested on held-out samples",
-        "The first half of each log trained the physics model and chose the settings; these are the errors of the "
-        "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in fit.judged.recordings) else ""),
-    )
-    _write_other_windows(report, fit, judged)
-    write_findings(report, logs, findings)
-    _write_identification(report, fit, judged)
-    _write_settings(report, fit, judged)
-    write_tracking(report, fit.tracking, judged.shown)
-    fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
-    if fmus:
-        write_use(report, fmus, fit.steps, T_s, Np)
-        report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
-    return report
-
-
-def _write_other_windows(report: Report, fit: Fit, judged: Judged) -> None:
+def write_other_windows(report: Report, windows: Sequence[WindowErrors], judged: Judged) -> None:
+    """Write the errors with shorter and longer windows than the controller's."""
     report.heading("Errors with other look-aheads")
     scale, unit = judged.unit
-    windows = np.array(
-        [[one[name] for name in ("Np", "rms_pb", "rms_hold", "rms_h")] for one in fit.windows], np.float64
-    )
-    lengths = 1e3 * judged.T_s * windows[:, 0]
-    lines = [Line(name, lengths, scale * windows[:, 1 + i], COLOURS[i]) for i, name in enumerate(NAMES)]
-    lines += [Line("", lengths, scale * windows[:, 3], HYBRID, points=True)]
+    lengths = 1e3 * judged.T_s * np.array([one.Np for one in windows])
+    errors = scale * np.array([(one.rms_pb, one.rms_hold, one.rms_h) for one in windows])
+    lines = [Line(name, lengths, errors[:, i], _COLOURS[i]) for i, name in enumerate(_NAMES)]
+    lines += [Line("", lengths, errors[:, 2], HYBRID, points=True)]
     report.chart(
         Chart(
             "look-ahead Np·T_s [ms]",
@@ -110,47 +55,48 @@ def _write_other_windows(report: Report, fit: Fit, judged: Judged) -> None:
     )
 
 
-def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
+def write_identification(report: Report, found: IdentifiedModel, judged: Judged) -> None:
+    """Write the physics model: its structure, parameters, the structures that were tried, and findings."""
     scale, unit = judged.unit
-    found = fit.identification
     report.heading("Physics model")
     report.paragraph(
-        f"{found['structure']}, {'zero' if found['input_hold'] == 'zoh' else 'first'}-order hold, dead time "
-        f"{found['dead_time']} samples."
+        f"{found.structure}, {'zero' if found.input_hold == 'zoh' else 'first'}-order hold, dead time "
+        f"{found.model.dead_time} samples."
     )
-    if found["parameters"]:
+    if found.parameters:
         rows = [
             [name, f"{value:.6g}", deviation_words(std, "± "), unit]
-            for name, value, std, unit in shown_estimates(found["parameters"], judged.shown)
+            for name, value, std, unit in shown_estimates(found.parameters, judged.shown)
         ]
         report.table(["parameter", "value", "standard deviation", "unit"], rows)
-    if found["alternatives"]:
+    if found.alternatives:
         rows = [
             [
-                other["name"],
-                str(other["n_parameters"]),
-                f"{scale * other['rms_fitted']:.4g}",
-                f"{scale * other['rms_held_out']:.4g}",
-                other["objection"] or ("chosen" if other["name"] == found["structure"] else ""),
+                other.name,
+                str(other.n_parameters),
+                f"{scale * other.rms_fitted:.4g}",
+                f"{scale * other.rms_held_out:.4g}",
+                other.objection or ("chosen" if other.name == found.structure else ""),
             ]
-            for other in found["alternatives"]
+            for other in found.alternatives
         ]
         report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
         report.paragraph("RMS of the simulated position within the training half.", "dim")
-    report.bullets(found["findings"])
+    report.bullets(found.findings)
 
 
-def _write_settings(report: Report, fit: Fit, judged: Judged) -> None:
+def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> None:
+    """Write the settings that were tried."""
     scale, unit = judged.unit
     report.heading("Settings")
     rows = [
         [
-            str(one["p"]),
-            str(one["q"]),
-            "diverged" if one["rms_h"] is None else f"{scale * one['rms_h']:.4g}",
-            "chosen" if one["chosen"] else "",
+            str(one.p),
+            str(one.q),
+            f"{scale * one.rms_h:.4g}" if math.isfinite(one.rms_h) else "diverged",
+            "chosen" if one.chosen else "",
         ]
-        for one in fit.choice
+        for one in choice
     ]
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
@@ -160,13 +106,12 @@ def _write_settings(report: Report, fit: Fit, judged: Judged) -> None:
     )
 
 
-NAMES = ("physics model", "hold the last residual", "hybrid")
-"""Names of :data:`~hybridsep.fitting.replay.PREDICTIONS`."""
-
-COLOURS = (PHYSICS, HOLD, HYBRID)
-"""Their colours."""
-
-_COMMAND = "#1d2733"
+def write_tracking(report: Report, lines: Sequence[str]) -> None:
+    """Write the tracking errors to be expected, in words, the last line being how they came about."""
+    report.heading("Compensation")
+    for line in lines[:-1]:
+        report.paragraph(line)
+    report.paragraph(lines[-1], "dim")
 
 
 def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
@@ -220,8 +165,8 @@ def _write_time(report: Report, judged: Judged) -> None:
     factor, position = judged.shown.position
     lines = [Line("command", t, factor * replay.commands(), _COMMAND)]
     within = coverage(errors[2], std, 0.95)
-    for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
-        if name != NAMES[1]:
+    for name, row, colour in zip(_NAMES, errors, _COLOURS, strict=True):
+        if name != _NAMES[1]:
             lines.append(Line(name, t, row, colour, panel=1))
     half = np.minimum(1.96 * std, 1.2 * np.nanmax(np.abs(errors)))  # at first it may be far wider than any error
     lines.append(Line("95 % interval of the hybrid", t, -half, HYBRID, upper=half, panel=1))
@@ -244,7 +189,7 @@ def _write_windows(report: Report, judged: Judged) -> None:
     t = np.repeat(judged.T_s * np.append(begins, len(judged.replay.commands())), 2)[1:-1]
     lines = [
         Line(name, t, scale * np.repeat(row, 2), colour)
-        for name, row, colour in zip(NAMES, errors, COLOURS, strict=True)
+        for name, row, colour in zip(_NAMES, errors, _COLOURS, strict=True)
     ]
     worse = int((errors[2] > errors[0]).sum())
     report.chart(
@@ -262,7 +207,7 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     scale, unit = judged.unit
     horizon = scale * judged.replay.horizon()
     ahead = 1e3 * judged.T_s * np.arange(1, judged.replay.Np + 1)
-    lines = [Line(name, ahead, row, colour) for name, row, colour in zip(NAMES, horizon, COLOURS, strict=True)]
+    lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
     report.chart(
         Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, "How the error grows from the window's first sample on.")
     )
@@ -276,7 +221,7 @@ def _write_spectra(report: Report, judged: Judged) -> None:
         return
     f, power = welch(errors, 1.0 / judged.T_s, nperseg=min(2048, errors.shape[1]))
     amplitude: Array = scale * np.sqrt(power)
-    lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(NAMES, amplitude, COLOURS, strict=True)]
+    lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
     report.heading("Spectra of the errors")
     report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
 
@@ -303,26 +248,15 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
             report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
 
 
-def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float, Np: int) -> None:
-    """Write how FMUs are used, and how long a step of the first takes.
+def write_use(report: Report, fmu: str, steps: StepTimes | None, T_s: float, Np: int) -> None:
+    """Write how the FMU of a predictor in a file of that name is used, and how long its steps take, where it is known.
 
-    Parameters
-    ----------
-    report : Report
-    fmus : iterable of str
-        Names of their files.
-    steps : mapping
-        As of :func:`~hybridsep.fitting.fit.step_times`.
-    T_s : float
-        Sampling interval, s.
-    Np : int
-        Samples of the look-ahead.
+    ``T_s`` is the sampling interval, s, ``Np`` the samples of the look-ahead.
     """
-    names = list(fmus)
     report.heading("Use it")
-    if steps:
-        report.paragraph(_times(names[0], steps, T_s))
-    report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
+    if steps is not None:
+        report.paragraph(_times(fmu, steps, T_s))
+    report.code(_REPLAY.format(fmu=fmu, T_s=T_s, Np=Np))
     report.paragraph(
         f"In a simulation tool: co-simulation with a step of {T_s:g} s. x_d_ahead is the trajectory, as many samples "
         "early as the look-ahead is long; wire x_d to the drive, and its measured position to x_meas: the FMU is the "
@@ -336,12 +270,12 @@ _LATE = (
 """What is added where steps do not fit into the sampling interval."""
 
 
-def _times(fmu: str, steps: Mapping[str, float], T_s: float) -> str:
+def _times(fmu: str, steps: StepTimes, T_s: float) -> str:
     """Return how long steps took, in words, and whether they are too long."""
-    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
+    late = "" if max(steps.median, steps.p99_9) <= T_s else _LATE
     return (
-        f"Through Python on this machine a step of {fmu} took {_duration(steps['median'])} (median; 99.9 % at most "
-        f"{_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
+        f"Through Python on this machine a step of {fmu} took {_duration(steps.median)} (median; 99.9 % at most "
+        f"{_duration(steps.p99_9)}; the largest {_duration(steps.largest)}, interruptions by the operating "
         f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
     )
 
@@ -364,52 +298,3 @@ result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], output_interval={T
 def _duration(seconds: float) -> str:
     """Return a duration in ms, or in µs if it is shorter."""
     return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"
-
-
-def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> list[str]:
-    """Return what to do after a fit, as lines to paste.
-
-    Parameters
-    ----------
-    found : Fit
-    files : mapping
-        Of :func:`~hybridsep.fitting.fit.fit_files`.
-    again : str
-        Command line of this fit.
-    fmi : str
-        Version of its FMUs.
-    """
-    machine = found.machine
-    file, state = shlex.quote(str(files["machine file"])), shlex.quote(str(files["trained predictor"]))
-    lines = ["", "Next, to paste:"]
-
-    def step(says: str, *commands: str) -> None:
-        lines.extend([f"  # {says}", *(f"  hybridsep {command}" for command in commands)])
-
-    limits = machine.drive_limits
-    if machine.plant is None:
-        lines.append(f"  # no plant to try with: {found.plant.get('reason', '')}")
-    elif limits is not None:
-        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
-        warm = f" --weights {state}" if "mode" in found.plant["entries"] else ""
-        step(
-            "the compensated axis, on the identified model: to try with, results are optimistic",
-            f"cosim -m {file} --compensate off",
-            f"cosim -m {file} --compensate hybrid{warm}",
-        )
-        step("the same as one file for tools that read SSP", f"system -m {file} --compensate hybrid{warm}")
-    else:
-        step("prediction, on the identified model: to try with, results are optimistic", f"cosim -m {file}")
-        step("the same as one file for tools that read SSP", f"system -m {file}")
-    if limits is not None and limits.estimated:
-        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
-        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
-        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
-        lines.append(f"  {again} {' '.join(known)}")
-    native = next((path for what, path in files.items() if what.startswith("native FMU")), None)
-    note = other_platforms(native, files["machine file"], files["trained predictor"], fmi) if native else ""
-    if note:
-        says, _, command = note.rpartition(": ")
-        lines += [f"  # {says}", f"  {command}"]
-    lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
-    return lines

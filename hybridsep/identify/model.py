@@ -147,10 +147,8 @@ def deviation_words(std: float, sign: str = "") -> str:
     return f"{sign}{std:.2g}" if std > 0 else "fixed"
 
 
-def shown_estimates(
-    parameters: Iterable[Mapping[str, Any]], shown: DisplayUnits
-) -> Iterator[tuple[str, float, float, str]]:
+def shown_estimates(parameters: Iterable[Estimate], shown: DisplayUnits) -> Iterator[tuple[str, float, float, str]]:
     """Yield name, value, standard deviation and unit of parameters; positions in the units of their log."""
     for one in parameters:
-        factor, unit = shown.error(abs(one["value"])) if one["unit"] in ("m", "rad") else (1.0, str(one["unit"]))
-        yield str(one["name"]), factor * one["value"], factor * one["std"], unit
+        factor, unit = shown.error(abs(one.value)) if one.unit in ("m", "rad") else (1.0, one.unit)
+        yield one.name, factor * one.value, factor * one.std, unit

@@ -19,14 +19,11 @@ from staircase_data import commanded, measured
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import FmuError, LogError, ParameterError
 from hybridsep.cosim.adapters import FmuController
-from hybridsep.fitting import fit as fitting
-from hybridsep.fitting.advice import recommendation
-from hybridsep.fitting.fit import Fit, FitOptions, fit, fit_files, sha256_of
+from hybridsep.fitting import build
+from hybridsep.fitting.build import Built, StepTimes, fit_files, sha256_of
+from hybridsep.fitting.fit import Fit, fit
 from hybridsep.fitting.replay import replay, split_log
-from hybridsep.fitting.report import fit_report, judged_by
 from hybridsep.fmi.extras import RESOURCE_DATA_FILE
-from hybridsep.logs.checks import checked
-from hybridsep.logs.units import shown_in
 from hybridsep.machines.machine import machine_name
 
 N = 3000
@@ -40,35 +37,37 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def fitted(log: Path) -> Fit:
-    out = log.parent / "out"
-    out.mkdir()
-    return fit([read_log(log)], out, FitOptions(NP, "axis"))
+    return fit(read_log(log), Np=NP)
+
+
+@pytest.fixture(scope="module")
+def built(fitted: Fit, log: Path) -> Built:
+    return fitted.build(log.parent / "out")
 
 
 @pytest.mark.slow
-def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, log: Path) -> None:
-    machine = load_machine(log.parent / "out" / "machine.toml")
+def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, built: Built, log: Path) -> None:
+    machine = load_machine(built.files["machine file"])
     assert machine == fitted.machine
     found = read_log(log)
     by_hand = replay(machine.new_predictor(), split_log([(found.x_d, found.x_meas)], 0.5))
-    assert fitted.judged.rms()[1:] == by_hand.rms()[1:]
-    assert replace(by_hand, offset=fitted.identification["offset"]).rms() == fitted.judged.rms()
+    assert fitted.judged.replay.rms()[1:] == by_hand.rms()[1:]
+    assert replace(by_hand, offset=fitted.identification.offset).rms() == fitted.judged.replay.rms()
     rms_pb, rms_hold, rms_h = by_hand.rms()
     assert rms_h < 0.6 * min(rms_pb, rms_hold)
     assert rms_h < 12e-6  # noise is 5 µm
 
 
-def test_the_fmus_begin_with_what_was_learned_from_the_log(fitted: Fit, log: Path) -> None:
-    found, trained = read_log(log), HybridPredictor.load(log.parent / "out" / "trained.state")
+def test_the_fmus_begin_with_what_was_learned_from_the_log(built: Built, log: Path) -> None:
+    found, trained = read_log(log), HybridPredictor.load(built.files["trained predictor"])
     trained.restart()
     x_d, x = found.x_d[: 6 * NP], found.x_meas[: 6 * NP]
     expected = []
     for i in range(0, len(x_d), NP):
         expected.append(trained.predict(x_d[i : i + NP]).x_h)
         trained.update(x[i : i + NP])
-    fmus = [path for path in fitted.files if path.suffix == ".fmu"]
-    assert len(fmus) == 2
-    for path in fmus:
+    assert len(built.fmus) == 2
+    for path in built.fmus:
         controller = FmuController(path, {}, 0.0)
         x_h = []
         with controller:
@@ -81,10 +80,12 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(fitted: Fit, log: Pat
         np.testing.assert_allclose(x_h[NP:], np.concatenate(expected), rtol=0, atol=1e-9)
 
 
-def test_the_fmus_name_the_log_the_settings_and_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
+def test_the_fmus_name_the_log_the_settings_and_the_figures(
+    fitted: Fit, built: Built, log: Path, tmp_path: Path
+) -> None:
     """By SRMD of SSP Traceability, so that whoever gets an FMU alone can find the log that it is from."""
-    results = json.loads((log.parent / "out" / "fit.json").read_text(encoding="utf-8"))
-    for path in (path for path in fitted.files if path.suffix == ".fmu"):
+    results = json.loads(built.files["results"].read_text(encoding="utf-8"))
+    for path in built.fmus:
         with zipfile.ZipFile(path) as archive:
             root = ElementTree.fromstring(archive.read(RESOURCE_DATA_FILE))
         entries = {entry.get("keyword"): entry.text for entry in root.iter() if entry.get("keyword")}
@@ -108,7 +109,7 @@ def test_a_fit_is_whole_where_no_library_can_be_loaded(
     def refused(*_arguments: object) -> None:
         raise FmuError("HybridPredictor_axis.fmu cannot be loaded: failed to map segment from shared object")
 
-    monkeypatch.setattr(fitting, "FmuController", refused)
+    monkeypatch.setattr(build, "FmuController", refused)
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
     assert status == 0, err
     assert "the FMU's steps are not timed: HybridPredictor_axis.fmu cannot be loaded" in " ".join(out.split())
@@ -117,48 +118,43 @@ def test_a_fit_is_whole_where_no_library_can_be_loaded(
     assert "Through Python on this machine" not in page
 
 
-def test_step_times_are_of_the_steps(fitted: Fit) -> None:
-    assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
+def test_step_times_are_of_the_steps(built: Built) -> None:
+    assert built.steps is not None
+    assert 0.0 < built.steps.median <= built.steps.p99_9 <= built.steps.largest
 
 
 @pytest.mark.slow
-def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
-    used, findings = [read_log(log)], {"axis.csv": checked(read_log(log))}
-    fit_report(fitted, used, findings).write(tmp_path / "report.html")
-    advice = recommendation(judged_by(fitted, shown_in("m")))
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, built: Built, tmp_path: Path) -> None:
+    advice = fitted.advice
+    page = built.files["report"].read_text(encoding="utf-8")
     others = "ARX40 (refitted), the best of the others"
     assert advice == f"Use the hybrid: its error is 0.98 × the error of {others}, judged by 30 windows."
     assert advice in page
-    assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
+    assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.replay.rms())
     assert "HybridPredictor_axis.fmu" in page
     assert page.count('<div id="chart') == 5
-    estimated = {one["name"]: one["std"] > 0 for one in fitted.identification["parameters"]}
+    estimated = {one.name: one.std > 0 for one in fitted.identification.parameters}
     assert not estimated["gain"]
     for name, free in estimated.items():
         row = page.partition(f"<td>{name}</td>")[2].partition("</tr>")[0]
         assert ("± " in row) == free
         assert ("<td>fixed</td>" in row) != free
-    slow = dict.fromkeys(fitted.steps, 2e-3)
-    fit_report(replace(fitted, steps=slow), used, findings).write(tmp_path / "slow.html")
+    fitted.report(tmp_path / "slow.html", replace(built, steps=StepTimes(2e-3, 2e-3, 2e-3)))
     assert "would overrun" in (tmp_path / "slow.html").read_text(encoding="utf-8")
 
 
-def test_the_reports_script_replays_a_log(
-    fitted: Fit, log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    used = [read_log(log)]
-    fit_report(fitted, used, {}).write(tmp_path / "report.html")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_the_reports_script_replays_a_log(fitted: Fit, built: Built, monkeypatch: pytest.MonkeyPatch) -> None:
+    [log] = fitted.logs
+    page = built.files["report"].read_text(encoding="utf-8")
     script = unescape(page.partition("<pre>")[2].partition("</pre>")[0])
-    monkeypatch.chdir(log.parent / "out")
-    names: dict[str, Any] = {"x_d": used[0].x_d, "x_meas": used[0].x_meas}
+    monkeypatch.chdir(built.files["report"].parent)
+    names: dict[str, Any] = {"x_d": log.x_d, "x_meas": log.x_meas}
     exec(script, names)  # what a user copies
     result = names["result"][NP:]
-    assert len(result) == len(used[0].x_d)
-    np.testing.assert_allclose(result["x_d"], used[0].x_d, rtol=0, atol=1e-15)
-    error = used[0].x_meas - result["x_h"]
-    assert np.sqrt(np.mean(error**2)) < 1.2 * fitted.judged.rms()[2]
+    assert len(result) == len(log.x_d)
+    np.testing.assert_allclose(result["x_d"], log.x_d, rtol=0, atol=1e-15)
+    error = log.x_meas - result["x_h"]
+    assert np.sqrt(np.mean(error**2)) < 1.2 * fitted.judged.replay.rms()[2]
 
 
 @pytest.mark.slow
@@ -169,8 +165,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 0, err
     result = json.loads(out)
     assert result["findings"] == {"my axis.csv": []}
-    assert result["settings"]["Np"] == 40
-    assert [one["Np"] for one in result["over_Np"]] == [8, 20, 40, 80]
+    assert [one["Np"] for one in result["windows"]] == [8, 20, 40, 80]
     assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
     assert load_machine(tmp_path / "fit" / "machine.toml").name == "my_axis"
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
@@ -196,23 +191,12 @@ def test_a_flipped_sign_is_refused(hybridsep: Run, tmp_path: Path) -> None:
     assert "axis.csv: sign: the measured position moves opposite to the command" in err
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("quick_fit")
-def test_a_log_that_cannot_train_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
-    used = [read_log(log)]
+def test_a_log_without_motion_is_refused(log: Path) -> None:
+    still = replace(read_log(log), x_d=np.full(N, 0.1))
     with pytest.raises(
-        LogError, match=r"still.csv: no motion: the commanded position never changes: an axis at rest shows neither"
+        LogError, match=r"axis.csv: no motion: the commanded position never changes: an axis at rest shows neither"
     ):
-        checked(used[0])
-    found = fit(used, tmp_path, FitOptions(20, "still"))
-    [reason] = found.identification["findings"]
-    assert reason.startswith("this log cannot determine a model, because")
-    rms_pb, _, rms_h = found.judged.rms()
-    assert rms_pb == pytest.approx(1e-6, rel=0.1)
-    assert rms_h <= 1.02 * rms_pb
-    fit_report(found, used, {}).write(tmp_path / "report.html")
+        fit(still)
 
 
 @pytest.mark.slow
@@ -224,33 +208,24 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
     used = [read_log(write_rows(tmp_path / "axis.csv", x_d, x))]
     for logs, name in ((used, "this log"), (2 * used, "these logs")):
-        [reason] = fit(logs, tmp_path, FitOptions(NP, "axis")).identification["findings"]
+        [reason] = fit(logs, Np=NP).identification.findings
         assert reason.startswith(
             f"the first half of {name} cannot determine a model, because the commanded position does not move"
         )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("n", "Np", "words"),
-    [
-        (2, None, "0 windows of 100 samples; record at least 4.2 s"),
-        (250, NP, "2 windows of 50 samples; record at least 2.1 s"),
-    ],
-)
 @pytest.mark.usefixtures("quick_fit")
-def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, words: str) -> None:
-    log = write_rows(tmp_path / "short.csv", commanded()[1050 : 1050 + n], measured(0)[1050 : 1050 + n])
-    used = [read_log(log)]
-    found = fit(used, tmp_path, FitOptions(Np, "short"))
-    if n == 2:
-        [reason] = found.identification["findings"]
-        assert "because 1 of its 2 samples train, at least 100 are needed; a gain of 1" in reason
+def test_too_short_a_log_judges_nothing(tmp_path: Path) -> None:
+    log = write_rows(tmp_path / "short.csv", commanded()[1000:1150], measured(0)[1000:1150])
+    found = fit(read_log(log), Np=NP)
     assert (
-        recommendation(judged_by(found, shown_in("m")))
-        == f"Nothing could be judged: the log's second half has {words}."
+        "because 75 of its 150 samples train, at least 100 are needed; a gain of 1" in found.identification.findings[0]
     )
-    assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
+    assert found.advice == (
+        "Nothing could be judged: the log's second half has 1 window of 50 samples; record at least 2.1 s."
+    )
+    assert found.results()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
 @pytest.mark.slow
@@ -260,13 +235,13 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     k = np.flatnonzero((np.arange(N) < 2050) | (np.arange(N) >= 2070))  # the axis moves from 2.0 s to 2.14 s
     columns = np.column_stack((k * 1e-3, x_d[k], x[k]))
     np.savetxt(tmp_path / "axis.csv", columns, delimiter=",", header="t,x_d,x", comments="", fmt="%.12g")
-    used = [read_log(tmp_path / "axis.csv")]
-    assert used[0].starts == (0, 2050)
-    found = fit(used, tmp_path, FitOptions(NP, "axis"))
-    pieces = [(one.x_d, one.x_meas) for one in used[0].segments()]
+    log = read_log(tmp_path / "axis.csv")
+    assert log.starts == (0, 2050)
+    found = fit(log, Np=NP)
+    pieces = [(one.x_d, one.x_meas) for one in log.segments()]
     all_windows = replay(found.machine.new_predictor(), split_log(pieces, 0.5)).rms()
-    assert found.judged.rms()[2] < 0.8 * all_windows[2]
-    fit_report(found, used, {}).write(tmp_path / "report.html")
+    assert found.judged.replay.rms()[2] < 0.8 * all_windows[2]
+    found.report(tmp_path / "report.html")
     assert "The window after a gap is no test window" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
@@ -321,20 +296,18 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
-def test_a_rotary_axis_stays_one_under_the_default_machines_name(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
-    found = fit([replace(read_log(log), unit="rad")], tmp_path, FitOptions(20, "spring_mass_damper"))
+def test_a_rotary_axis_stays_one_under_the_default_machines_name(log: Path, tmp_path: Path) -> None:
+    found = fit(replace(read_log(log), unit="rad"), Np=20, name="spring_mass_damper").build(tmp_path, report=False)
     assert load_machine(tmp_path / "machine.toml").unit == "rad"
-    assert all(path.exists() for path in found.files if path.suffix == ".fmu")
+    assert all(path.exists() for path in found.files.values())
 
 
-def test_logs_of_different_sampling_are_refused(log: Path, tmp_path: Path) -> None:
+def test_logs_of_different_sampling_are_refused(log: Path) -> None:
     found = read_log(log)
     with pytest.raises(ParameterError, match=r"axis\.csv is sampled every 0\.002 s, axis\.csv every 0\.001 s"):
-        fit([found, replace(found, T_s=2e-3)], tmp_path, FitOptions(NP, "axis"))
+        fit([found, replace(found, T_s=2e-3)])
     with pytest.raises(ParameterError, match=r"axis\.csv is in rad, axis\.csv in m"):
-        fit([found, replace(found, unit="rad")], tmp_path, FitOptions(NP, "axis"))
+        fit([found, replace(found, unit="rad")])
 
 
 @pytest.mark.parametrize(
@@ -350,11 +323,14 @@ def test_axes_of_one_recording_have_names_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("Np", [1501, 100_000])
-def test_a_look_ahead_longer_than_what_judges_is_refused(log: Path, tmp_path: Path, Np: int) -> None:
-    with pytest.raises(
-        ParameterError, match=rf"--Np must be at most 1500, got {Np}: the first half of each log trains"
-    ):
-        fit([read_log(log)], tmp_path, FitOptions(Np, "axis"))
+def test_a_look_ahead_longer_than_what_judges_is_refused(log: Path, Np: int) -> None:
+    with pytest.raises(ParameterError, match=rf"Np must be at most 1500, got {Np}: the first half of each log trains"):
+        fit(read_log(log), Np=Np)
+
+
+def test_what_is_known_has_a_name(log: Path) -> None:
+    with pytest.raises(ParameterError, match=r"must be of period, measurement_delay, v_max, .*, got 'pitch'"):
+        fit(read_log(log), pitch=0.01)
 
 
 def test_a_name_that_can_be_none_of_an_fmu_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
@@ -363,8 +339,6 @@ def test_a_name_that_can_be_none_of_an_fmu_is_refused(hybridsep: Run, log: Path,
     assert "--name must be" in err
 
 
-def test_all_files_are_declared(fitted: Fit, log: Path) -> None:
-    declared = fit_files(log.parent / "out", "axis")
-    assert set(fitted.files) == set(declared.values())
-    written = {path for path in declared.values() if path.exists()}
-    assert set(declared.values()) - written <= {declared["report"]}
+def test_all_files_are_declared(built: Built, log: Path) -> None:
+    assert built.files == fit_files(log.parent / "out", "axis")
+    assert set(built.files.values()) == set((log.parent / "out").iterdir())

@@ -11,7 +11,7 @@ from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.fitting.compensation import estimated_limits
-from hybridsep.fitting.plant import commands_to_try, identified_plant, plant_words
+from hybridsep.fitting.plant import commands_to_try, identified_plant
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
 from hybridsep.plants.stage_drive import StageDrive
@@ -37,31 +37,33 @@ def test_friction_and_stiffness_are_found_and_the_plant_follows_the_drive() -> N
     recording = recorded(StageDrive(ModalModel([MODE]), 8e-6, 0.05, T_S, v_friction=4e-3))
     biased = ModalModel([Mode(34.0, 0.43, 0.99 * (68 * np.pi) ** 2)])  # as identified where friction is not known
     found = identified_plant(biased, SETTINGS, [recording], [recording])
-    entries = found["entries"]
+    entries = found.entries
     assert entries["f"] == pytest.approx(8e-6, rel=0.03)
     assert entries["kappa"] == pytest.approx(0.05, rel=0.1)
     assert entries["v_friction"] == pytest.approx(4e-3, rel=0.3)
     assert entries["noise_std"] == pytest.approx(5e-7, rel=0.1)
     assert entries["mode"][0]["f_n"] == pytest.approx(35.0, rel=0.01)
-    assert found["rms"] < 1.1 * 5e-7
-    assert found["rms_pb"] > 5 * found["rms"]
-    assert "refitted with the friction and stiffness of the log" in plant_words(found, shown_in("m"))
-    assert "no measurement" in plant_words(found, shown_in("m"))
+    assert found.rms is not None
+    assert found.rms_pb is not None
+    assert found.rms < 1.1 * 5e-7
+    assert found.rms_pb > 5 * found.rms
+    assert "refitted with the friction and stiffness of the log" in found.words(shown_in("m"))
+    assert "no measurement" in found.words(shown_in("m"))
 
 
 def test_a_linear_drive_keeps_its_model_alone() -> None:
     model = ModalModel([MODE])
     recording = recorded(StageDrive(model, T_s=T_S))
     found = identified_plant(model, SETTINGS, [recording], [recording])
-    assert set(found["entries"]) == {"noise_std"}
-    assert found["rms"] == found["rms_pb"] == pytest.approx(5e-7, rel=0.05)
+    assert set(found.entries) == {"noise_std"}
+    assert found.rms == found.rms_pb == pytest.approx(5e-7, rel=0.05)
 
 
 def test_a_model_that_is_too_fast_for_a_plant_has_none() -> None:
     recording = recorded(StageDrive(ModalModel([MODE])))
     found = identified_plant(ModalModel([Mode(5e4, 0.5, 1.0)]), SETTINGS, [recording], [recording])
-    assert found["entries"] == {}
-    assert "must be at most 100000 1/s in a plant" in found["reason"]
+    assert found.entries == {}
+    assert "must be at most 100000 1/s in a plant" in found.reason
 
 
 def test_commands_begin_where_the_log_began_and_end_at_rest() -> None:

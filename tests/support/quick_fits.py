@@ -16,7 +16,7 @@ def without_other_windows(patch: pytest.MonkeyPatch) -> None:
 
 def without_python_fmus(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` write the native FMUs alone: a tenth of its time."""
-    patch.setattr("hybridsep.fitting.fit.FLAVOURS", FLAVOURS[:1])
+    patch.setattr("hybridsep.fitting.build.FLAVOURS", FLAVOURS[:1])
 
 
 def without_other_settings(patch: pytest.MonkeyPatch) -> None:

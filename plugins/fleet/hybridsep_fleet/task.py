@@ -7,23 +7,25 @@ import json
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hybridsep.base.errors import MachineError, brief
+from hybridsep.base.files import plain
 from hybridsep.base.metrics import rms_ratio
 from hybridsep.base.threads import one_blas_thread
 from hybridsep.evaluate.report import Report
 from hybridsep.fitting.advice import Judged, extent, recommendation
-from hybridsep.fitting.fit import FitOptions, fit
+from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording, Replay, replay
-from hybridsep.fitting.report import fit_report, judged_by, write_errors, write_findings
+from hybridsep.fitting.report import write_errors, write_findings
 from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
 from hybridsep.machines.machine import Machine, check_interval, check_unit, load_machine, machine_name
+from hybridsep.model.physics import Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 from .settings import AxisTask, FleetSettings, Looked
@@ -42,7 +44,7 @@ class _Judged:
     judged: Judged
     machine: Machine
     findings: Mapping[str, Sequence[Finding]]
-    modes: list[dict[str, Any]] = field(default_factory=list)
+    modes: Sequence[Mode] = ()
     folder: str = ""
 
 
@@ -81,15 +83,10 @@ def work(task: AxisTask) -> dict[str, Any]:
 
 def _fitted(task: AxisTask, path: Path) -> _Judged:
     log = task.settings.read(path, task.axis)
-    findings = {log.path.name: checked(log)}
     folder = _folder(task)
-    name = machine_name(path, task.axis)
-    options = FitOptions(task.settings.Np, name)
-    result = fit([log], folder, options, fmus=task.settings.fmus)
-    if task.settings.reports:
-        fit_report(result, [log], findings).write(folder / "report.html")
-    judged = judged_by(result, log.shown)
-    return _Judged(judged, result.machine, findings, result.identification["modes"], _below(task, folder))
+    found = fit(log, Np=task.settings.Np, name=machine_name(path, task.axis))
+    found.build(folder, fmus=task.settings.fmus, report=task.settings.reports)
+    return _Judged(found.judged, found.machine, found.findings, found.identification.model.modes, _below(task, folder))
 
 
 def _replayed(task: AxisTask, path: Path) -> _Judged:
@@ -108,7 +105,7 @@ def _replayed(task: AxisTask, path: Path) -> _Judged:
         write_errors(report, judged, "Errors of the replay", "The predictor began without any knowledge.")
         write_findings(report, [log], findings)
         report.write(folder / "report.html")
-    return _Judged(judged, machine, findings, [], _below(task, folder))
+    return _Judged(judged, machine, findings, (), _below(task, folder))
 
 
 def _machine(task: AxisTask) -> Machine:
@@ -159,7 +156,7 @@ def _figures(found: _Judged) -> dict[str, Any]:
         "verdict": str(verdict),
         "advice": recommendation(judged),
         "peers": json.dumps(peers),
-        "modes": json.dumps(found.modes),
+        "modes": json.dumps(plain(found.modes)),
         "findings": json.dumps([[one["name"], one["severity"], one["words"]] for one in findings]),
         "friction": _known(_friction(judged.replay)),
         "folder": found.folder,

@@ -17,7 +17,7 @@ from log_files import capture, columns
 from staircase_data import commanded, measured
 
 from hybridsep.base.errors import StateError
-from hybridsep.fitting.fit import FitOptions, fit
+from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording, replay
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import load_machine, machine_path
@@ -135,13 +135,12 @@ def test_a_fit_is_that_of_fit(folder: Path) -> None:
     source = folder / "logs" / "mill" / DAYS[0]
     settings = FleetSettings(Np=20, fmus=False)
     (row,) = run_fleet([str(source)], folder / "out", settings, engine).rows
-    (folder / "single").mkdir()
-    single = fit([read_log(source / "X.csv")], folder / "single", FitOptions(20, "X"), fmus=False)
-    judged = single.summary()["judged"]
+    single = fit(read_log(source / "X.csv"), Np=20).results()
+    judged = single["judged"]
     assert {name: row[name] for name in ("rms_pb", "rms_hold", "rms_h", "ratio", "best", "verdict")} == {
         name: judged[name] for name in ("rms_pb", "rms_hold", "rms_h", "ratio", "best", "verdict")
     }
-    assert json.loads(row["modes"]) == single.identification["modes"]
+    assert json.loads(row["modes"]) == single["identification"]["modes"]
     made = {path.name for path in (folder / "out" / row["folder"]).iterdir()}
     assert made == {"machine.toml", "commands.csv", "trained.state", "fit.json", "report.html"}
 
