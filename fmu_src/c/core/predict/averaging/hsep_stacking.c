@@ -106,8 +106,8 @@ HSEP_API void hsep_stack_update(
     self->evidence[0] = HSEP_AVERAGING_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
     self->evidence[1] = HSEP_AVERAGING_GAMMA * self->evidence[1] + n;
     hsep_real best = self->evidence[0]; /* of the prediction 0, which is always there */
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        for (int j = 0; j < HSEP_N_EXPERTS; j++) {
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        for (hsep_int j = 0; j < HSEP_N_EXPERTS; j++) {
             hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
             *gram = HSEP_AVERAGING_GAMMA * *gram + products[i][j];
             H[i][j] = *gram;
@@ -117,7 +117,7 @@ HSEP_API void hsep_stack_update(
     }
     const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
     const hsep_real ridge = HSEP_AVERAGING_KAPPA * square * n;
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
         l[i] = self->cross[i] + ridge * hsep_expert_of(i).first_weight;
     }
