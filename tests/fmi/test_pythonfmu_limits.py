@@ -36,27 +36,19 @@ def folder(python_fmu: Fmu, tmp_path: Path) -> Path:
     return tmp_path / "unpacked"
 
 
-def outcome(folder: Path, case: str) -> subprocess.CompletedProcess[str]:
-    """Make one of the calls in a process of its own."""
-    command = [sys.executable, pythonfmu_calls.__file__, str(folder), case]
-    return subprocess.run(command, capture_output=True, text=True)
-
-
 needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="the calls are made to pythonfmu's binary for Linux")
 
 
 @needs_linux
 @pytest.mark.parametrize("case", CAUGHT)
 def test_what_the_slave_catches(folder: Path, case: str) -> None:
-    done = outcome(folder, case)
+    """Each call in a process of its own; where there is no logging the text of a refusal goes to stderr."""
+    command = [sys.executable, pythonfmu_calls.__file__, str(folder), case]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stdout.strip()) == (0, "survived"), done.stderr
-
-
-@needs_linux
-def test_the_text_of_a_refusal_goes_to_stderr(folder: Path) -> None:
-    lines = outcome(folder, "refusals_with_logging_off").stderr.splitlines()
-    assert [line for line in lines if re.match(r".*: the communication step size must be .*, got nan", line)]
-    assert [line for line in lines if line.endswith(": the start time must be finite, got nan s")]
+    if case == "refusals_with_logging_off":
+        assert re.search(r": the communication step size must be .*, got nan$", done.stderr, re.MULTILINE)
+        assert re.search(r": the start time must be finite, got nan s$", done.stderr, re.MULTILINE)
 
 
 @needs_linux

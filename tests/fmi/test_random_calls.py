@@ -1,0 +1,117 @@
+"""The native FMUs' sources: random calls and tables under sanitizers, and each file compiled alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import fuzz_fmi
+import pytest
+from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
+from c_core import STAGE_DRIVE
+from places import ROOT
+
+from hybridsep.fmi.compile import _sources
+from hybridsep.fmi.native import sources
+from hybridsep.fmi.variables import FmuTable
+from hybridsep.machines.machine import load_machine
+
+FUZZED = {
+    "SepCompensator": 0.9,
+    "FeedDrive_als25010_x": 0.3,
+    "HybridPredictorFmi3": 0.6,
+    "HybridPredictor": 0.9,
+    "FeedDrive": 0.3,
+    "ReferenceTrajectory": 0.3,
+    "FeedDriveFmi3": 0.3,
+}
+"""Duration of the random calls of each FMU, s. The first three, which a contributor's run has, have all functions of
+both versions, all of the core but a player's, and each kind of state."""
+
+COUNTED = ROOT / "tests" / "c" / "counted.h"
+SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+
+
+@needs_sanitisers
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("models", "factor"), [(list(FUZZED)[:3], 1), pytest.param(list(FUZZED), 20, marks=pytest.mark.nightly)]
+)
+def test_random_calls_under_sanitizers(
+    folders: Callable[[str], Path], tmp_path: Path, models: list[str], factor: float
+) -> None:
+    """All FMUs at the same time, so that it takes no longer than one; libraries are compiled as those that ship."""
+    compiler = sanitising_compiler()
+    environment = {
+        **os.environ,
+        "LD_PRELOAD": address_sanitizer(compiler),
+        "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",  # Python's own leaks; ours are counted
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+    }
+
+    def findings(name: str) -> str:
+        folder, source = tmp_path / name, tmp_path / f"{name}_sources"
+        shutil.copytree(folders(name), folder, ignore=shutil.ignore_patterns("sources", "documentation"))
+        (library,) = (folder / "binaries").glob("*linux*/*.so")
+        source.mkdir()
+        kind = name.replace("Fmi3", "") if "als25010" not in name else "StageDrive"
+        for file, content in _sources(kind).items():
+            (source / file).write_bytes(content)
+        files: list[str | Path] = ["-include", COUNTED, f"-I{source}", source / "all.c", "-lm", "-ldl", "-o", library]
+        # Optimised, they would take four times as long to compile, and run no faster beside Python
+        flags = ["-O0", "-g", "-D_GNU_SOURCE", *SANITIZERS, "-fPIC", "-shared"]
+        run_compiler([*flags, *files], command=compiler)
+        command = [
+            sys.executable,
+            fuzz_fmi.__file__,
+            str(folder),
+            "--seconds",
+            str(factor * FUZZED[name]),
+            "--seed",
+            "1",
+        ]
+        result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        held = result.returncode == 0 and "no finding" in result.stdout
+        return "" if held else f"{name}: {result.stdout}{result.stderr}"
+
+    with ThreadPoolExecutor(len(models)) as pool:
+        assert not "".join(pool.map(findings, models))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: str) -> None:
+    """By gcc those of a compensator and of a stage, and FMI 3.0's adapter; by clang those of a predictor."""
+    if compiler == "gcc" and shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    machine, mode = load_machine("spring_mass_damper"), {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
+    predictor = FmuTable("HybridPredictor", "Predictor", machine.fmi_parameters(), (mode,))
+    compensator = FmuTable("SepCompensator", "Compensator", machine.fmi_compensator_parameters(), (mode,))
+    stage = FmuTable("FeedDrive", "Stage", STAGE_DRIVE, (mode,))
+    tables = [(predictor, "2")] if compiler == "clang" else [(compensator, "2"), (stage, "2"), (predictor, "3")]
+    files: list[Path] = []
+    for table, fmi in tables:
+        folder = tmp_path / f"{table.name}{fmi}"
+        folder.mkdir()
+        for file, content in sources(table, "{}", fmi).items():
+            (folder / file).write_bytes(content)
+        # The core knows nothing of the model, and what is not an adapter nothing of FMI: compiled with the first
+        core = {path.name for path in (C_SOURCES / "core").rglob("*.c")} if files else set()
+        adapter = {path.name for path in (C_SOURCES / "fmi3").glob("*.c")}
+        files += [path for path in folder.glob("*.c") if path.name in adapter or (fmi == "2" and path.name not in core)]
+    assert len(files) > 40
+    command = ["gcc"] if compiler == "gcc" else [sys.executable, "-m", "ziglang", "cc"]
+    # What gcc warns of it finds while it optimises; clang finds it before, and would take twice the time
+    optimised = "-O1" if compiler == "gcc" else "-O0"
+
+    def compile_alone(path: Path) -> None:
+        # FMI 3.0's own header has two declarations that clang warns of
+        run_compiler([optimised, "-isystem", FMI_HEADERS, "-c", path, "-o", path.with_suffix(".o")], command=command)
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(compile_alone, files))
