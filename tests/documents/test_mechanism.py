@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 from mechanism import (
     Drive,
-    characteristic,
     coulomb,
-    innovation,
     lifted,
     linear_mode,
-    moving_average,
-    polynomial,
     quadratic,
     response,
     simulate,
-    sinusoid,
     split,
     squared_command,
 )
@@ -35,7 +30,6 @@ DRIVE = Drive.spring_mass_damper(M, C, K, TS)
 SQUARING = replace(DRIVE, Gamma=-1000.0 * DRIVE.Gamma)
 T = np.asarray(TS * np.arange(N), dtype=np.float64)
 X_D = np.asarray(0.005 * (1 - np.cos(4 * np.pi * T)), dtype=np.float64)
-CHI = characteristic(DRIVE.A)
 MODE = ModalModel([Mode(60.0, 0.02, 300.0 * (120 * np.pi) ** 2)]).discretise(TS)
 
 
@@ -86,35 +80,6 @@ def test_the_papers_example_written_out() -> None:
     np.testing.assert_allclose(run.e_pb[1:], e_pb, rtol=1e-9)
     np.testing.assert_allclose(lifted(A, gamma, C, 3)[2], [C @ A @ A @ gamma, C @ A @ gamma, C @ gamma], rtol=1e-12)
     assert np.all(np.triu(lifted(A, gamma, C, 3), 1) == 0.0)
-
-
-def test_the_papers_argument_needs_the_response_to_have_decayed() -> None:
-    """``η(D) x_d² = 0`` makes ``η(D) e_pb`` vanish as ``C Aⁿ Γ`` does, ``χ η e_pb`` at once."""
-    run = simulate(SQUARING, X_D, squared_command)
-    eta = np.convolve(polynomial(0), np.convolve(sinusoid(2.0, TS), sinusoid(4.0, TS)))
-    size = float(np.max(np.abs(run.e_pb)))
-    np.testing.assert_allclose(innovation(run.h, eta)[5:], 0.0, atol=1e-13 * np.max(run.h))
-    alone, exact = (np.abs(innovation(run.e_pb, r)) for r in (eta, np.convolve(CHI, eta)))
-    assert np.max(exact[7:]) < 1e-9 * size
-    assert np.max(alone[7:80]) > 5e-9 * size
-    assert np.max(alone[600:]) < 0.02 * np.max(alone)  # exp(−600 T_s c/2m) = 0.009
-
-
-def test_friction_is_news_at_a_reversal_alone() -> None:
-    force = 2.0
-    run = simulate(DRIVE, X_D, coulomb(force, X_D))
-    news = innovation(run.e_pb, np.convolve(CHI, polynomial(0)))
-    jumps = np.concatenate(([run.h[0]], np.diff(run.h)))
-    reversals = np.flatnonzero(jumps)
-    np.testing.assert_array_equal(reversals, np.arange(0, N, 250))
-    np.testing.assert_allclose(np.abs(jumps[reversals[1:]]), 2 * force)
-    # The first residual after the jump holds C Γ Δh, the second one more spike, then all is known again.
-    n_1, n_2 = moving_average(DRIVE.A, DRIVE.Gamma, DRIVE.C)[1:]
-    assert n_1 == pytest.approx(DRIVE.C @ DRIVE.Gamma, rel=1e-14)
-    np.testing.assert_allclose(news[reversals + 1], n_1 * jumps[reversals], rtol=1e-9)
-    np.testing.assert_allclose(news[reversals + 2], n_2 * jumps[reversals], rtol=1e-9)
-    quiet = np.setdiff1d(np.arange(N), np.concatenate((reversals + 1, reversals + 2)))
-    np.testing.assert_allclose(news[quiet], 0.0, atol=1e-13 * np.max(np.abs(run.e_pb)))
 
 
 def test_demonstration() -> None:

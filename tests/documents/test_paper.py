@@ -35,11 +35,10 @@ def test_readings_of_eqs_12_and_13() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("length", "ratio"), [(0.030, 1.1), (0.013, 1.02)])
-def test_the_hybrid_can_be_worse_on_the_whole(length: float, ratio: float) -> None:
-    x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, dwell=0.3)
+def test_the_hybrid_can_be_worse_on_the_whole() -> None:
+    x_d = rest_to_rest(np.resize([0.0, 0.03], 8), PAPER_LIMITS, dwell=0.3)
     x, result, poles = example("section_4_2")["replay"](paper_machine("als25010_y"), x_d)
-    assert rms(x - result.x_h) > ratio * rms(x - result.x_pb)
+    assert rms(x - result.x_h) > 1.1 * rms(x - result.x_pb)
     assert poles[int(np.argmax(result.batch_rms_h))] > 1.0
 
 
@@ -55,13 +54,11 @@ def test_where_on_the_spiral_the_hybrid_errs() -> None:
     assert rms(hybrid[-section["SLOWING"] :]) < 0.5 * rms(physics[-section["SLOWING"] :])  # the end
 
 
-@pytest.mark.slow
 def test_hz_read_as_rad_per_second_is_no_drive() -> None:
     model = paper_machine("als25010_x").model
     assert sum(mode.alpha / mode.f_n**2 for mode in model.modes) == pytest.approx((2 * np.pi) ** 2, rel=1e-4)
 
 
-@pytest.mark.slow
 def test_commands_and_tests_on_the_page_exist() -> None:
     commands = re.findall(r"`((?:python|pytest) [^`]+)`", PAGE)
     assert len(commands) > 8
