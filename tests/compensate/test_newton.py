@@ -197,9 +197,9 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
 
 @pytest.mark.slow
 def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
-    sep = compensator(change_max=2e-4)
-    run(sep)
-    away = run(sep, sensor=no_faster(0.06), t_init=0.0)
+    sep = SepCompensator.from_bytes(learned())
+    sep.change(change_max=2e-4)
+    away = run(sep, sensor=no_faster(0.05), t_init=0.0)
     first = int(np.argmax(away.state == SepState.PHYSICS))
     assert 50 < first < 250
     assert (away.state[:first] == SepState.HYBRID).all()
@@ -207,16 +207,8 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
     restored = SepCompensator.from_bytes(sep.to_bytes())
     for one in (sep, restored):
         assert one.plan(np.full(200, 0.007)).state is SepState.PHYSICS
-    assert run(sep, t_init=0.0).state.max() == SepState.HYBRID  # another run
-
-
-@pytest.mark.slow
-def test_without_a_largest_change_no_plan_runs_away() -> None:
-    sep = compensator(change_max=None)
-    run(sep)
-    state = run(sep, sensor=no_faster(0.02), t_init=0.0).state
-    first = int(np.argmax(state == SepState.PHYSICS))  # its plan is better there
-    assert (state[first:] == SepState.HYBRID).any()
+    sep.restart(0.0)  # another run
+    assert sep.plan(moves()[:200]).state is SepState.HYBRID
 
 
 @pytest.mark.parametrize(
@@ -242,16 +234,6 @@ def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
 
     sound, other = cold()[0], run(compensator(), sensor=wrong)
     assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
-
-
-@pytest.mark.slow
-def test_missing_measurements_are_bridged() -> None:
-    def missing(k: int, x_meas: float) -> float:
-        return math.nan if 400 <= k < 460 or k % 97 == 0 else x_meas
-
-    physics, found = by_physics(), run(compensator(), sensor=missing)
-    assert np.isfinite(found.x_dm).all()
-    assert found.tracking_rms < 0.8 * physics.tracking_rms
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
 @pytest.mark.parametrize(
     ("seed", "n", "fixed"),
     [
-        pytest.param(34, 550, {}, id="jerk bounds side by side"),
+        pytest.param(34, 300, {}, id="jerk bounds side by side"),
         pytest.param(38, 1000, {}, id="limits of the trajectory", marks=pytest.mark.nightly),
         pytest.param(233, 800, {"change_max": 1e-4}, id="change of 0.1 mm", marks=pytest.mark.nightly),
     ],
@@ -48,8 +48,8 @@ def test_the_minimum_is_that_of_another_solver(
 ) -> None:
     """To 2 nm in every coefficient; a stop at 1e-5 of the cost left 0.3 to 3 µm, and roundings grew with it."""
     problems = problems_of(monkeypatch, seed, n, **fixed)
-    assert len(problems) >= 20
-    for (P, v, rows, low, high, _, cost), x in problems[:: max(1, len(problems) // 20)]:
+    assert len(problems) >= 10
+    for (P, v, rows, low, high, _, cost), x in problems[:: max(1, len(problems) // 10)]:
         values = rows @ x
         assert np.max(np.maximum(values - high, low - values)) <= 10 * EXACT.margin
         expected = clarabel_minimum(P, v, rows, low, high, 1e-11)
