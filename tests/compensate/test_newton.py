@@ -209,6 +209,10 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
         assert one.plan(np.full(200, 0.007)).state is SepState.PHYSICS
     sep.restart(0.0)  # another run
     assert sep.plan(moves()[:200]).state is SepState.HYBRID
+    free = SepCompensator.from_bytes(learned())
+    free.change(change_max=None)  # no bound, no plan at it
+    found = cosimulate(free, STAGE.new_plant(), moves()[: first + 100], sensor=no_faster(0.05), t_init=0.0)
+    assert (found.state[first:] == SepState.HYBRID).any()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -112,10 +113,9 @@ def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time:
             assert core["x"] == pytest.approx(plant.x, abs=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("f_n", [25.0, 500.0, 2000.0, 5000.0])
+@pytest.mark.parametrize("f_n", [500.0, 5000.0])
 def test_fast_modes_are_resolved(f_n: float) -> None:
-    x_d = staircase()[:300]
+    x_d = staircase()[:100]
     mode = Mode(f_n, 0.05, (2 * math.pi * f_n) ** 2)
     discrete = ModalModel([mode]).discretise(TS)
     x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
@@ -133,18 +133,12 @@ def test_velocity_is_the_derivative_of_the_position() -> None:
         assert (plant.x - before) / 1e-6 == pytest.approx(v, rel=1e-3)
 
 
-def test_positions_count_from_the_start() -> None:
-    x_d = staircase()[:400]
-    for name in ("spring_mass_damper", "als25010_y"):
-        plant = load_machine(name).new_plant()
-        np.testing.assert_allclose(simulate(plant, x_d + 0.1, TS) - 0.1, simulate(plant, x_d, TS), atol=1e-14)
-
-
-def test_any_step_gives_the_same_motion() -> None:
+def test_any_step_from_any_start_gives_the_same_motion() -> None:
     x_d = staircase()[:300]
     for name in ("spring_mass_damper", "als25010_x"):
         plant = load_machine(name).new_plant()
         whole = simulate(plant, x_d, TS)
+        np.testing.assert_allclose(simulate(plant, x_d + 0.1, TS) - 0.1, whole, atol=1e-14)
         plant.reset(0.0)
         for k, r in enumerate(x_d):
             assert plant.x == pytest.approx(whole[k], abs=1e-9)
@@ -183,23 +177,21 @@ def test_encoder_noise_is_normal_and_seeded() -> None:
     assert np.array_equal(noise, Encoder(1.0, 7).measure_all(np.zeros(20_000)))
 
 
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"k must be 1e-06 … 1e\+15 N/m, got -1"):
-        FeedDrive(1.0, 1.0, -1.0)
-    with pytest.raises(ParameterError, match=r"kappa must be 0 … 1000000 1/m, got -0.1"):
-        StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), kappa=-0.1)
-    with pytest.raises(ParameterError, match=r"v_friction must be 1e-12 … 10000 m/s, got 0"):
-        StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), v_friction=0.0)
-    with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 0.0"):
-        FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0)
-    with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 1000000000.0"):
-        FeedDrive(1.0, 1.0, 1.0).step(0.0, 1e9)
-    with pytest.raises(SignalError, match="x_d must have at least one sample, got none"):
-        simulate(FeedDrive(1.0, 1.0, 1.0), [], TS)
-    with pytest.raises(ParameterError, match=r"noise_std must be 0 … 1 m, got -1"):
-        Encoder(-1.0)
-    with pytest.raises(ParameterError, match=r"seed must be a whole number, got 0.5"):
-        Encoder(1.0, seed=0.5)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: FeedDrive(1.0, 1.0, -1.0), r"k must be 1e-06 … 1e\+15 N/m, got -1"),
+        (lambda: StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), kappa=-0.1), "kappa must be 0 … 1000000 1/m, got -0.1"),
+        (lambda: StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), v_friction=0.0), "v_friction must be 1e-12 … 10000 m/s"),
+        (lambda: FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0), r"step size must be > 0 and ≤ 100 s, got 0\.0"),
+        (lambda: FeedDrive(1.0, 1.0, 1.0).step(0.0, 1e9), r"step size must be > 0 and ≤ 100 s, got 1000000000\.0"),
+        (lambda: simulate(FeedDrive(1.0, 1.0, 1.0), [], TS), "x_d must have at least one sample, got none"),
+        (lambda: Encoder(-1.0), "noise_std must be 0 … 1 m, got -1"),
+    ],
+)
+def test_what_cannot_be_is_refused(make: Callable[[], object], message: str) -> None:
+    with pytest.raises((ParameterError, SignalError), match=message):
+        make()
 
 
 @pytest.mark.parametrize(("name", "changes"), [("spring_mass_damper", {"c_nl": 1e4}), ("als25010_x", {"kappa": 1e2})])
