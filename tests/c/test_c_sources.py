@@ -10,7 +10,6 @@ from typing import Any
 
 import c_core
 import elf
-import numpy as np
 import pytest
 import staircase_data as staircase
 from c_compiler import C_SOURCES, build_folder, include_flags, needs_sanitisers, run_compiler, sanitising_compiler
@@ -22,8 +21,6 @@ from hybridsep.fmi.c_header import all_c
 SUFFIXES = (".c", ".h", ".cpp")
 SANITISED = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 """Not optimised: that would take three times as long to compile."""
-ALIKE = sorted(c_core.TABLES.keys() - {"compensator_2", "trajectory"})
-"""Tables that run at night: each has the same sources as the two others, and calls some of their functions."""
 
 
 def at_night(*values: object) -> Any:
@@ -49,30 +46,9 @@ def test_the_c_files_are_formatted() -> None:
 @pytest.mark.slow
 def test_the_core_needs_libm_alone() -> None:
     # No allocation, no file, no global: nothing but these is undefined in it, and nothing in it is writable.
-    allowed = {
-        "memcpy",
-        "memmove",
-        "memset",
-        "memcmp",
-        "strcmp",
-        "strncmp",
-        "bcmp",  # what a compiler makes of memcmp where only equality counts
-        "sqrt",
-        "log",
-        "exp",
-        "pow",
-        "sin",
-        "cos",
-        "sincos",
-        "tanh",
-        "ldexp",
-        "frexp",
-        "floor",
-        "nextafter",
-        "ceil",
-        "fmax",
-        "fmin",
-    }
+    allowed = {"memcpy", "memmove", "memset", "memcmp", "strcmp", "strncmp", "bcmp"}  # bcmp: compilers' for memcmp
+    allowed |= {"sqrt", "log", "exp", "pow", "sin", "cos", "sincos", "tanh", "ldexp", "frexp", "floor", "nextafter"}
+    allowed |= {"ceil", "fmax", "fmin"}
     core = {path.stem for path in (C_SOURCES / "core").rglob("*.c")}
     for built in c_core.object_files():
         if Path(built).stem not in core:
@@ -84,7 +60,7 @@ def test_the_core_needs_libm_alone() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["compensator_2", "trajectory", *map(at_night, ALIKE)])
+@pytest.mark.parametrize("name", ["compensator_2", "trajectory"])
 def test_everything_compiles_as_one_file(name: str) -> None:
     """Optimised once: the models differ in a table and in which of the core's functions they call."""
     folder = build_folder() / f"all_{name}"
@@ -93,17 +69,6 @@ def test_everything_compiles_as_one_file(name: str) -> None:
     everything.write_text(all_c(c_core.sources()))
     level = "-O3" if name == "compensator_2" else "-O0"
     run_compiler([level, f"-I{folder}", *include_flags(), "-c", everything, "-o", folder / "all.o"])
-
-
-def sanitised_program(driver: str, folder: Path) -> Path:
-    """Return the program of a C file of these tests and the core with a model's header, built when first asked for."""
-    program = folder / driver
-    if not program.exists():
-        command = tuple(sanitising_compiler())
-        files = [*c_core.model_sources(), str(ROOT / "tests" / "c" / f"{driver}.c")]
-        files += c_core.object_files(SANITISED, command)
-        run_compiler([*SANITISED, f"-I{folder}", *include_flags(), *files, "-lm", "-o", program], command=command)
-    return program
 
 
 @needs_sanitisers
@@ -148,34 +113,16 @@ def sanitised_program(driver: str, folder: Path) -> Path:
 def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:
     folder = build_folder() / f"sanitise_{name}"
     c_core.write_header(name, folder)
-    program = sanitised_program("sanitise", folder)
+    program, command = folder / "sanitise", tuple(sanitising_compiler())
+    if not program.exists():
+        files: list[str | Path] = [
+            *c_core.model_sources(),
+            ROOT / "tests" / "c" / "sanitise.c",
+            *c_core.object_files(SANITISED, command),
+        ]
+        flags: list[str | Path] = [*SANITISED, f"-I{folder}", *include_flags()]
+        run_compiler([*flags, *files, "-lm", "-o", program], command=command)
     write_trajectory(tmp_path, staircase.commanded()[:360])
     for pairs in arguments:
         done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-@needs_sanitisers
-@pytest.mark.parametrize(
-    ("n_samples", "said"),
-    [
-        (4100, "has changed meanwhile: initialise again"),  # 32 kB too many for the memory
-        (101, "has changed meanwhile: initialise again"),
-        (99, "has changed meanwhile: initialise again"),
-        (100, "0.2\n"),  # as many others: they are played
-        (0, "it is damaged or truncated"),
-    ],
-)
-def test_a_trajectory_that_changes_while_it_is_read(n_samples: int, said: str, tmp_path: Path) -> None:
-    folder = build_folder() / "changing_resource"
-    c_core.write_header("trajectory", folder)
-    program = sanitised_program("changing_resource", folder)
-    write_trajectory(tmp_path, np.full(n_samples, 0.2))
-    file = (tmp_path / "trajectory_3.bin").rename(tmp_path / "other.bin")
-    write_trajectory(tmp_path, np.full(100, 0.1))
-    done = subprocess.run(
-        [program, f"{tmp_path}/", tmp_path / "trajectory_3.bin", file], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert said in done.stdout

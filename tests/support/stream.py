@@ -47,7 +47,10 @@ CANNOT = {
     (LIBRARY, "figures"): "the C core agrees with it to 1e-12 m, and its figures take a tenth of the time",
     (PYTHON, "figures"): "it agrees with the library to the last bit",
     (NATIVE, "figures"): "it agrees with the C core, which it is compiled from",
-    (CORE, "bad states"): "checksum and GUID are the adapter's; what it checks itself: tests/c/test_c_states.py",
+    (
+        CORE,
+        "bad states",
+    ): "checksum and GUID are the adapter's; what it checks itself: tests/c/sanitise.c, support/fuzz_fmi.py",
     (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",
 }
 """(implementation, model or ability): why it is not there."""
