@@ -107,22 +107,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
     machine = load_machine(write(tmp_path, GOOD))
     settings = machine.predictor_settings
     assert (settings.Np, settings.p, settings.q) == (50, 20, 3)
-    assert machine.fmi_parameters() == {
-        "Np": 50,
-        "p": 20,
-        "q": 3,
-        "lambda": 1e-12,
-        "T_s": 0.002,
-        "t_init": -1.0,
-        "input_hold": 0,
-        "averaging": True,
-        "effect": 0.0,
-        "noise_std": 0.0,
-        "forgetting": 0.0,
-        "period": 0.0,
-        "measurement_delay": 0,
-        "dead_time": 0,
-    }
+    assert machine.fmi_parameters() == {**PredictorSettings(Np=50, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
     predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))
     assert (predictor.settings.p, predictor.T_s) == (10, 0.002)
 
@@ -131,12 +116,10 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("zeta = 0.5", "zeta = 0.0", r"axis.toml: physics.mode\[1\].zeta: zeta must be 1e-06 … 10000, got 0.0"),
-        ("f_n = 30.0", "f_n = nan", r"physics.mode\[1\].f_n: f_n must be finite, got nan"),
         ("f_n = 30.0", 'f_n = "fast"', r"f_n must be a number, got 'fast'"),
         ("alpha = 35530.0", "", r"physics.mode\[1\].alpha is missing"),
         ("zeta = 0.5", "zeta = 0.5\ndamping = 1", r"physics.mode\[1\].damping is not an entry"),
         ("p = 20", "p = 60", r"predictor: p must be 1 … Np = 50, got 60; lower p or raise Np"),
-        ("p = 20", "p = 2.5", r"predictor.p: p must be a whole number, got 2.5"),
         ("p = 20", "p = 20\nlambda = 0", r"predictor.lambda: lambda must be 1e-40 … 1e\+12 m2, got 0"),
         ("T_s = 0.002", "T_s = -1", r"T_s: T_s must be 1e-05 … 1 s, got -1"),
         ('kind = "stage"', 'kind = "robot"', r"plant.kind must not be 'robot', but feed_drive, stage, identified"),
@@ -148,8 +131,6 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         ("[[physics.mode]]", "[physics.mode]", r"physics.mode must be a list of modes: write \[\[physics.mode\]\]"),
         ('kind = "stage"', "", "plant.kind is missing: feed_drive, stage, identified"),
         ('title = "An axis"', 'title = "An \\u0001 axis"', "title must be one line of printable text"),
-        ("T_s = 0.002", "T_s = true", "T_s must be a number, got True"),
-        ("T_s = 0.002", 'T_s = "0.002"', "T_s must be a number, got '0.002'"),
         ("p = 20", "p = 20\nlam = 1e-12", "predictor.lam is not an entry"),
         ("[[physics.mode]]", "[[physics.modes]]", "physics.modes is not an entry"),
         ("[predictor]", "[physics.spring_mass_damper]\nm = 1\nc = 1\nk = 1\n[predictor]", "give either"),
@@ -178,32 +159,9 @@ COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk
 
 
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
-    assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == {
-        "Np": 50,
-        "p": 20,
-        "q": 3,
-        "lambda": 1e-12,
-        "T_s": 0.002,
-        "t_init": -1.0,
-        "input_hold": 0,
-        "dead_time": 0,
-        "averaging": True,
-        "effect": 0.0,
-        "noise_std": 0.0,
-        "forgetting": 0.0,
-        "period": 0.0,
-        "measurement_delay": 0,
-        "preview": 200,
-        "spacing": 2,
-        "jerk_weight": 1.0,
-        "v_max": 0.2,
-        "a_max": 8.0,
-        "j_max": 900.0,
-        "change_max": 1e-3,
-        "no_reversal": True,
-        "compensate": 2,
-        "measurement_timeout": 1.0,
-    }
+    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=200, spacing=2).to_fmi()
+    expected |= {**PredictorSettings(Np=50, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
+    assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
     entries += "no_reversal = false\n"
     machine = load_machine(write(tmp_path, COMPENSATED + entries))
@@ -246,8 +204,7 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
             predictor_alone.new_compensator()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (1500, 2000, 2)])
+@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2)])
 def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int, preview: int, spacing: int) -> None:
     text = COMPENSATED.replace("[compensator]\n", "").replace("Np = 50", f"Np = {Np}")
     compensator = load_machine(write(tmp_path, text)).new_compensator()
@@ -258,16 +215,9 @@ def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int,
     ("entries", "message"),
     [
         ("preview = 7", r"axis.toml: compensator.preview: preview must be 8 … 2000, got 7"),
-        ("spacing = 0", r"compensator.spacing: spacing must be 1 … 1000, got 0"),
-        ("jerk_weight = -1.0", r"compensator.jerk_weight: jerk_weight must be 0 … 1e\+12, got -1.0"),
-        ("jerk_weight = nan", r"compensator.jerk_weight: jerk_weight must be finite, got nan"),
         ("lambda = 0", r"compensator.lambda: lambda must be 1e-40 … 1e\+12 m2, got 0"),
-        ("Np = 2.5", r"compensator.Np: Np must be a whole number, got 2.5"),
-        ('p = "many"', r"compensator.p: p must be a number, got 'many'"),
         ("change_max = 1e-3", r"compensator.change_max is not an entry"),
-        ("v_friction = 2e-3", r"compensator.v_friction is not an entry"),
         ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be true or false, got 2"),
-        ('no_reversal = "no"', r"compensator.no_reversal: no_reversal must be true or false, got 'no'"),
         ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),
         ("Np = 60\npreview = 70", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 71, got 70 \(p, q of "),
         ("Np = 20\np = 5\nq = 20", r"compensator: q must be 0 … Np − 1 = 19, got 20; lower q or raise Np$"),
@@ -296,16 +246,12 @@ def test_without_drive_limits_there_is_a_compensator_but_no_fmu(tmp_path: Path) 
         machine.fmi_compensator_parameters()
 
 
-def test_a_file_that_is_not_there() -> None:
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(MachineError, match=r"no machine 'robot': expected a .toml file or one of als25010_x"):
         load_machine("robot")
     with pytest.raises(MachineError, match=r"no machine 'robot\.toml': there is no such file"):
         load_machine("robot.toml")
-
-
-def test_a_folder_of_fit_is_told_from_its_machine_file(tmp_path: Path) -> None:
-    path = write(tmp_path, GOOD)
-    path.rename(tmp_path / "machine.toml")
+    write(tmp_path, GOOD).rename(tmp_path / "machine.toml")
     with pytest.raises(MachineError, match=r"expected a \.toml file or one of .*; .*machine\.toml is there"):
         load_machine(tmp_path)
 
@@ -325,10 +271,6 @@ def test_a_stage_and_a_dead_time_exclude_each_other(tmp_path: Path) -> None:
 
 
 def test_a_machine_can_be_made_in_code() -> None:
-    machine = Machine(
-        name="bench",
-        title="bench",
-        sources=("made up for this test",),
-        physics=Physics(spring_mass_damper=SpringMassDamper(m=2.0, c=30.0, k=2e4)),
-    )
+    physics = Physics(spring_mass_damper=SpringMassDamper(m=2.0, c=30.0, k=2e4))
+    machine = Machine(name="bench", title="bench", sources=("made up for this test",), physics=physics)
     assert machine.model.modes[0].alpha == 1e4

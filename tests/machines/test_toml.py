@@ -21,7 +21,6 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("\n".join(f"k{i} = 1" for i in range(2000)), r"k8 is not an entry .* … and 1991 more"),
-        (f"{'x' * 100_000} = 1", r"'x{59}… \(100002 characters\) is not an entry of a machine file"),
         ('"a\\nb" = 1', r"'a\\nb' is not an entry"),
         (f"name = '{'x' * 100_000}-'", r"name must be .* got 'x{59}… \(100003 characters\)"),
         ("a = [" + "[" * 100_000, "is not valid TOML: "),

@@ -117,20 +117,16 @@ UNSTABLE = control.tf([1.0], [1.0, -1.0, 3.0])
 REFUSED: list[tuple[Any, str]] = [
     (UNSTABLE, "G_pb must be stable, got a pole at 0.5"),
     (control.tf([1.0], [1.0, 0.0]), "G_pb must be stable, got a pole at 0"),
-    (control.tf([1.0], [1.0, 0.0, 9.0]), "G_pb must be stable, got a pole at"),
     (control.tf([2.0], [1.0]), "numerator of degree 0 over a denominator of degree 0"),
     (control.tf([1.0, 0.0, 0.0], [1.0, 1.0, 3.0]), "numerator of degree 2 over a denominator of degree 2"),
-    (control.tf([1.0, 0, 0, 0], [1.0, 1.0, 3.0]), "numerator of degree 3 over a denominator of degree 2"),
     (control.ss([[-1.0]], [[1.0]], [[1.0]], [[0.5]]), "G_pb must be strictly proper"),
     (control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), "one input and one output, got 2 and 2"),
     (control.tf([1.0], [1.0, 0.5], TS), "G_pb must be continuous, got a discrete system"),
-    (control.tf([1.0], [1.0, 0.5], True), "G_pb must be continuous, got a discrete system"),
     (control.tf([1.0], np.polymul([1.0, 1.0, 3.0], [1.0, 1.0, 3.0])), "G_pb has repeated modes"),
-    *((control.tf([1.0], np.poly([-3.0] * n)), "G_pb has repeated modes") for n in (3, 4, 5, 6, 8)),
-    *((control.tf([1.0], np.real(np.poly([-1 + 5j, -1 - 5j] * n))), "G_pb has repeated modes") for n in (3, 4, 6, 8)),
+    *((control.tf([1.0], np.poly([-3.0] * n)), "G_pb has repeated modes") for n in (3, 8)),
+    *((control.tf([1.0], np.real(np.poly([-1 + 5j, -1 - 5j] * n))), "G_pb has repeated modes") for n in (3, 8)),
     (control.tf([0.0], [1.0, 1.0]), "G_pb must not be zero, got a zero transfer function"),
     (control.tf([math.nan], [1.0, 1.0]), "must have finite coefficients"),
-    (control.tf([1.0], [1.0, math.inf, 1.0]), "must have finite coefficients"),
     (control.ss([[math.nan]], [[1.0]], [[1.0]], [[0.0]]), "must have finite coefficients"),
     (control.frd([1.0, 2.0], [1.0, 2.0]), "must be a TransferFunction or StateSpace, got FrequencyResponseData"),
 ]
@@ -144,29 +140,11 @@ def test_systems_that_are_no_sum_of_modes(system: Any, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ((25.0, 0.0, 1.0, 0.0), "zeta must be 1e-06 … 10000, got 0.0"),
-        ((25.0, -0.1, 1.0, 0.0), "zeta must be 1e-06 … 10000, got -0.1"),
-        ((0.0, 0.1, 1.0, 0.0), "f_n must be 0.001 … 100000 Hz, got 0.0"),
-        ((25.0, 0.1, math.nan, 0.0), "alpha must be finite, got nan"),
-        ((25.0, 0.1, 1.0, math.inf), "beta must be finite, got inf"),
-    ],
-)
-def test_modes_out_of_range(values: tuple[float, float, float, float], message: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        Mode(*values)
-    assert str(caught.value) == message
-
-
-@pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: ModalModel([]), "a modal model needs at least one mode, got none"),
         (lambda: ModalModel([UNDER], -1), "dead_time must be 0 … 100000, got -1"),
-        (lambda: ModalModel([UNDER], 0.5), "dead_time must be a whole number, got 0.5"),  # type: ignore[arg-type]
-        (lambda: ModalModel.spring_mass_damper(0.0, 1.0, 1.0), "m must be 1e-06 … 1000000 kg, got 0.0"),
-        (lambda: ModalModel.spring_mass_damper(1.0, 0.0, 1.0), "c must be 1e-09 … 1e+12 N.s/m, got 0.0"),
+        (lambda: Mode(25.0, -0.1, 1.0, 0.0), "zeta must be 1e-06 … 10000, got -0.1"),
         (lambda: ModalModel.spring_mass_damper(1.0, 1.0, -1.0), "k must be 1e-06 … 1e+15 N/m, got -1.0"),
         (lambda: ModalModel([UNDER]).discretise(0.0), "T_s must be 1e-05 … 1 s, got 0.0"),
         (lambda: DiscreteModel(ModalModel([UNDER]).state_space(), 0, -1.0), "T_s must be 1e-05 … 1 s, got -1.0"),
