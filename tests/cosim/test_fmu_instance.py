@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -37,7 +38,7 @@ def drive(request: pytest.FixtureRequest, fmus: BuiltFmus) -> Path:
     return fmus(request.param)
 
 
-def with_files(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
+def changed(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
     """Copy an archive, each file as ``change`` gives it, without those for which it gives None."""
     with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
         for name in old.namelist():
@@ -45,13 +46,6 @@ def with_files(archive: Path, target: Path, change: Callable[[str, bytes], bytes
             if content is not None:
                 new.writestr(name, content)
     return target
-
-
-@pytest.fixture(scope="module")
-def unloadable(native: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A FMU whose binaries are none."""
-    target = tmp_path_factory.mktemp("unloadable") / "Unloadable.fmu"
-    return with_files(native, target, lambda name, content: b"none" if name.startswith("binaries/") else content)
 
 
 @pytest.fixture
@@ -153,45 +147,94 @@ for instance in instances:
     assert not list(temporary.iterdir())
 
 
-# Failed constructions ----------------------------------------------------------------------------------------------
+# What is no FMU ----------------------------------------------------------------------------------------------------
 
 
-def test_what_cannot_be_loaded_leaves_nothing_behind(
-    native: Path, unloadable: Path, python_fmu: Callable[[str], Path], tmp_path: Path, temporary: Path
+def without_binaries(name: str, content: bytes) -> bytes | None:
+    return None if name.startswith("binaries/") else content
+
+
+def of_binaries(change: Callable[[bytes], bytes]) -> Callable[[str, bytes], bytes]:
+    return lambda name, content: change(content) if name.startswith("binaries/") else content
+
+
+def of_description(change: Callable[[bytes], bytes]) -> Callable[[str, bytes], bytes]:
+    return lambda name, content: change(content) if name == "modelDescription.xml" else content
+
+
+UNREADABLE = r"Odd\.fmu is not a readable FMU: "
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (of_binaries(lambda content: b"none"), r"Odd\.fmu cannot be loaded: "),
+        (
+            without_binaries,
+            r"Odd\.fmu cannot be loaded: binaries/.*FeedDrive\S* is missing, there are binaries for none",
+        ),
+        (
+            of_binaries(lambda content: content.replace(b"fmi2DoStep\0", b"fmi2DoStop\0")),
+            r"Odd\.fmu cannot be loaded: .*undefined symbol: fmi2DoStep",
+        ),
+        (
+            of_description(lambda xml: re.sub(rb'guid="[^"]*"', b'guid="{0}"', xml)),
+            r"Odd\.fmu cannot be instantiated: .*(?i:guid)",
+        ),
+        (of_description(lambda xml: b"<html></html>"), UNREADABLE),
+        (of_description(lambda xml: xml[:-40]), UNREADABLE),
+        (
+            of_description(lambda xml: xml.replace(b'causality="input"', b'causality="exput"')),
+            f"{UNREADABLE}.*causality",
+        ),
+        (
+            of_description(lambda xml: xml.replace(b"CoSimulation", b"ModelExchange")),
+            r"is not a readable FMU|must be an FMI 2\.0 or 3\.0 co",
+        ),
+        (
+            lambda name, content: None if name == "modelDescription.xml" else content,
+            rf"{UNREADABLE}.*modelDescription\.xml",
+        ),
+    ],
+)
+def test_what_is_no_fmu_is_said_in_a_line_and_leaves_nothing_behind(
+    native: Path, tmp_path: Path, temporary: Path, change: Callable[[str, bytes], bytes | None], message: str
 ) -> None:
-    directory = Path.cwd()
-    guid = b"{" + b"0" * 36 + b"}"
-    truncated = tmp_path / "Truncated.fmu"
+    path, directory = changed(native, tmp_path / "Odd.fmu", change), Path.cwd()
+    with pytest.raises(FmuError, match=message) as caught:
+        FmuInstance(path)
+    assert len(str(caught.value)) < 400
+    assert "\n" not in str(caught.value)
+    assert Path.cwd() == directory
+    assert not list(temporary.iterdir())
+
+
+def test_archives_that_are_cut_damaged_or_for_another_platform(
+    native: Path, fmus: BuiltFmus, tmp_path: Path, temporary: Path
+) -> None:
+    content, path = bytearray(native.read_bytes()), tmp_path / "Cut.fmu"
+    with pytest.raises(FmuError, match=r"no FMU at .*Cut.fmu; build it first"):
+        FmuInstance(path)
+    for kept in (0, 10, len(content) // 2, len(content) - 30):
+        path.write_bytes(content[:kept])
+        with pytest.raises(FmuError, match=r"Cut\.fmu is not a readable FMU: "):
+            FmuInstance(path)
     # the description can be read, the binary's checksum is wrong
-    content = bytearray(native.read_bytes())
     with zipfile.ZipFile(native) as archive:
         largest = max(archive.infolist(), key=lambda info: info.compress_size)
     content[largest.header_offset + 200 + largest.compress_size // 2] ^= 0xFF
-    truncated.write_bytes(content)
-    bare = with_files(native, tmp_path / "Bare.fmu", lambda n, c: None if n.startswith("binaries/") else c)
-    foreign = with_files(
-        native,
-        tmp_path / "Foreign.fmu",
-        lambda n, c: c.replace(guid_of(native), guid) if n == "modelDescription.xml" else c,
-    )
-    useless = with_files(
-        python_fmu("FeedDrivePy"), tmp_path / "Useless.fmu", lambda n, c: None if n.endswith("machine.json") else c
-    )
-    for path, message in (
-        (unloadable, r"Unloadable\.fmu cannot be loaded: "),
-        (truncated, r"Truncated\.fmu cannot be loaded: "),
-        (bare, r"Bare\.fmu cannot be loaded: binaries/.*FeedDrive\S* is missing, there are binaries for none"),
-        (foreign, r"Foreign\.fmu cannot be instantiated: .*(?i:guid)"),
-        (useless, r"Useless\.fmu cannot be instantiated: "),
-    ):
-        with pytest.raises(FmuError, match=message):
-            FmuInstance(path)
-        assert Path.cwd() == directory
-        assert not list(temporary.iterdir()), path
-
-
-def guid_of(path: Path) -> bytes:
-    return str(fmpy.read_model_description(str(path)).guid).encode()
+    path.write_bytes(content)
+    with pytest.raises(FmuError, match=r"Cut\.fmu cannot be loaded: "):
+        FmuInstance(path)
+    with zipfile.ZipFile(native) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            new.writestr(name.replace("linux64", "darwin64"), old.read(name))
+    with pytest.raises(FmuError, match=r"linux64/FeedDrive\.so is missing, there are binaries for darwin64"):
+        FmuInstance(path)
+    changed(fmus("FeedDrivePy"), path, lambda name, data: None if name.endswith("machine.json") else data)
+    with pytest.raises(FmuError, match=r"Cut\.fmu cannot be instantiated: "):
+        FmuInstance(path)
+    assert not list(temporary.iterdir())
 
 
 def test_a_removed_working_directory_is_named(native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,12 +250,12 @@ def test_a_removed_working_directory_is_named(native: Path, tmp_path: Path, monk
 
 
 def test_threads_load_without_moving_the_process(
-    native: Path, unloadable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, eager_threads: None
+    native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, eager_threads: None
 ) -> None:
     """Relative paths, libraries that take a while to load, and some that cannot be loaded, in 8 threads at a time."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / native.name).write_bytes(native.read_bytes())
-    (tmp_path / unloadable.name).write_bytes(unloadable.read_bytes())
+    unloadable = changed(native, tmp_path / "Unloadable.fmu", of_binaries(lambda content: b"none"))
     load = fmpy.fmi1.cdll.LoadLibrary
 
     def load_slowly(path: str) -> Any:

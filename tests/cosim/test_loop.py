@@ -1,7 +1,8 @@
-"""Co-simulation loop: library objects and FMUs, alone and together, hooks, arguments that do not apply."""
+"""Co-simulation: library and FMUs in each other's place, against predictions of the log; results, files, hooks."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,20 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from hybridsep import Encoder, FmuInstance, backtest, cosimulate, load_machine, paper_machine, simulate, staircase
-from hybridsep.base.errors import ParameterError
-from hybridsep.cosim.run import COMPENSATOR, PREDICTOR
+from hybridsep import load_machine, paper_machine
+from hybridsep.base.errors import FmuError, ParameterError, SignalError
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
+from hybridsep.cosim.adapters import check_controller
+from hybridsep.cosim.fmu import FmuInstance
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.plants.plant import Encoder, simulate
+from hybridsep.plants.trajectory import staircase
 
 MACHINE = load_machine("spring_mass_damper")
 R = staircase()[:1200]
+PAPER = {"averaging": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 
 Fmu = Callable[[str], Path]
 
@@ -141,3 +150,131 @@ def test_arguments_that_have_no_use_are_refused(
     )
     with pytest.raises(ParameterError, match=message):
         cosimulate(*pair, R, **arguments)
+
+
+# FMUs --------------------------------------------------------------------------------------------------------------
+
+SIGNALS: dict[Kind, list[str]] = {
+    PREDICTOR: ["t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "x_h_std", "active"],
+    COMPENSATOR: ["t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std", "state"],
+}
+
+
+@pytest.fixture(scope="module")
+def runs(python_fmu: Fmu) -> dict[Kind, Run]:
+    """Short runs of a predictor and of a compensator."""
+    plant = python_fmu("FeedDrivePy")
+    return {
+        PREDICTOR: cosimulate(python_fmu("HybridPredictorPy"), plant, R[:900]),
+        COMPENSATOR: cosimulate(python_fmu("SepCompensatorPy"), plant, R[:600]),
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("choice", PARAMETERS["compensate"].choices)
+def test_native_fmus_equal_the_library_and_keep_the_drives_limits(python_fmu: Fmu, choice: str) -> None:
+    """1 nm, with the paper's model."""
+    values = {**PAPER, "compensate": PARAMETERS["compensate"].to_fmi(choice)}
+    run = cosimulate(python_fmu("SepCompensator"), python_fmu("FeedDrive"), R, controller_values=values)
+    given = {**MACHINE.fmi_compensator_parameters(), **values}
+    library = MACHINE.new_compensator(CompensatorSettings.from_fmi(given), predictor=PredictorSettings.from_fmi(given))
+    loop = cosimulate(library, MACHINE.new_plant(), R, encoder=encoder())
+    for name in SIGNALS[COMPENSATOR]:
+        one, other = getattr(run, name), getattr(loop, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=0 if name == "state" else 1e-9, err_msg=name)
+    assert run.t[0] == pytest.approx(0.2)
+    limits, change_max = MACHINE.command_limits()
+    assert limits is not None
+    for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+        assert np.abs(np.diff(run.x_dm, order)).max() <= limit * MACHINE.T_s**order * (1 + 1e-9)
+    assert change_max is not None
+    assert np.abs(run.change).max() <= change_max
+    assert run.summary()["change_max_um"] > 100.0 or choice == "off"
+
+
+@pytest.mark.slow
+def test_start_time_and_a_shifted_start(python_fmu: Fmu, runs: dict[Kind, Run]) -> None:
+    pair = python_fmu("SepCompensatorPy"), python_fmu("FeedDrivePy")
+    moved, short = cosimulate(*pair, R[:600] + 0.1, start_time=50.0), runs[COMPENSATOR]
+    np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(moved.t - 50.0, short.t, rtol=0, atol=1e-12)
+    assert (moved.Np, moved.T_s, len(moved.t)) == (50, 1e-3, 600)
+
+
+@pytest.mark.slow
+def test_summary_is_what_the_signals_say(runs: dict[Kind, Run]) -> None:
+    short = runs[COMPENSATOR]
+    summary, change = short.summary(), 1e6 * (short.x_dm - short.x_d)
+    for name, error in (("tracking", short.x_d - short.x), ("tracking_measured", short.x_d - short.x_meas)):
+        assert summary[f"{name}_rms_um"] == pytest.approx(1e6 * np.sqrt(np.mean(error**2)))
+        assert summary[f"{name}_max_um"] == pytest.approx(1e6 * np.max(np.abs(error)))
+    assert summary["change_rms_um"] == pytest.approx(np.sqrt(np.mean(change**2)))
+    assert summary["change_max_um"] == pytest.approx(np.max(np.abs(change)))
+    assert summary["peak_jerk_m_s3"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 3))) * 1e9)
+    assert summary["peak_acceleration_m_s2"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 2))) * 1e6)
+    # Nothing is learned before the first window, of 50 samples; the second follows its plan for 24 more.
+    assert summary["share_physics"] == pytest.approx(74 / 600)
+    assert summary["share_off"] + summary["share_physics"] + summary["share_hybrid"] == pytest.approx(1.0)
+    assert summary["n_samples"] == 600
+    run = runs[PREDICTOR]
+    result = backtest(MACHINE.new_predictor(), R[:900], run.x_meas)
+    assert run.summary()["rms_h_um"] == pytest.approx(result.summary()["rms_h_um"], rel=1e-9)
+    np.testing.assert_allclose(run.batch_rms()["x_h"], result.batch_rms_h, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", SIGNALS)
+def test_results_as_csv_and_npz(runs: dict[Kind, Run], tmp_path: Path, kind: Kind) -> None:
+    run = runs[kind]
+    run.save(tmp_path / "run.csv")
+    run.save(tmp_path / "run.npz")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert list(arrays) == list(rows[0]) == SIGNALS[kind]
+        for name in arrays:
+            np.testing.assert_array_equal(arrays[name], [float(row[name]) for row in rows])
+            np.testing.assert_array_equal(arrays[name], getattr(run, name))
+    with pytest.raises(ValueError, match=r"written as .csv or .npz, got 'run.txt'"):
+        run.save(tmp_path / "run.txt")
+
+
+def test_progress_is_reported_to_the_end(python_fmu: Fmu) -> None:
+    calls: list[tuple[int, int]] = []
+    pair = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy")
+    cosimulate(*pair, staircase()[:300], progress=lambda k, n: calls.append((k, n)))
+    assert calls[-1] == (400, 400)
+    assert 50 < len(calls) < 150
+
+
+def test_what_is_refused(python_fmu: Fmu) -> None:
+    names = ("HybridPredictorPy", "SepCompensatorPy", "FeedDrivePy", "FeedDrivePy_als25010_x")
+    predictor, compensator, plant, other = map(python_fmu, names)
+    cases: list[tuple[tuple[Path, Path], list[float], dict[str, Any], str]] = [
+        ((predictor, plant), [0.0, float("nan")], {}, "r must be finite, got nan at sample 1"),
+        ((predictor, plant), [], {}, "r must have 1 samples, got 0"),
+        ((predictor, plant), [0.0], {"controller_values": {"p": 101}}, "p must be 1 … Np = 100, got 101"),
+        ((compensator, plant), [0.0], {"controller_values": {"preview": 60}}, "preview must be ≥ Np"),
+        ((predictor, plant), [0.0], {"plant_values": {"stiffness": 1.0}}, "has no variable 'stiffness'"),
+        ((plant, predictor), [0.0], {}, r"FeedDrivePy.fmu is no predictor: it has no input x_d_ahead"),
+        ((predictor, predictor), [0.0], {}, r"HybridPredictorPy.fmu is no plant: it has no input x_d$"),
+        (
+            (predictor, other),
+            [0.0],
+            {"plant_values": {"T_s": 0.002}},
+            r"FeedDrivePy_als25010_x.fmu has T_s = 0.002 s, but HybridPredictorPy.fmu has 0.001 s",
+        ),
+        *(
+            (
+                (predictor, plant),
+                [0.0],
+                {"plant_values": {"seed": value}},
+                rf"seed must be a whole number .* got {value!r}",
+            )
+            for value in (99_999_999_999, 1.5, "one")
+        ),
+    ]
+    for pair, r, values, message in cases:
+        with pytest.raises((FmuError, SignalError), match=message):
+            cosimulate(*pair, r, **values)
+    with pytest.raises(FmuError, match=r"HybridPredictorPy.fmu is no compensator: it has no output x_dm"):
+        check_controller(predictor, COMPENSATOR)

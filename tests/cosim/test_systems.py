@@ -89,7 +89,7 @@ def test_the_picture_is_tidy(archive: Path) -> None:
             assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
 
 
-@pytest.mark.parametrize("compensate", [None, "physics", "hybrid"])
+@pytest.mark.parametrize("compensate", [None, "hybrid"])
 def test_every_fmu_starts_where_the_trajectory_does(tmp_path: Path, compensate: str | None) -> None:
     """Its start values alone do, in a tool that carries nothing before the first step."""
     machine, shift, command = load_machine("spring_mass_damper"), 0.11, staircase()[:400]

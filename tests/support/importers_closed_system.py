@@ -1,8 +1,9 @@
 """ReferenceTrajectory → a look-ahead FMU → FeedDrive over the staircase, in one importer after the other.
 
 Run as a program, so that an importer's threads and libraries live in a process of their own:
-``python tests/support/importers_closed_system.py IMPORTER SYSTEM FOLDER …`` runs systems one after the other. A FOLDER
-holds three FMUs, and gets what :func:`run` returns as rows.npy.
+``python tests/support/importers_closed_system.py IMPORTER FOLDER MOVED OUT`` runs all systems that the importer can,
+with the FMUs of a folder, and of another one whose trajectory, command.npy, starts elsewhere; what :func:`run` returns
+goes to OUT.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -36,24 +38,27 @@ STEP = 1e-3  # s
 GUIDE = ROOT / "docs" / "evidence" / "importers.md"
 
 
+UNCARRIED = ("fmpy SSP", "fmucontainer -sequential")
+"""Importers that carry nothing to the drive before the first step, and change the first measurement."""
+
+READ_FMI3 = ("ecos", "fmucontainer")
+MOVED = " moved"
+
+
 @dataclass(frozen=True)
 class ClosedSystem:
     """A closed system of three FMUs: ``reference``, the look-ahead and ``drive``.
 
     Attributes
     ----------
-    look_ahead : str
-        The look-ahead's name in the system.
-    model : str
-        Its FMU.
+    look_ahead, model : str
+        The look-ahead's name in the system, and its FMU.
     command : str
         Its output that goes to the drive.
     delay : int
         By how many samples it delays the trajectory; the trajectory is held at its end for as many more.
-    positions : tuple of str
-        Its outputs that move with the trajectory.
-    reported : tuple of str
-        Its own figures, errors since ``t_init``.
+    positions, reported : tuple of str
+        Its outputs that move with the trajectory, and its own figures, errors since ``t_init``.
     figures : tuple of str
         Figures of ``reported`` that the guide states.
     errors : tuple of (str, str)
@@ -76,11 +81,6 @@ class ClosedSystem:
     n_samples: int = N_SAMPLES
 
     @property
-    def key(self) -> str:
-        """Key in :data:`SYSTEMS` or :data:`FMI3_SYSTEMS`."""
-        return f"{self.look_ahead} {self.suffix}".strip()
-
-    @property
     def components(self) -> dict[str, str]:
         """Name → FMU, in the order of the signals."""
         models = {"reference": "ReferenceTrajectory", self.look_ahead: self.model, "drive": "FeedDrive"}
@@ -98,12 +98,8 @@ class ClosedSystem:
     @property
     def observed(self) -> tuple[tuple[str, str], ...]:
         """Component and output of each column of what the runs return; the positions first."""
-        return (
-            *((self.look_ahead, name) for name in self.positions),
-            ("drive", "x"),
-            ("drive", "x_meas"),
-            *((self.look_ahead, name) for name in self.reported),
-        )
+        own, drive = self.look_ahead, (("drive", "x"), ("drive", "x_meas"))
+        return (*((own, name) for name in self.positions), *drive, *((own, name) for name in self.reported))
 
     @property
     def n_positions(self) -> int:
@@ -111,14 +107,13 @@ class ClosedSystem:
         return len(self.observed) - len(self.reported)
 
     @property
-    def first(self) -> int:
-        """Row where the first fill ends."""
-        return self.delay - 1
-
-    @property
     def n_steps(self) -> int:
         """Steps to the trajectory's last sample."""
         return self.n_samples - 1 + self.delay
+
+    def columns(self, rows: Array) -> dict[str, Array]:
+        """Return the columns by the outputs' names, from the end of the first fill on, m."""
+        return dict(zip((name for _, name in self.observed), rows[self.delay - 1 :].T, strict=True))
 
 
 SYSTEMS = {
@@ -146,8 +141,6 @@ SYSTEMS = {
         ),
     )
 }
-
-FMI3_SYSTEMS = {system.key: system for system in (replace(system, suffix="Fmi3") for system in SYSTEMS.values())}
 
 
 def blocks(language: str) -> list[str]:
@@ -300,9 +293,19 @@ def run(importer: str, system: ClosedSystem, folder: Path) -> Array:
     return np.asarray(rows, dtype=np.float64)
 
 
-if __name__ == "__main__":
-    for key, place in zip(sys.argv[2::2], map(Path, sys.argv[3::2]), strict=True):
-        played = np.load(place / "command.npy") if (place / "command.npy").exists() else staircase()
-        system = replace((SYSTEMS | FMI3_SYSTEMS)[key], n_samples=len(played))
+def main(importer: str, folder: Path, moved: Path, out: Path) -> None:
+    """Run all systems that an importer can, each in a folder of its own."""
+    runs = {key: (system, folder) for key, system in SYSTEMS.items()}
+    if importer not in UNCARRIED:
+        n = len(np.load(moved / "command.npy"))
+        runs |= {f"{key}{MOVED}": (replace(system, n_samples=n), moved) for key, system in SYSTEMS.items()}
+    if importer in READ_FMI3:
+        runs["predictor Fmi3"] = replace(SYSTEMS["predictor"], suffix="Fmi3"), folder
+    for name, (system, source) in runs.items():
+        place = shutil.copytree(source, out / name.replace(" ", "_"))
         os.chdir(place)
-        np.save("rows.npy", run(sys.argv[1], system, place))
+        np.save(out / f"{name}.npy", run(importer, system, place))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(Path, sys.argv[2:]))
