@@ -124,13 +124,6 @@ def test_hold_is_the_last_sample_measured_whatever_is_believed(delay: int) -> No
     assert run.prediction_figures()["rms_hold_um"] == pytest.approx(1e6 * result.overall.rms_hold, rel=1e-12)
 
 
-def test_warm_up_publishes_the_physics_model() -> None:
-    result = backtest(predictor(t_init=0.25), *log())
-    np.testing.assert_array_equal(result.x_h[:250], result.x_pb[:250])
-    np.testing.assert_array_equal(result.x_hold[:250], result.x_pb[:250])
-    assert (result.x_h[250:] != result.x_pb[250:]).all()
-
-
 def test_log_shorter_than_the_warm_up() -> None:
     result = backtest(predictor(), *log(30))
     assert result.after_warm_up.n_samples == 0
@@ -171,16 +164,6 @@ def test_on_batch_over_arrays() -> None:
     np.testing.assert_array_equal([batch.rms_h for batch in batches], result.batch_rms_h)
 
 
-def test_second_run_starts_warm() -> None:
-    x_d, x = log()
-    learning = predictor()
-    cold = backtest(learning, x_d, x)
-    learning.restart()
-    warm = backtest(learning, x_d, x)
-    assert warm.active.all()
-    assert warm.overall.rms_h < cold.overall.rms_h
-
-
 @pytest.mark.parametrize(
     ("x_d", "x", "message"),
     [
@@ -189,7 +172,6 @@ def test_second_run_starts_warm() -> None:
         ([[0.0]], [[0.0]], r"x_d must be one-dimensional, got shape \(1, 1\)"),
         ([0.0, math.nan], [0.0, 0.0], "x_d must be finite, got nan at sample 1"),
         ([0.0, 0.0], [0.0, math.inf], "x_meas must be finite, got inf at sample 1"),
-        (["a"], [0.0], "x_d must be numbers"),
     ],
 )
 def test_bad_arrays(x_d: list[float], x: list[float], message: str) -> None:
