@@ -146,6 +146,11 @@ def test_systems_that_are_no_sum_of_modes(system: Any, message: str) -> None:
         (lambda: ModalModel([UNDER], -1), "dead_time must be 0 … 100000, got -1"),
         (lambda: Mode(25.0, -0.1, 1.0, 0.0), "zeta must be 1e-06 … 10000, got -0.1"),
         (lambda: ModalModel.spring_mass_damper(1.0, 1.0, -1.0), "k must be 1e-06 … 1e+15 N/m, got -1.0"),
+        (
+            lambda: ModalModel.spring_mass_damper(1.0, 1.0, 1e-6),
+            "m = 1 kg, c = 1 N.s/m, k = 1e-06 N/m give a mode out of range: f_n must be 0.001 … 100000 Hz, "
+            "got 0.00015915494309189535",
+        ),
         (lambda: ModalModel([UNDER]).discretise(0.0), "T_s must be 1e-05 … 1 s, got 0.0"),
         (lambda: DiscreteModel(ModalModel([UNDER]).state_space(), 0, -1.0), "T_s must be 1e-05 … 1 s, got -1.0"),
         (lambda: ModalModel([UNDER]).discretise(TS, "soh"), "input_hold must be one of zoh, foh, got 'soh'"),

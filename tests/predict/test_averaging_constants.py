@@ -80,11 +80,6 @@ def test_no_number_of_the_core_is_without_a_name(path: Path) -> None:
     assert set(literals_of_core(path.read_text(encoding="utf-8"))) <= PLAIN
 
 
-def test_a_number_without_a_name_is_found() -> None:
-    assert list(literals_of_library('LEAST = 3.0\n"""Reason."""\nx = LEAST + 0.25\n')) == [0.25]
-    assert list(literals_of_core("static const double least = 3.0;\nx = least + 0.25; /* 7 */\n")) == [0.25]
-
-
 def members(header: str, struct: str) -> list[str]:
     """Return the names of a struct's members."""
     text = next(path for path in CORE if path.name == header).read_text(encoding="utf-8")

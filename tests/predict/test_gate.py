@@ -166,13 +166,6 @@ def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags
     assert learned.evidence[COMMAND_RESIDUAL].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
 
 
-def test_without_averaging_a_missing_sample_is_an_error() -> None:
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False))
-    predictor.predict(np.zeros(NP))
-    with pytest.raises(SignalError, match="must be finite, got nan at sample 3"):
-        predictor.update(np.where(np.arange(NP) == 3, np.nan, 0.0))
-
-
 def test_infinite_measurements_stay_errors_with_averaging() -> None:
     predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=True))
     predictor.predict(np.zeros(NP))

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from benchmarks.periodic import errors, moves, new_predictor
-from hybridsep.base.errors import ParameterError
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -36,9 +32,3 @@ def test_a_saved_predictor_goes_on_the_same() -> None:
     backtest(first, x_d[:700], x[:700])
     second = HybridPredictor.from_bytes(first.to_bytes())
     np.testing.assert_array_equal(second.predict(x_d[700:800]).x_h, first.predict(x_d[700:800]).x_h)
-
-
-@pytest.mark.parametrize("period", [-1e-3, 1e-12, 1e3, math.nan])
-def test_illegal_periods_are_refused(period: float) -> None:
-    with pytest.raises(ParameterError, match="period must be"):
-        PredictorSettings(period=period)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,33 +27,16 @@ def rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-@lru_cache(maxsize=1)
-def replayed() -> tuple[Array, Array, Array]:
-    """Return the paper's run with noise seed 0."""
-    return replay(
-        HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)),
-        staircase.commanded(),
-        staircase.measured(0),
-    )
-
-
 class TestStaircase:
     @pytest.mark.slow
     def test_equals_the_oracle(self) -> None:
-        x_pb, x_h, active = replayed()
-        slow = oracle.run(NUMERATOR, DENOMINATOR, staircase.commanded(), staircase.measured(0), **PAPER)
+        x_d, x = staircase.commanded(), staircase.measured(0)
+        x_pb, x_h, active = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)), x_d, x)
+        slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
         np.testing.assert_allclose(x_pb, slow.x_pb, rtol=0, atol=1e-12)
         np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
         np.testing.assert_array_equal(active, slow.active)
         assert active.sum() == 6001 - 300
-
-    @pytest.mark.slow
-    def test_equals_the_oracle_elsewhere_on_the_axis(self) -> None:
-        x_d, x = staircase.commanded() + 0.1, staircase.measured(0) + 0.1
-        _, x_h, _ = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)), x_d, x)
-        slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
-        np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(x_h - 0.1, replayed()[1], rtol=0, atol=1e-10)
 
     def test_figures_of_the_paper_and_of_a_warm_start(self) -> None:
         x_d = staircase.commanded()
@@ -144,10 +126,6 @@ def test_operator_is_lower_triangular_toeplitz_and_of_a_window_by_default() -> N
         for j in range(predictor.Np):
             np.testing.assert_array_equal(G[j:, j], g[: predictor.Np - j])
             np.testing.assert_array_equal(G[:j, j], 0.0)
-    # Column by column, what a unit command changes
-    free = predictor.predict(np.zeros(predictor.Np)).x_h
-    columns = [predictor.predict(np.eye(predictor.Np)[j]).x_h - free for j in range(predictor.Np)]
-    np.testing.assert_allclose(operator.G_h, np.array(columns).T, rtol=0, atol=1e-12)
 
 
 @examples(40)

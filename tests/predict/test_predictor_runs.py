@@ -7,14 +7,13 @@ import math
 import pickle
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import staircase_data as staircase
 from predictor_cases import MODEL, replay, small_signals, trained
 
-from hybridsep.base.errors import ParameterError, SignalError, StateError
+from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -141,33 +140,6 @@ def test_memory_does_not_grow() -> None:
     assert len(predictor.to_bytes()) - size <= 8  # only the digits of the counters
 
 
-def test_fmi_names() -> None:
-    parameters = {"lambda": 1e-9, "T_s": 5e-4, "input_hold": 1, "Np": 8, "p": 3, "q": 1, "t_init": 0.0}
-    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi({"averaging": False, **parameters}), start=0.5)
-    assert (predictor.settings.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
-    assert (predictor.Np, predictor.settings.p, predictor.settings.q, predictor.start) == (8, 3, 1, 0.5)
-    assert predictor.regression.n_features == len(predictor.weights) == 6
-    with pytest.raises(ParameterError, match=r"^input_hold must be 0 … 1, got 2$"):
-        HybridPredictor(MODEL, PredictorSettings.from_fmi({"input_hold": 2}))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"p": 120}, "p must be 1 … Np = 100, got 120; lower p or raise Np"),
-        ({"q": 100}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
-        ({"Np": 0, "lam": -1.0}, "Np must be 1 … 100000, got 0; lambda must be 1e-40 … 1e+12 m2, got -1.0"),
-        ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
-        ({"t_init": -0.1}, "t_init must be -1 (automatic) or 0 … 1000000 s, got -0.1"),
-        ({"input_hold": "soh"}, "input_hold must be one of zoh, foh, got 'soh'"),
-    ],
-)
-def test_parameters_that_do_not_fit(change: dict[str, Any], message: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        HybridPredictor(MODEL, PredictorSettings(**change))
-    assert str(caught.value) == message
-
-
 @pytest.mark.parametrize(
     ("use", "message"),
     [
@@ -192,19 +164,6 @@ def test_bad_calls_are_refused_and_change_nothing(use: Callable[[HybridPredictor
         use(predictor)
     assert str(caught.value) == message
     assert predictor.to_bytes() == before
-
-
-def test_update_must_follow_predict() -> None:
-    predictor = trained(50)
-    with pytest.raises(SignalError, match=r"^update must follow predict: there is no predicted window to measure$"):
-        predictor.update(np.zeros(10))
-
-
-def test_a_file_that_is_no_predictor(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("t,x_d,x\n" * 10)
-    with pytest.raises(StateError, match=r"^a saved state of kind 'predictor' was expected, got 80 bytes of"):
-        HybridPredictor.load(path)
 
 
 def test_a_predictor_says_its_settings_and_how_much_it_has_learned() -> None:
