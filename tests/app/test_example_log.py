@@ -20,14 +20,11 @@ def test_it_is_written_and_read(hybridsep: Run, tmp_path: Path, monkeypatch: pyt
     assert hybridsep("example-log", "--out", "logs/other.csv.gz")[0] == 0
     log = read_log("example_axis.csv")
     assert (len(log.t), log.T_s, log.unit, log.unit_stated) == (20_000, 1e-3, "m", True)
+    assert check(log) == ()
     np.testing.assert_array_equal(read_log("logs/other.csv.gz").x_meas, log.x_meas)
     assert EXAMPLE.stat().st_size < 300_000
     assert hybridsep("example-log")[0] == 2
     assert "--out must end in .csv or .gz, got 'log.mat'" in hybridsep("example-log", "--out", "log.mat")[2]
-
-
-def test_the_checks_have_nothing_to_say_of_it() -> None:
-    assert check(read_log(EXAMPLE)) == ()
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
-from hybridsep.base.errors import FmuError, LogError, ParameterError
+from hybridsep.base.errors import FmuError, ParameterError
 from hybridsep.cosim.adapters import FmuController
 from hybridsep.fitting import build
 from hybridsep.fitting.build import Built, StepTimes, fit_files, sha256_of
@@ -171,32 +171,14 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out
-    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 20 mm, as the file states no unit" in " ".join(
-        out.split()
-    )
+    out = " ".join(out.split())
+    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 20 mm, as the file states no unit" in out
     assert "report: " in out
     assert result["judged"]["n_windows"] == 10
     assert "Judged by 10 windows only." in out
     assert "So far the hybrid is " in out
-    assert "judged by 10 windows only: record at least 1.7 s." in " ".join(out.split())
-    assert "held-out samples [µm]" in " ".join(out.split())
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("quick_fit")
-def test_a_flipped_sign_is_refused(hybridsep: Run, tmp_path: Path) -> None:
-    log = write_rows(tmp_path / "axis.csv", commanded()[:800], -measured(0)[:800])
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
-    assert (status, out) == (2, "")
-    assert "axis.csv: sign: the measured position moves opposite to the command" in err
-
-
-def test_a_log_without_motion_is_refused(log: Path) -> None:
-    still = replace(read_log(log), x_d=np.full(N, 0.1))
-    with pytest.raises(
-        LogError, match=r"axis.csv: no motion: the commanded position never changes: an axis at rest shows neither"
-    ):
-        fit(still)
+    assert "judged by 10 windows only: record at least 1.7 s." in out
+    assert "held-out samples [µm]" in out
 
 
 @pytest.mark.slow
@@ -209,9 +191,8 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     used = [read_log(write_rows(tmp_path / "axis.csv", x_d, x))]
     for logs, name in ((used, "this log"), (2 * used, "these logs")):
         [reason] = fit(logs, Np=NP).identification.findings
-        assert reason.startswith(
-            f"the first half of {name} cannot determine a model, because the commanded position does not move"
-        )
+        why = "cannot determine a model, because the commanded position does not move"
+        assert reason.startswith(f"the first half of {name} {why}")
 
 
 @pytest.mark.slow
@@ -219,12 +200,10 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
 def test_too_short_a_log_judges_nothing(tmp_path: Path) -> None:
     log = write_rows(tmp_path / "short.csv", commanded()[1000:1150], measured(0)[1000:1150])
     found = fit(read_log(log), Np=NP)
-    assert (
-        "because 75 of its 150 samples train, at least 100 are needed; a gain of 1" in found.identification.findings[0]
-    )
-    assert found.advice == (
-        "Nothing could be judged: the log's second half has 1 window of 50 samples; record at least 2.1 s."
-    )
+    words = "because 75 of its 150 samples train, at least 100 are needed; a gain of 1"
+    assert words in found.identification.findings[0]
+    told = "Nothing could be judged: the log's second half has 1 window of 50 samples; record at least 2.1 s."
+    assert found.advice == told
     assert found.results()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
@@ -302,41 +281,32 @@ def test_a_rotary_axis_stays_one_under_the_default_machines_name(log: Path, tmp_
     assert all(path.exists() for path in found.files.values())
 
 
-def test_logs_of_different_sampling_are_refused(log: Path) -> None:
+@pytest.mark.parametrize(
+    ("file", "axis", "name"),
+    [
+        ("axis.csv", None, "axis"),
+        ("X axis-2.tar.gz", None, "X_axis_2"),
+        ("2026 run.csv", None, "axis_2026_run"),
+        ("logs/spindle.2026-11-26.csv", None, "spindle_2026_11_26"),
+        ("µ.csv", None, "axis"),
+        ("capture.json", "Y1", "capture_Y1"),
+        ("my_axis.csv.gz", "X", "my_axis_X"),
+    ],
+)
+def test_the_machine_is_named_after_log_and_axis(file: str, axis: str | None, name: str) -> None:
+    assert machine_name(Path(file), axis) == name
+
+
+def test_what_cannot_be_is_refused(log: Path) -> None:
     found = read_log(log)
     with pytest.raises(ParameterError, match=r"axis\.csv is sampled every 0\.002 s, axis\.csv every 0\.001 s"):
         fit([found, replace(found, T_s=2e-3)])
     with pytest.raises(ParameterError, match=r"axis\.csv is in rad, axis\.csv in m"):
         fit([found, replace(found, unit="rad")])
-
-
-@pytest.mark.parametrize(
-    ("file", "name"),
-    [("axis.csv", "axis"), ("X axis-2.tar.gz", "X_axis_2"), ("2026 run.csv", "axis_2026_run"), ("µ.csv", "axis")],
-)
-def test_the_machine_is_named_after_the_log(file: str, name: str) -> None:
-    assert machine_name(Path(file)) == name
-
-
-def test_axes_of_one_recording_have_names_of_their_own() -> None:
-    assert machine_name(Path("capture.json"), "Y1") == "capture_Y1"
-
-
-@pytest.mark.parametrize("Np", [1501, 100_000])
-def test_a_look_ahead_longer_than_what_judges_is_refused(log: Path, Np: int) -> None:
-    with pytest.raises(ParameterError, match=rf"Np must be at most 1500, got {Np}: the first half of each log trains"):
-        fit(read_log(log), Np=Np)
-
-
-def test_what_is_known_has_a_name(log: Path) -> None:
+    with pytest.raises(ParameterError, match="Np must be at most 1500, got 1501: the first half of each log trains"):
+        fit(found, Np=1501)
     with pytest.raises(ParameterError, match=r"must be of period, measurement_delay, v_max, .*, got 'pitch'"):
-        fit(read_log(log), pitch=0.01)
-
-
-def test_a_name_that_can_be_none_of_an_fmu_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
-    status, _, err = hybridsep("fit", log, "--out", tmp_path, "--name", "no name")
-    assert status == 2
-    assert "--name must be" in err
+        fit(found, pitch=0.01)
 
 
 def test_all_files_are_declared(built: Built, log: Path) -> None:

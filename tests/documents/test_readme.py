@@ -36,16 +36,11 @@ def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
     assert load_machine(path).model.dc_gain == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "example",
-    [
-        # of the others test_commands.py, test_mechanism.py, test_paper.py, test_machine.py run what they show
-        pytest.param(path.name, marks=[pytest.mark.nightly] if path.stem != "example_log" else [])
-        for path in sorted((ROOT / "examples").glob("*.py"))
-        if "__main__" in path.read_text("utf-8")
-    ],
-)
+EXAMPLES = [path.name for path in sorted((ROOT / "examples").glob("*.py")) if "__main__" in path.read_text("utf-8")]
+
+
+@pytest.mark.nightly  # by day: test_commands, test_mechanism, test_paper, test_machine, test_example_log
+@pytest.mark.parametrize("example", EXAMPLES)
 def test_examples_run(example: str, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
