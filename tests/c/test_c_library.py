@@ -16,7 +16,7 @@ import staircase_data as staircase
 from c_compiler import C_SOURCES, compiler, include_flags
 from c_core import SPRING_MASS_DAMPER, STAGE_MODES, CModel
 from c_library import STRICT, Library, cmake, configured, installed
-from library_models import trained_predictor
+from library_models import trained_state
 from places import ROOT
 from spoiled_weights import spoiled
 
@@ -162,7 +162,7 @@ def test_outputs_are_the_models(averaging: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_weights_from_memory(kind: str) -> None:
-    trained = trained_predictor("HybridPredictor")
+    trained = HybridPredictor.load(trained_state("HybridPredictor"))
     content = weights_file(trained)
     modes = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")} for mode in trained.model.modes]
     settings = {name: float(value) for name, value in trained.settings.to_fmi().items()}

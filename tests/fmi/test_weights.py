@@ -17,19 +17,18 @@ import fmpy
 import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
-from library_models import trained_predictor
+from library_models import trained_state
 from properties import share
-from spoiled_weights import sealed, spoiled
+from spoiled_weights import spoiled
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.base.state import numbers_of
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.spec import fmu_names
-from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -38,11 +37,9 @@ MACHINE = paper_machine("spring_mass_damper")
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trained() -> Path:
     """The state of a predictor that has seen one staircase."""
-    path = tmp_path_factory.mktemp("trained") / "trained.state"
-    trained_predictor("HybridPredictor").save(path)
-    return path
+    return trained_state("HybridPredictor")
 
 
 def build(flavour: str, out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
@@ -64,9 +61,7 @@ def test_the_weights_are_in_the_resources_and_in_the_guid(flavour: str, tmp_path
 @pytest.mark.parametrize(
     ("changes", "differing"),
     [
-        ({"p": 40}, "p = 40 instead of 50"),
         ({"q": 5, "lam": 1e-9}, "q = 5 instead of 3, lambda = 1e-09 instead of 1e-12"),
-        ({"Np": 60}, "Np = 60 instead of 100"),
         ({"T_s": 2e-3, "input_hold": "foh"}, "T_s = 0.002 instead of 0.001, input_hold = foh instead of zoh"),
     ],
 )
@@ -109,22 +104,6 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
         build_fmu(MACHINE, "FeedDrive", tmp_path, samples=[0.0])
 
 
-def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
-    content = weights_file(HybridPredictor.load(trained))
-    predictor = MACHINE.new_predictor()
-    n_numbers = len(numbers_of(predictor.state.uncertainty))
-    first = 32 + 32 * len(learned_settings(predictor.settings, predictor.model)) + 8 * (n_numbers + 1)
-    zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
-    infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
-    longer = sealed(content[:-8] + bytes(8))
-    for damaged in (b"", content[:-8], b"X" + content[1:], content + bytes(8), zero, infinite, longer):
-        with pytest.raises(StateError, match=r"weights\.bin must be a factor of learned rows; it is damaged or trunc"):
-            restore_weights(predictor, damaged)
-    assert not predictor.weights.any()
-    restore_weights(predictor, content)
-    assert predictor.weights.any()
-
-
 def mutations(content: bytes, count: int) -> Iterator[bytes]:
     """Yield contents with flipped, replaced, lost, doubled or exchanged bytes, all other than the given one."""
     chance = random.Random(0)
@@ -156,7 +135,7 @@ def mutations(content: bytes, count: int) -> Iterator[bytes]:
 def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    for changed in mutations(content, share(20_000)):
+    for changed in mutations(content, share(6000)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
     assert not predictor.weights.any()
@@ -170,25 +149,11 @@ def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     file, model = tmp_path / WEIGHTS_FILE, CModel("predictor_2", {"p": 4, "q": 2, "Np": 8}, tmp_path)
     content = file.read_bytes()
     model.initialise()
-    for changed in mutations(content, share(5000)):
+    for changed in mutations(content, share(3000)):
         file.write_bytes(changed)
         assert refusal(model.initialise)
     file.write_bytes(content)
     model.initialise()
-
-
-def test_weights_in_memory_are_those_of_the_file(tmp_path: Path) -> None:
-    write_weights(tmp_path, "predictor_2", np.linalg.qr(np.eye(40, 9))[1], 40, p=4, q=2)
-    content = (tmp_path / WEIGHTS_FILE).read_bytes()
-    settings = {"p": 4, "q": 2, "Np": 8}
-    from_file = CModel("predictor_2", settings, tmp_path).initialise()
-    in_memory = CModel("predictor_2", settings)
-    for damaged in (content[:-8], content + b"\0", b"X" + content[1:]):
-        in_memory.context.weights, in_memory.context.weights_size = damaged, len(damaged)
-        assert "weights.bin must be a factor of learned rows" in refusal(in_memory.initialise)
-    in_memory.context.weights, in_memory.context.weights_size = content, len(content)
-    assert in_memory.initialise().state.tobytes() == from_file.state.tobytes()
-    assert from_file.state.tobytes() != CModel("predictor_2", settings).initialise().state.tobytes()
 
 
 AVERAGING = {"p": 4, "q": 2, "Np": 20, "averaging": 1}
@@ -220,6 +185,10 @@ def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
         assert "it is damaged or truncated" in said if name in damaged else "weights.bin" in said, name
         assert said == refusal(in_memory.initialise), name
     assert predictor.regression.n_rows == 0.0
+    (tmp_path / WEIGHTS_FILE).write_bytes(content)
+    in_memory.context.weights, in_memory.context.weights_size = content, len(content)
+    states = [model.initialise().state.tobytes() for model in (from_file, in_memory, CModel("predictor", AVERAGING))]
+    assert states[0] == states[1] != states[2]
 
 
 def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
@@ -322,7 +291,7 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
             "--weights is for one HybridPredictor or SepCompensator, this would build none",
         ),
         (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
-        (("-m", "emps", "--weights", "TRAINED"), "trained.state was not trained for machine emps: it has "),
+        (("-m", "emps", "--weights", "TRAINED"), "HybridPredictor.state was not trained for machine emps: it has "),
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
         (
             ("SepCompensator", "--no-windows"),

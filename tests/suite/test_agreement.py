@@ -57,17 +57,11 @@ def named(values: object) -> str:
 
 @pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize(
-    ("p", "q", "start"),
-    [
-        (50, 3, 0.0),
-        (100, 99, 0.1),
-        pytest.param(50, 3, 0.1, marks=pytest.mark.nightly),
-        pytest.param(100, 99, 0.0, marks=pytest.mark.nightly),
-    ],
-)
-def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p: int, q: int, start: float) -> None:
-    loop = assert_agreement(new_stream, 3000, {"p": p, "q": q}, 1e-11, start=start)
+@pytest.mark.parametrize(("p", "q", "n", "start"), [(50, 3, 3000, 0.0), (100, 99, 1500, 0.1)])
+def test_the_staircase_is_predicted_as_by_the_library(
+    new_stream: StreamMaker, p: int, q: int, n: int, start: float
+) -> None:
+    loop = assert_agreement(new_stream, n, {"p": p, "q": q}, 1e-11, start=start)
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
 
 
@@ -92,16 +86,14 @@ def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, val
 
 
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
-def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
-    loop = assert_agreement(new_stream, 2550, {"averaging": True, "t_init": -1.0}, 1e-12, start=start)
+def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream: StreamMaker) -> None:
+    loop = assert_agreement(new_stream, 2550, {"averaging": True, "t_init": -1.0}, 1e-12)
     assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
     assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
 
 
 @pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("path", ["spiral", pytest.param("staircase", marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
     "values",
     [
@@ -118,10 +110,10 @@ def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream:
     ids=named,
 )
 def test_every_parameter_predicts_with_averaging_as_in_the_library(
-    new_stream: StreamMaker, values: dict[str, Value], path: str
+    new_stream: StreamMaker, values: dict[str, Value]
 ) -> None:
     n = 150 if values.get("Np") == 1 else 650
-    assert_agreement(new_stream, n, {"averaging": True, **values}, 1e-12, path=path)
+    assert_agreement(new_stream, n, {"averaging": True, **values}, 1e-12, path="spiral")
 
 
 def faulty(k: int, x_meas: float, last: float) -> float:
@@ -139,9 +131,8 @@ def faulty(k: int, x_meas: float, last: float) -> float:
 
 @pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("values", [{}, {"Np": 30, "p": 7, "q": 1}], ids=named)
-def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    given = {"averaging": True, "t_init": -1.0, **values}
+def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMaker) -> None:
+    given: dict[str, Value] = {"averaging": True, "t_init": -1.0}
     loop = assert_agreement(new_stream, 2850, given, 1e-12, sensor=faulty)
     sound = closed_loop(new_stream.model, 2850, given)
     change = np.abs(loop.column(PREDICTOR, "x_h") - loop.column(PREDICTOR, "x_pb"))
@@ -154,10 +145,9 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
 
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
-def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
     # The limits act in some windows.
-    loop = assert_agreement(new_stream, 2400, PAPER, 1e-11, start=start)
+    loop = assert_agreement(new_stream, 2400, PAPER, 1e-11)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
 
@@ -167,22 +157,16 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
 @pytest.mark.parametrize(
     "values",
     [
-        BEST,
         BEST | TIGHT,
         PAPER | TIGHT,  # nearly every plan is bounded
-        pytest.param(PAPER | TIGHT | {"Np": 50, "p": 20, "t_init": 0.1}, marks=pytest.mark.nightly),
         PAPER | {"change_max": 2e-4, "t_init": -1.0},
         PAPER | {"no_reversal": 0, "t_init": 0.1},
         PAPER | {"compensate": 0},
         PAPER | {"compensate": 1, "spacing": 5},
         PAPER | {"spacing": 1, "preview": 130, "p": 7, "q": 0},
-        pytest.param(PAPER | {"spacing": 20, "preview": 207, "p": 7, "q": 99}, marks=pytest.mark.nightly),
         PAPER | {"Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "t_init": 0.05},
-        pytest.param(PAPER | {"Np": 20, "p": 10, "q": 5, "preview": 160}, marks=pytest.mark.nightly),
-        pytest.param(BEST | {"Np": 8, "p": 5, "q": 2, "preview": 160, "t_init": 0.3}, marks=pytest.mark.nightly),
         PAPER | {"Np": 1, "p": 1, "q": 0, "spacing": 1, "preview": 60, "t_init": 0.05},
         PAPER | {"input_hold": 1, "dead_time": 3, "p": 10},
-        PAPER | {"jerk_weight": 0.0, "t_init": 0.0, "p": 10},
         PAPER | {"jerk_weight": 300.0, "lambda": 1e-6},
     ],
     ids=named,
@@ -197,9 +181,7 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     "values",
     [
         BEST | TIGHT,
-        BEST | {"compensate": 1, "change_max": 3e-4, "spacing": 5},
         TIGHT,
-        pytest.param(BEST | {"q": 20}, marks=pytest.mark.nightly),
     ],
     ids=named,
 )
@@ -209,9 +191,8 @@ def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, val
 
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.1, pytest.param(0.0, marks=pytest.mark.nightly)])
-def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
-    loop = assert_agreement(new_stream, 1600, {}, 1e-11, start=start)
+def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_stream: StreamMaker) -> None:
+    loop = assert_agreement(new_stream, 1600, {}, 1e-11, start=0.1)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert loop.column(COMPENSATOR, "rms_e")[-1] < 1e-5
     assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
@@ -223,13 +204,11 @@ def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_strea
     "values",
     [
         TIGHT,
-        {"compensate": 0},
         {"compensate": 1, "spacing": 5},
         {"Np": 100, "p": 20, "t_init": 0.25},
         {"p": 10, "q": 40, "change_max": 2e-4, "jerk_weight": 30.0},
         {"p": 10, "input_hold": 1, "dead_time": 3},
         {"p": 10, "effect": 1e-4, "noise_std": 1e-6, "forgetting": 0.2, "lambda": 1e-10},
-        pytest.param({"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77}, marks=pytest.mark.nightly),
         {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0},  # nothing of a plan is decided before
         {"Np": 2, "p": 1, "q": 0, "spacing": 1, "preview": 40},
         {"p": 10, "period": 3e-3},
@@ -239,7 +218,7 @@ def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_strea
 def test_every_parameter_compensates_with_averaging_as_in_the_library(
     new_stream: StreamMaker, values: dict[str, Value]
 ) -> None:
-    assert_agreement(new_stream, 150 if values.get("Np") == 2 else 750, values, 1e-9)
+    assert_agreement(new_stream, 150 if values.get("Np") == 2 else 650, values, 1e-9)
 
 
 @pytest.mark.slow
@@ -247,21 +226,18 @@ def test_every_parameter_compensates_with_averaging_as_in_the_library(
 @pytest.mark.parametrize(
     "values",
     [
-        {"measurement_delay": 1, "p": 20},
         {"measurement_delay": 5, "p": 10, "input_hold": 1, "dead_time": 3, "t_init": 0.25},
         {"measurement_delay": 70, "p": 10, "q": 40, "period": 3e-3},  # later than a window
         {"measurement_delay": 250, "p": 10},  # and than a plan
-        {"measurement_delay": 5, "p": 10, **TIGHT},
         {"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77, "measurement_delay": 12},
         {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0, "measurement_delay": 3},
-        {"compensate": 1, "spacing": 5, "measurement_delay": 5},
     ],
     ids=named,
 )
 def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     delay = int(values["measurement_delay"])
     start = 0.1 if "spacing" in values else 0.0
-    assert_agreement(new_stream, 800, values, 1e-9, start=start, delay=delay)
+    assert_agreement(new_stream, 650, values, 1e-9, start=start, delay=delay)
 
 
 def at_rest_first(k: int, x_meas: float, last: float) -> float:
@@ -269,10 +245,9 @@ def at_rest_first(k: int, x_meas: float, last: float) -> float:
 
 
 @on_all(LOOK_AHEADS)
-@pytest.mark.parametrize("averaging", [True, False])
-def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker, averaging: bool) -> None:
+def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker) -> None:
     """As a sequential master carries it; the outputs are those of measurements in time, bit for bit."""
-    values: dict[str, Value] = SHORT[kind_of(new_stream.model)] | {"averaging": averaging}
+    values = SHORT[kind_of(new_stream.model)]
     loop = closed_loop(new_stream.model, 300, values, sensor=at_rest_first)
     early = replace(loop, x=np.append(loop.x[1:], loop.x[-1]))
     in_time, held = new_stream(), new_stream()
@@ -283,19 +258,12 @@ def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker
 
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
-def test_late_and_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
-    values: dict[str, Value] = {"p": 20, "measurement_delay": 5}
-    loop = assert_agreement(new_stream, 2450, values, 1e-9, sensor=faulty, delay=5)
+@pytest.mark.parametrize("delay", [0, 5])
+def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker, delay: int) -> None:
+    values: dict[str, Value] = {"p": 20, "measurement_delay": delay}
+    loop = assert_agreement(new_stream, 1500, values, 1e-9, sensor=faulty, delay=delay)
     assert np.isfinite(loop.outputs).all()
-    assert loop.column(COMPENSATOR, "n_rejected")[-1] > 100
-
-
-@pytest.mark.slow
-@on_all((COMPENSATOR,), needs="agreement")
-def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
-    loop = assert_agreement(new_stream, 2500, {"p": 20}, 1e-9, sensor=faulty)
-    assert np.isfinite(loop.outputs).all()
-    assert 100 < loop.column(COMPENSATOR, "n_rejected")[-1] < 500
+    assert 50 < loop.column(COMPENSATOR, "n_rejected")[-1] < 500
 
 
 def slow(k: int, x_meas: float, last: float) -> float:
@@ -327,14 +295,14 @@ def test_an_unstable_recursion_never_plans(new_stream: StreamMaker) -> None:
 
 
 @on_all(PLANTS, needs="agreement")
-@pytest.mark.parametrize("h", [1e-3, 0.25e-3, 2.5e-3, 0.7e-4])
+@pytest.mark.parametrize("h", [1e-3, 2.5e-3, 0.7e-4])
 def test_plants_move_as_the_librarys_do(new_stream: StreamMaker, h: float) -> None:
     # 1e-12 m in position and measurement, 1e-10 m/s in velocity.
     library, stream = PlantStream(new_stream.model), new_stream()
     for each in (stream, library):
         each.initialise({"x_d": 0.1, "seed": 12345})
     rows: list[list[list[float]]] = [[], []]
-    for k, command in enumerate((commanded()[:1200] + 0.1).tolist()):
+    for k, command in enumerate((commanded()[:600] + 0.1).tolist()):
         for each, outputs in zip((stream, library), rows, strict=True):
             outputs.append(each.outputs())
             each.set("x_d", command)
@@ -342,7 +310,7 @@ def test_plants_move_as_the_librarys_do(new_stream: StreamMaker, h: float) -> No
     x, v, x_meas = (np.array(rows[0]) - np.array(rows[1])).T
     for difference, tolerance in ((x, 1e-12), (v, 1e-10), (x_meas, 1e-12)):
         assert np.max(np.abs(difference)) <= tolerance
-    assert len({row[2] - row[0] for row in rows[0]}) == 1200  # a new draw each communication step
+    assert len({row[2] - row[0] for row in rows[0]}) == 600  # a new draw each communication step
 
 
 @on_all((TRAJECTORY,))

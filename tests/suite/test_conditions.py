@@ -125,18 +125,15 @@ def named(values: dict[str, Any]) -> str:
 
 @pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("inputs", [late, cut])
 @pytest.mark.parametrize(
-    "values",
+    ("values", "inputs"),
     [
-        AVERAGING | {"measurement_delay": 1},
-        AVERAGING | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1},
-        AVERAGING | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50},  # later than a window
-        AVERAGING | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25},
-        {"p": 20, "measurement_delay": DELAY},
-        {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50, "t_init": 0.0},
+        (AVERAGING | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1}, late),
+        (AVERAGING | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50}, cut),  # later than a window
+        (AVERAGING | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25}, late),
+        ({"p": 20, "measurement_delay": DELAY}, cut),
+        ({"Np": 20, "p": 6, "q": 2, "measurement_delay": 50, "t_init": 0.0}, late),
     ],
-    ids=named,
 )
 def test_a_late_measurement_is_predicted_as_by_the_library(
     new_stream: StreamMaker, values: dict[str, Value], inputs: Any
@@ -147,9 +144,7 @@ def test_a_late_measurement_is_predicted_as_by_the_library(
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
-@pytest.mark.parametrize(
-    "values", [{}, {"Np": 30, "p": 5}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"averaging": False}], ids=named
-)
+@pytest.mark.parametrize("values", [{}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"averaging": False}], ids=named)
 def test_a_start_in_motion_is_predicted_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     inputs = cut(new_stream.model, int(values.get("Np", 100)), 0)
     assert_agreement(new_stream, inputs, AVERAGING | values)
@@ -194,9 +189,8 @@ def growing(model: str) -> tuple[Array, Array]:
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
-@pytest.mark.parametrize("Np", [100, 50])
-def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:
-    assert_agreement(new_stream, growing(new_stream.model), AVERAGING | {"Np": Np, "p": 20})
+def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamMaker) -> None:
+    assert_agreement(new_stream, growing(new_stream.model), AVERAGING | {"Np": 50, "p": 20})
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
@@ -213,17 +207,8 @@ def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> No
     [
         ("k", 1.2, 1333, ARX_RESIDUAL),
         ("c_nl", 3.0, 150, ARX_COMMAND),
-        ("c", 1.0, 733, ARX_RESIDUAL),
-        (
-            "k_nl",
-            0.7,
-            2499,
-            ARX_RESIDUAL,
-        ),  # of the drive, told by errors alone in the window that ends then, predicted again
-        pytest.param("k", 1.2, 1333, ARX_COMMAND, marks=pytest.mark.nightly),
-        pytest.param("c_nl", 3.0, 150, ARX_RESIDUAL, marks=pytest.mark.nightly),
-        pytest.param("c", 1.0, 733, ARX_COMMAND, marks=pytest.mark.nightly),
-        pytest.param("k_nl", 0.7, 2499, ARX_COMMAND, marks=pytest.mark.nightly),
+        # of the drive, told by errors alone in the window that ends then, predicted again
+        ("k_nl", 0.7, 2499, ARX_RESIDUAL),
     ],
 )
 def test_a_changed_plant_is_relearned_as_by_the_library(

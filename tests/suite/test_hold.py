@@ -40,9 +40,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     [
         {},
         {"t_init": 0.333},
-        pytest.param({"measurement_delay": 7}, marks=pytest.mark.nightly),
         {"measurement_delay": 45},  # later than a window
-        {"averaging": False},
         {"averaging": False, "t_init": 0.2},
     ],
     ids=lambda more: ",".join(f"{key}={value}" for key, value in more.items()) or "averaging",

@@ -28,31 +28,21 @@ PREDICTION: list[tuple[dict[str, Value], str]] = [
     ({"Np": 0}, "Np must be 1 … 100000, got 0"),
     ({"Np": 100_001}, "Np must be 1 … 100000, got 100001"),
     ({"p": 0, "lambda": 0.0}, "p must be 1 … 5000, got 0; lambda must be 1e-40 … 1e+12 m2, got 0.0"),
-    ({"lambda": -1.0, "T_s": 0.0}, "lambda must be 1e-40 … 1e+12 m2, got -1.0; T_s must be 1e-05 … 1 s, got 0.0"),
     (
         {"lambda": -1e-12, "T_s": 0.0, "t_init": -0.25},
         "lambda must be 1e-40 … 1e+12 m2, got -1e-12; T_s must be 1e-05 … 1 s, got 0.0; "
         "t_init must be -1 (automatic) or 0 … 1000000 s, got -0.25",
     ),
-    ({"lambda": 1e-300}, "lambda must be 1e-40 … 1e+12 m2, got 1e-300"),
     ({"lambda": -1e16}, "lambda must be 1e-40 … 1e+12 m2, got -1e+16"),
-    ({"lambda": math.inf}, "lambda must be finite, got inf"),
     ({"T_s": -123456.789}, "T_s must be 1e-05 … 1 s, got -123456.789"),
     ({"t_init": -1e22}, "t_init must be -1 (automatic) or 0 … 1000000 s, got -1e+22"),
-    (
-        {"T_s": 1e-300, "t_init": 1e300},
-        "T_s must be 1e-05 … 1 s, got 1e-300; t_init must be -1 (automatic) or 0 … 1000000 s, got 1e+300",
-    ),
     ({"lambda": math.nan}, "lambda must be finite, got nan"),
     ({"lambda": -5e-324}, "lambda must be 1e-40 … 1e+12 m2, got -5e-324"),
     ({"T_s": 1e-300}, "T_s must be 1e-05 … 1 s, got 1e-300"),
-    ({"T_s": -math.inf}, "T_s must be finite, got -inf"),
-    ({"t_init": -0.1}, "t_init must be -1 (automatic) or 0 … 1000000 s, got -0.1"),
     ({"input_hold": 2}, "input_hold must be 0 … 1, got 2"),
     ({"dead_time": -1}, "dead_time must be 0 … 100000, got -1"),
     ({"mode[1].zeta": 0.0}, "mode[1].zeta must be 1e-06 … 10000, got 0.0"),
     ({"mode[1].f_n": 1e308}, "mode[1].f_n must be 0.001 … 100000 Hz, got 1e+308"),
-    ({"mode[1].alpha": math.inf}, "mode[1].alpha must be finite, got inf"),
     *(
         ({"x_d_ahead": value}, f"the start value of x_d_ahead must be finite, got {value}")
         for value in (math.inf, -math.inf, math.nan)
@@ -61,7 +51,6 @@ PREDICTION: list[tuple[dict[str, Value], str]] = [
 ]
 PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"preview": 7}, "preview must be 8 … 2000, got 7"),
-    ({"preview": 2001}, "preview must be 8 … 2000, got 2001"),
     ({"preview": 60}, "preview must be ≥ Np + 4·spacing + 3 = 61, got 60"),
     ({"spacing": 0}, "spacing must be 1 … 1000, got 0"),
     ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 50, got 3"),
@@ -71,15 +60,11 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
         "plans from a late measurement",
     ),
     ({"jerk_weight": -1.0}, "jerk_weight must be 0 … 1e+12, got -1.0"),
-    ({"jerk_weight": math.nan}, "jerk_weight must be finite, got nan"),
-    ({"jerk_weight": 1e300}, "jerk_weight must be 0 … 1e+12, got 1e+300"),
     ({"v_max": 0.0}, "v_max must be 1e-09 … 10000 m/s, got 0.0"),
     ({"a_max": -16.0}, "a_max must be 1e-06 … 1000000 m/s2, got -16.0"),
-    ({"a_max": 1e308}, "a_max must be 1e-06 … 1000000 m/s2, got 1e+308"),
     ({"j_max": math.inf}, "j_max must be finite, got inf"),
     ({"change_max": 0.0}, "change_max must be 1e-12 … 10 m, got 0.0"),
     ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
-    ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
     (
         {"p": 60, "q": 50},
         "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50; lower q or raise Np",
@@ -94,23 +79,15 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
         ({"forgetting": 5e-4}, "forgetting must be 0 or 0.001 … 1000000000 s, got 0.0005"),
     ],
     STAGE_PREDICTOR: [({"mode[2].zeta": 0.0}, "mode[2].zeta must be 1e-06 … 10000, got 0.0")],
-    COMPENSATOR: [
-        *PLANNING,
-        ({"effect": 11.0}, "effect must be 0 or 1e-15 … 10 m, got 11.0"),
-        ({"noise_std": -1e-6}, "noise_std must be 0 or 1e-15 … 1 m, got -1e-06"),
-        ({"forgetting": math.inf}, "forgetting must be finite, got inf"),
-    ],
+    COMPENSATOR: PLANNING,
     DRIVE: [
         ({"m": 0.0}, "m must be 1e-06 … 1000000 kg, got 0.0"),
         ({"k": -24674.0}, "k must be 1e-06 … 1e+15 N/m, got -24674.0"),
-        ({"k": 1e308}, "k must be 1e-06 … 1e+15 N/m, got 1e+308"),
         ({"c_nl": -1.0}, "c_nl must be 0 … 1e+12 N.s2/m2, got -1.0"),
         ({"k_nl": -1.0}, "k_nl must be 0 … 1e+15 N/m2, got -1.0"),
         ({"noise_std": math.nan}, "noise_std must be finite, got nan"),
-        ({"noise_std": 1e300}, "noise_std must be 0 … 1 m, got 1e+300"),
         ({"seed": -1}, "seed must be 0 … 2147483647, got -1"),
         ({"k": 1e12}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
-        ({"c": 1e6}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
     ],
     TRAJECTORY: [
         ({"trajectory": 4}, "trajectory must be 0 … 3, got 4"),
@@ -119,7 +96,6 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
     STAGE: [
         ({"f": -1.0}, "f must be 0 … 1 m, got -1.0"),
         ({"kappa": -1.0}, "kappa must be 0 … 1000000 1/m, got -1.0"),
-        ({"kappa": 1e300}, "kappa must be 0 … 1000000 1/m, got 1e+300"),
         ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
         ({"mode[2].zeta": -0.1}, "mode[2].zeta must be 1e-06 … 10000, got -0.1"),
         (
@@ -158,7 +134,7 @@ def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
 
 
 @on_adapters((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
-@pytest.mark.parametrize("h", [0.0, -T_S, -1e-320, math.nan, math.inf, 100.5])
+@pytest.mark.parametrize("h", [0.0, -T_S, math.nan, math.inf, 100.5])
 def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
     stream = new_stream()
     initialise(stream)
@@ -167,7 +143,7 @@ def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: 
     stream.step(0.05, T_S)
 
 
-ANOTHER_TIME = pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, 1e9, math.nan, math.inf, -math.inf])
+ANOTHER_TIME = pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, math.nan, math.inf])
 
 
 def assert_no_step_from(stream: Stream, t: float) -> None:
@@ -203,7 +179,7 @@ def test_a_plant_goes_back_by_a_saved_state_alone(new_stream: StreamMaker) -> No
     stream.step(5.002, T_S)
 
 
-BAD_POSITIONS = [(math.nan, "finite"), (math.inf, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
+BAD_POSITIONS = [(math.nan, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from stream import (
 from streams import StreamMaker, on_all
 
 OTHERS = {PREDICTOR: STAGE_PREDICTOR, COMPENSATOR: STAGE_COMPENSATOR, DRIVE: STAGE, STAGE: DRIVE}
-N_SAMPLES = 200
+N_SAMPLES = 130
 
 
 def instances_of(model: str) -> list[tuple[str, dict[str, Value], float]]:

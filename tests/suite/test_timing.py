@@ -91,10 +91,8 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
 @pytest.mark.parametrize(
     ("pattern", "start"),
     [
-        *((pattern, 0.0) for pattern in ("0.04", "0.5", "0.96", "1", "3.7", "12.04", "230", "mixture")),
+        *((pattern, 0.0) for pattern in ("0.04", "0.96", "3.7", "230")),
         ("mixture", 1e9),
-        *(pytest.param(pattern, 0.0, marks=pytest.mark.nightly) for pattern in ("0.3", "1.03", "2", "12.2")),
-        pytest.param("12.2", 1e9, marks=pytest.mark.nightly),
     ],
 )
 def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern: str, start: float) -> None:
@@ -120,7 +118,6 @@ def _sum_of_steps(n: int, T_s: float) -> Array:
     ("times_of", "T_s", "warned"),
     [
         (_whole_nanoseconds, 1 / 3000, 0),
-        (_single_precision, 1e-3, 1),
         (_single_precision, 1 / 3000, 1),
         (_sum_of_steps, 1 / 3000, 0),
     ],
@@ -152,14 +149,15 @@ def test_each_kind_of_warning_is_given_once(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream)
     now = 0.0
-    for h in (1.03e-3, 0.98e-3, 1.02e-3, 3e-3, 3e-3, 1.02e-3):
+    for h in (1.03e-3, 0.98e-3, 1.02e-3, 8e-3, 8e-3, 1.02e-3):
         stream.step(now, h)
         now += h
     warnings = stream.warnings()
     assert "point 0.00103 s is 0.03 samples of T_s = 0.001 s behind a sampling instant, which is taken" in warnings[0]
     if (new_stream.implementation, "one warning") not in CANNOT:
         assert len(warnings) == 2
-        assert "contains sampling instants" in warnings[1]
+        assert "the step from 0.00303 s by 0.008 s contains sampling instants of T_s = 0.001 s" in warnings[1]
+        assert "x_meas is read up to 0.007 s late" in warnings[1]
     else:
         assert "is 0.02 samples of T_s = 0.001 s before a sampling instant" in warnings[1]
 
@@ -230,18 +228,6 @@ def test_inputs_are_read_at_instants_only(new_stream: StreamMaker) -> None:
 
 
 @on_all(LOOK_AHEADS)
-def test_one_warning_where_an_instant_is_no_communication_point(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
-    for i in range(3):
-        stream.step(i * 8e-3, 8e-3)
-    warnings = stream.warnings()
-    assert len(warnings) == (3 if (new_stream.implementation, "one warning") in CANNOT else 1)
-    assert "the step from 0 s by 0.008 s contains sampling instants of T_s = 0.001 s" in warnings[0]
-    assert "x_meas is read up to 0.007 s late" in warnings[0]
-
-
-@on_all(LOOK_AHEADS)
 def test_a_ramp_with_derivatives_is_that_of_single_samples(new_stream: StreamMaker) -> None:
     if (new_stream.implementation, "slopes") in CANNOT:
         with pytest.raises(RefusedStreamError):
@@ -275,7 +261,7 @@ def test_a_ramp_with_derivatives_is_that_of_single_samples(new_stream: StreamMak
 
 @pytest.mark.slow
 @on_all(PLANTS)
-@pytest.mark.parametrize("step", ["0.3", "0.4", "0.5", "2", "3.7", "8", "12.2", "37"])
+@pytest.mark.parametrize("step", ["0.3", "2", "12.2", "37"])
 def test_plants_move_the_same_in_any_steps(new_stream: StreamMaker, step: str) -> None:
     # The command changes where both runs have a communication point.
     size = Fraction(step)

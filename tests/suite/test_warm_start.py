@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from averaged_cases import averaged_model, change_learned
 from driving import closed_loop, replay, steps
-from library_models import trained_predictor
+from library_models import trained_state
 from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters
@@ -24,28 +23,14 @@ from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.averaging.experts import ARX_COMMAND, EXPERTS
 from hybridsep.predict.averaging.stacking import Stack
-
-Trained = Callable[[str], Path]
-
-
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
-    """Return a function that gives a predictor as it was saved after one staircase, of a predictor or a compensator."""
-    folder = tmp_path_factory.mktemp("trained")
-
-    def saved(model: str) -> Path:
-        path = folder / f"{model}.state"
-        if not path.exists():
-            trained_predictor(model).save(path)
-        return path
-
-    return saved
+from hybridsep.predict.predictor import HybridPredictor
 
 
 @pytest.fixture(scope="module")
 def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a compensator's predictor, saved, in which the command's expert led."""
-    path, predictor = tmp_path_factory.mktemp("led") / "command.state", trained_predictor(COMPENSATOR)
+    path = tmp_path_factory.mktemp("led") / "command.state"
+    predictor = HybridPredictor.load(trained_state(COMPENSATOR))
     stack = averaged_model(predictor).learned.stack
     weights, less = np.eye(len(EXPERTS))[ARX_COMMAND.place], 1e-3
     change_learned(predictor, stack=Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence))
@@ -55,11 +40,11 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @on_adapters(LOOK_AHEADS, needs="agreement")
-def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
+def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker) -> None:
     # 1e-11 m at every sample; a pythonfmu FMU is the library, over the first quarter.
     tolerance, part = (0.0, 4) if new_stream.implementation == PYTHON else (1e-11, 1)
-    path, model = weights(new_stream.model), new_stream.model
-    loop = closed_loop(model, 6001 if model == PREDICTOR else 1501, weights=path)
+    path, model = trained_state(new_stream.model), new_stream.model
+    loop = closed_loop(model, 6001 if model == PREDICTOR else 1001, weights=path)
     stream, last = new_stream(weights=path), len(loop.r) // part
     stream.initialise(loop.values)
     np.testing.assert_allclose(replay(stream, loop, last=last), loop.outputs[: last + 1], rtol=0, atol=tolerance)
@@ -85,21 +70,21 @@ def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, le
 
 
 @on_adapters(LOOK_AHEADS, needs="weights before")
-def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker, weights: Trained) -> None:
-    path = weights(new_stream.model)
+def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) -> None:
+    path = trained_state(new_stream.model)
     expected = closed_loop(new_stream.model, 10, weights=path).outputs[0]
     assert new_stream(weights=path).outputs_before({}) == expected.tolist()
 
 
 @on_adapters(LOOK_AHEADS)
-def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMaker, weights: Trained) -> None:
+def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMaker) -> None:
     model = new_stream.model
     choices: dict[str, list[tuple[dict[str, Value], str, int, list[float]]]] = {
         PREDICTOR: [({"t_init": 0.05}, "hybrid_active", 100, [0.0] * 50 + [1.0] * 50)],
         COMPENSATOR: [({"t_init": 0.1}, "sep_state", 0, [1.0] * 200), ({"compensate": 1}, "sep_state", 0, [1.0] * 200)],
     }
     for values, name, first, expected in choices[model]:
-        stream = new_stream(weights=weights(model))
+        stream = new_stream(weights=trained_state(model))
         stream.initialise(values)
         shown = [stream.outputs(), *steps(stream, 0, 250)]
         assert [row[OUTPUTS[model].index(name)] for row in shown[first : first + len(expected)]] == expected
@@ -107,8 +92,8 @@ def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMake
 
 @pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
-def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker, weights: Trained) -> None:
-    stream, other = (new_stream(weights=weights(new_stream.model)) for _ in range(2))
+def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker) -> None:
+    stream, other = (new_stream(weights=trained_state(new_stream.model)) for _ in range(2))
     runs = []
     for _ in range(2):
         stream.initialise({})
@@ -140,8 +125,8 @@ OTHERS: list[dict[str, Value]] = [
 
 
 @on_adapters(LOOK_AHEADS)
-def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weights: Trained) -> None:
-    stream, learned = new_stream(weights=weights(new_stream.model)), LEARNED[new_stream.model]
+def test_other_settings_than_learned_are_refused(new_stream: StreamMaker) -> None:
+    stream, learned = new_stream(weights=trained_state(new_stream.model)), LEARNED[new_stream.model]
     for values in OTHERS:
         message = "; ".join(
             f"{name} must be {learned.get(name, 24674.0)!r}, with which this FMU was trained (weights.bin), got {now!r}"
@@ -154,8 +139,8 @@ def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weight
 
 
 @on_adapters(LOOK_AHEADS)
-def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker, weights: Trained) -> None:
-    stream = new_stream(weights=weights(new_stream.model))
+def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker) -> None:
+    stream = new_stream(weights=trained_state(new_stream.model))
     stream.initialise({"Np": 60, "t_init": 0.1})
     steps(stream, 0, 130)
 

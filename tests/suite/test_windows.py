@@ -48,10 +48,9 @@ def tolerance_of(new_stream: StreamMaker) -> float:
 
 
 @on_all((PREDICTOR,))
-@pytest.mark.parametrize("start", [0.0, 0.1])
-def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start: float) -> None:
-    shown = shown_by(new_stream, 1700, {}, start)
-    x_pb, x_h, active = predicted(start)
+def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker) -> None:
+    shown = shown_by(new_stream, 1700, {}, 0.1)
+    x_pb, x_h, active = predicted(0.1)
     n, tolerance = len(x_pb), tolerance_of(new_stream)
     np.testing.assert_array_equal(shown["x_d"][100 : 100 + n], shown["r"][:n])
     np.testing.assert_allclose(shown["x_pb"][100 : 100 + n], x_pb, rtol=0, atol=tolerance)
@@ -81,10 +80,9 @@ def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream
 
 @pytest.mark.slow
 @on_all((COMPENSATOR,))
-@pytest.mark.parametrize(("preview", "start"), [(200, 0.0), (170, 0.1)])
-def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker, preview: int, start: float) -> None:
-    shown = shown_by(new_stream, 900, PLANS | {"preview": preview}, start)
-    expected = planned(preview, start)
+def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker) -> None:
+    shown = shown_by(new_stream, 900, PLANS | {"preview": 170}, 0.1)
+    expected = planned(170, 0.1)
     exact = new_stream.implementation in (LIBRARY, PYTHON)
     for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state"):
         np.testing.assert_allclose(shown[name][:900], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
@@ -166,8 +164,8 @@ def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream
 
 @pytest.mark.slow
 @on_all(LOOK_AHEADS)
-@pytest.mark.parametrize("t_init", [0.05, 0.25])
-def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker, t_init: float) -> None:
+def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker) -> None:
+    t_init = 0.25
     shown = shown_by(new_stream, 1500, {"t_init": t_init})
     fill, Np = (100, 100) if new_stream.model == PREDICTOR else (200, 50)
     first = fill + round(t_init / TS)

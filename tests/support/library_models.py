@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from built_once import SHARED_BUILDS, built_once
+from c_compiler import build_folder
 
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import SepCompensator
@@ -93,6 +96,12 @@ def trained_predictor(kind: str) -> HybridPredictor:
     compensator = machine.new_compensator()
     cosimulate(compensator, machine.new_plant(), staircase()[:4000], encoder=encoder)
     return compensator.predictor
+
+
+def trained_state(kind: str) -> Path:
+    """Return a file with that predictor, saved once for all processes of a test session."""
+    folder = Path(os.environ.get(SHARED_BUILDS) or build_folder())
+    return built_once(folder / f"{kind}.state", lambda path: trained_predictor(kind).save(path))
 
 
 def runaway_predictor() -> HybridPredictor:
