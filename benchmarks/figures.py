@@ -53,16 +53,13 @@ def main() -> int:
 def demo(emps: Path | None) -> Any:
     """Return the full demo's summary, rounded."""
     with TemporaryDirectory() as out:
-        arguments = [
-            "demo",
-            "--full",
-            "--json",
-            "--out",
-            out,
-            *([] if emps is None else ["--emps", str(emps.resolve())]),
-        ]
-        command = [sys.executable, "-c", "from hybridsep.app.cli import main; main()", *arguments]
-        return rounded(json.loads(run(command)))
+        command = [sys.executable, "-c", "from hybridsep.app.cli import main; main()"]
+        run([*command, "demo", "--full", "--out", out])
+        found = json.loads((Path(out) / "summary.json").read_text(encoding="utf-8"))
+        if emps is not None:
+            paper = ("--set", "predictor.averaging=false", "--set", "predictor.t_init=1.242")
+            found["emps"] = json.loads(run([*command, "backtest", str(emps.resolve()), "-m", "emps", *paper, "--json"]))
+        return rounded(found)
 
 
 def printed(script: tuple[str, ...]) -> list[str]:

@@ -61,8 +61,8 @@ Made = tuple[dict[str, Path], Figures]
 
 def demonstration(folder: Path, chromium: str) -> Made:
     """Make the pictures of the demonstration."""
-    hybridsep(folder, "demo", "--out", "first", "--json")  # of the noise seed that the pictures show
-    hybridsep(folder, "demo", "--full", "--out", "demo", "--json")
+    hybridsep(folder, "demo", "--out", "first")  # of the noise seed that the pictures show
+    hybridsep(folder, "demo", "--full", "--out", "demo")
     out = folder / "demo"
     names = ("staircase.png", "staircase_compensated.png", "spiral_y.png", "spiral_contour.png")
     summary = json.loads((folder / "first" / "summary.json").read_text(encoding="utf-8"))
@@ -76,19 +76,16 @@ def demonstrated(summary: dict[str, Any]) -> Figures:
 
 
 def fitted(folder: Path, chromium: str) -> Made:
-    """Make the pictures of the fit of the example log: the first part of its report, and its settings compared."""
+    """Make the picture of the fit of the example log: the first part of its report."""
     hybridsep(folder, "example-log", "--out", "my_axis.csv")
     hybridsep(folder, "fit", "my_axis.csv", "--Np", "100")
-    machine = ("--machine", "my_axis/machine.toml")
-    hybridsep(folder, "tune", "my_axis.csv", *machine, "--figure", "tune.png", "--out", "tuned.toml")
     width, height = REPORT_SIZE
     report = (folder / "my_axis" / "report.html").as_uri()
     options = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=10000")
     look = [chromium, *options, f"--window-size={width},{height}", "--screenshot=fit_report.png", report]
     subprocess.run(look, cwd=folder, check=True, capture_output=True)
     judged = json.loads((folder / "my_axis" / "fit.json").read_text(encoding="utf-8"))["judged"]
-    made = {name: folder / name for name in ("fit_report.png", "tune.png")}
-    return made, judged_figures(judged)
+    return {"fit_report.png": folder / "fit_report.png"}, judged_figures(judged)
 
 
 def judged_figures(judged: dict[str, Any]) -> Figures:
@@ -98,17 +95,9 @@ def judged_figures(judged: dict[str, Any]) -> Figures:
     return {key: rounded(1e6 * rms) for key, rms in found.items()}
 
 
-def identified(folder: Path, chromium: str) -> Made:
-    """Make the picture of the identification."""
-    run(folder, str(ROOT / "examples" / "recordings_to_identify.py"), "recordings")
-    hybridsep(folder, "identify", "recordings/log.csv", "--out", "log.toml", "--figure", "identify_log.png")
-    return {"identify_log.png": folder / "identify_log.png"}, {}
-
-
 MAKERS: dict[tuple[str, ...], Callable[[Path, str], Made]] = {
     ("staircase.png", "staircase_compensated.png", "spiral_y.png", "spiral_contour.png"): demonstration,
-    ("fit_report.png", "tune.png"): fitted,
-    ("identify_log.png",): identified,
+    ("fit_report.png",): fitted,
 }
 
 

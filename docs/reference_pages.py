@@ -111,7 +111,7 @@ def command_pages() -> dict[Path, str]:
 
 
 def _command(name: str, command: Any) -> str:
-    """Return the page of a command: what it does, how it is called, its arguments, then its options panel by panel."""
+    """Return the page of a command: what it does, how it is called, its arguments, its options."""
     arguments = [one for one in command.params if not one.opts[0].startswith("-")]
     options = [one for one in command.params if one.opts[0].startswith("-")]
     usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
@@ -125,12 +125,7 @@ def _command(name: str, command: Any) -> str:
     if arguments:
         parts.append(_table(("argument", "what"), ((f"`{one.name.upper()}`", one.help) for one in arguments)))
     parts.append("```text\n" + "\n".join(EXAMPLES[name]) + "\n```")
-    panels: dict[str, list[Any]] = {}
-    for one in options:
-        panels.setdefault(getattr(one, "rich_help_panel", None) or "Options", []).append(one)
-    for panel, members in panels.items():
-        rows = ((_option(one), _described(one)) for one in members)
-        parts += [f"## {panel}", _table(("option", "what"), rows)]
+    parts.append(_table(("option", "what"), ((_option(one), _described(one)) for one in options)))
     return _page(parts)
 
 
@@ -140,7 +135,7 @@ def machine_file() -> str:
         "# Machine file",
         _WRITTEN,
         "A TOML file that says what an axis is. Values are SI; of a rotary axis (`unit = 'rad'`) wherever a unit has m "
-        "it is rad. Unknown entries are refused. `hybridsep fit`, `identify` and `init` write one, the library brings "
+        "it is rad. Unknown entries are refused. `hybridsep fit` and `init` write one, the library brings "
         "`spring_mass_damper`, `als25010_x`, `als25010_y` and `emps` by name; an example is in "
         "[log to FMU](../howto/log-to-fmu.md#machine-file).",
     ]

@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperGroup
 
 from ..base.errors import HybridSepError, LogError, ParameterError, brief
-from ..base.settings import DRIVE_LIMIT_ENTRIES
 from ..base.version import version_text
 from .cosim import cosim, system
-from .fit import fit, identify
+from .fit import fit
 from .fmus import build, hal, header
-from .logs import backtest, report
-from .options import COMPENSATOR_ENTRIES, KNOWN_ENTRIES, PREDICTOR_ENTRIES
+from .logs import backtest
 from .start import demo, example_log, init
 from .tune import tune
 
@@ -42,36 +40,16 @@ DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
 """What an option takes, by the beginning of a type of typer's errors."""
 
-_READING = ("unit", "T_s", "axis", "t", "x_d", "x", "delay", "resample", "list_channels")
-_OUTPUT = ("out", "figure", "save", "fmus", "reports", "full", "force", "as_json")
-
-_PANELS = {
-    **dict.fromkeys(PREDICTOR_ENTRIES, "Parameters of the predictor"),
-    **dict.fromkeys(COMPENSATOR_ENTRIES, "Parameters of the compensator"),
-    **dict.fromkeys(KNOWN_ENTRIES, "What is known of the axis"),
-    **dict.fromkeys(DRIVE_LIMIT_ENTRIES, "Limits of the drive, for a compensator"),
-    **dict.fromkeys(_READING, "Reading the file"),
-    **dict.fromkeys(_OUTPUT, "Output"),
-}
-"""Panel of an option by its name; the others are the command's own, the first."""
-
-_KNOWN_OF_A_REPLAY = ("backtest", "report", "cosim", "tune")
-"""Commands that take all parameters of the predictor, also the entries that are known of an axis."""
-
 EXAMPLES = {
     "fit": (
         "hybridsep fit my_axis.csv --Np 100",
         "hybridsep fit my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4",
     ),
-    "identify": (
-        "hybridsep identify my_axis.csv --out machine.toml",
-        "hybridsep identify my_axis.csv --unit-gain --figure identified.png",
-    ),
     "tune": (
         "hybridsep tune my_axis.csv -m my_axis/machine.toml",
-        "hybridsep tune my_axis.csv -m my_axis/machine.toml --p 10,50",
+        "hybridsep tune my_axis.csv -m my_axis/machine.toml --try p=10,50 --try q=3",
     ),
-    "init": ("hybridsep init machine.toml", "hybridsep init machine.toml --f_n 42 --zeta 0.35"),
+    "init": ("hybridsep init machine.toml", "hybridsep init --force"),
     "demo": ("hybridsep demo --out demo", "hybridsep demo --out demo --force"),
     "build": (
         "hybridsep build -m my_axis/machine.toml --out dist",
@@ -86,12 +64,8 @@ EXAMPLES = {
         "hybridsep system --ssp 2 --target host",
     ),
     "backtest": (
-        "hybridsep backtest my_axis.csv -m my_axis/machine.toml",
-        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --figure errors.png --save trained.state",
-    ),
-    "report": (
-        "hybridsep report my_axis.csv -m my_axis/machine.toml",
-        "hybridsep report my_axis.csv -m my_axis/machine.toml --weights my_axis/trained.state --out today.html",
+        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --set predictor.p=20 --figure errors.png",
+        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --report today.html --save trained.state",
     ),
     "hal": ("hybridsep hal my_axis/machine.toml --out hal", "hybridsep hal x/machine.toml y/machine.toml --out hal"),
     "header": (
@@ -101,32 +75,6 @@ EXAMPLES = {
     "example-log": ("hybridsep example-log --out my_axis.csv", "hybridsep example-log --out my_axis.csv.gz"),
 }
 """Two lines for each command."""
-
-
-class _PanelledCommand(TyperCommand):
-    """Command whose help shows its options by panels."""
-
-    def __init__(self, *arguments: Any, **keywords: Any) -> None:
-        super().__init__(*arguments, **keywords)
-        replays = self.name in _KNOWN_OF_A_REPLAY
-        for one in self.params:
-            panel = _PANELS.get(one.name or "")
-            if panel and one.param_type_name == "option":
-                if replays and one.name in KNOWN_ENTRIES:
-                    panel = _PANELS["p"]
-                if replays or one.name != "Np":  # the look-ahead of a fit is the controller's
-                    one.rich_help_panel = panel  # type: ignore[attr-defined]
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write arguments, then options panel by panel."""
-        panels: dict[str, list[tuple[str, str]]] = {}
-        for one in self.get_params(ctx):
-            if record := one.get_help_record(ctx):
-                panel = getattr(one, "rich_help_panel", None) or "Options"
-                panels.setdefault("Arguments" if one.param_type_name == "argument" else panel, []).append(record)
-        for name in sorted(panels, key=lambda name: (name != "Arguments", name != "Options", name == "Output")):
-            with formatter.section(name):
-                formatter.write_dl(panels[name])
 
 
 class _Commands(TyperGroup):
@@ -172,7 +120,7 @@ class _Commands(TyperGroup):
         if found is None:
             return None
         alone = typer.Typer(rich_markup_mode=None, add_completion=False)
-        alone.command(cmd_name, cls=_PanelledCommand)(found.load())
+        alone.command(cmd_name)(found.load())
         return typer.main.get_command(alone)
 
 
@@ -192,25 +140,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (
-    fit,
-    identify,
-    tune,
-    init,
-    demo,
-    build,
-    cosim,
-    system,
-    hal,
-    header,
-    backtest,
-    report,
-    example_log,
-):
+for _command in (fit, tune, backtest, init, example_log, demo, build, cosim, system, hal, header):
     _name = _command.__name__.replace("_", "-")
-    app.command(cls=_PanelledCommand, epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(
-        _command
-    )
+    app.command(epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(_command)
 
 
 @app.callback(invoke_without_command=True)

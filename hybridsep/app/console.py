@@ -35,6 +35,7 @@ __all__ = [
     "check_outputs",
     "console",
     "errors_console",
+    "print_built",
     "print_channels",
     "print_json",
     "print_run",
@@ -180,6 +181,12 @@ def print_written(*paths: Path | None) -> None:
     for path in paths:
         if path is not None:
             console.print(f"wrote {path}", soft_wrap=True)
+
+
+def print_built(archives: Iterable[Path]) -> None:
+    """Print the names and the sizes of archives that were written."""
+    for path in archives:
+        console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", soft_wrap=True)
 
 
 def print_json(result: Any) -> None:

@@ -10,24 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import ParameterError
-from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
-from .options import (
-    FlavourOption,
-    FmiOption,
-    ForceOption,
-    JsonOption,
-    TargetOption,
-    TsOption,
-    UnitOption,
-    WeightsOption,
-)
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
+from .options import ForceOption, TargetOption, UnitOption, WeightsOption
 
 if TYPE_CHECKING:
     from ..fmi.compile import Library
     from ..machines.machine import Machine
 
-    Job = tuple[Machine, str, str, str]
-    """An FMU to build: its machine, name and model, and the version of FMI."""
+    Job = tuple[Machine, str, str]
+    """An FMU to build: its machine, name and model."""
 
 __all__ = ["build", "hal", "header"]
 
@@ -43,8 +34,13 @@ def build(
         list[str] | None,
         typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
     ] = None,
-    flavour: FlavourOption = FLAVOURS[0],
-    fmi: FmiOption = FMI_VERSIONS[0],
+    flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
+    fmi: Annotated[
+        str,
+        typer.Option(
+            help=f"Version of FMI: {', '.join(FMI_VERSIONS)}; FMUs of FMI 3.0 are native, their names have Fmi3."
+        ),
+    ] = FMI_VERSIONS[0],
     target: TargetOption = None,
     weights: WeightsOption = None,
     trajectory: Annotated[
@@ -52,7 +48,6 @@ def build(
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
     unit: UnitOption = None,
-    T_s: TsOption = None,
     windows: Annotated[
         bool,
         typer.Option(
@@ -77,7 +72,6 @@ def build(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Build FMUs from machine files.
 
@@ -87,7 +81,7 @@ def build(
     from ..fmi.compile import library_paths, missing
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..machines.machine import machine_path
-    from .console import check_outputs, console, print_json, progress_bar, warn_of_estimates
+    from .console import check_outputs, print_built, progress_bar, warn_of_estimates
 
     if embed_weights and flavour != "native":
         raise ParameterError(f"--embed-weights is for native FMUs; with --flavour {flavour} leave it out")
@@ -99,69 +93,59 @@ def build(
     if controller is not None:
         jobs = _without_files(jobs, f"--for {controller}", named=bool(fmus))
         embed_weights = embed_weights or weights is not None
-    extras = _extras_of(jobs, weights, trajectory, unit, T_s, windows=windows, embed_weights=embed_weights)
+    extras = _extras_of(jobs, weights, trajectory, unit, windows=windows, embed_weights=embed_weights)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [
-            *(("--out", out / f"{name}.fmu", ()) for _, name, _, _ in jobs),
+            *(("--out", out / f"{name}.fmu", ()) for _, name, _ in jobs),
             *([("--out", out / CONFIGURATION_FILE, ())] if controller else []),
         ],
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
-    warn_of_estimates({axis.name: axis for axis, _, model, _ in jobs if model == "SepCompensator"}.values())
+    warn_of_estimates({axis.name: axis for axis, _, model in jobs if model == "SepCompensator"}.values())
     paths = []
-    with progress_bar(as_json) as advance:
+    with progress_bar(False) as advance:
         if flavour == "native":
             needed = _libraries_of(jobs, target or [])
             made = iter(range(1, (n := len(missing(needed))) + 1))
             advance(f"compile {n} libraries", 0.0)
             library_paths(needed, lambda one: advance(f"compiled {one[0]} for {one[1]}", next(made) / n))
-        for i, (axis, name, model, version) in enumerate(jobs):
+        for i, (axis, name, model) in enumerate(jobs):
             advance(name, i / len(jobs))
-            given = {"targets": target or None, "fmi": version, **extras.get(model, {})}
+            given = {"targets": target or None, "fmi": fmi, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
         if controller is not None:
             paths.append(write_configuration(out, paths))
         advance("done", 1.0)
-    if as_json:
-        print_json([str(path) for path in paths])
-    else:
-        for path in paths:
-            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", soft_wrap=True)
+    print_built(paths)
 
 
-def _jobs_of(
-    fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
-) -> list[Job]:
-    """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
+def _jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str) -> list[Job]:
+    """Return the FMUs to build, all of the machines' if none is named."""
     from ..fmi.compile import check_available
-    from ..fmi.spec import fmu_name, fmu_names
+    from ..fmi.spec import fmu_names
     from ..machines.machine import load_machine, machine_names
 
-    versions = versions_of(fmi, flavour)
+    check_version(flavour, fmi)
     jobs = [
-        (axis, name, model, version)
+        (axis, name, model)
         for axis in map(load_machine, machines or machine_names())
-        for version in versions
-        for name, model in fmu_names(axis, flavour, version).items()
+        for name, model in fmu_names(axis, flavour, fmi).items()
     ]
-    if unknown := sorted(set(fmus) - {name for _, name, _, _ in jobs}):
-        without = dict.fromkeys(axis.name for axis, _, _, _ in jobs if axis.drive_limits is None)
+    if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
+        without = dict.fromkeys(axis.name for axis, _, _ in jobs if axis.drive_limits is None)
         hint = ""
         if without and any(name.startswith("SepCompensator") for name in unknown):
             hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
         if fmi == FMI_VERSIONS[0] and any("Fmi3" in name for name in unknown):
             hint += "; FMUs of FMI 3.0 need --fmi 3"
-        raise ParameterError(
-            f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _, _ in jobs)}{hint}"
-        )
+        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}{hint}")
     if targets and flavour != "native":
         raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
     if flavour == "native":
         check_available(targets or ("host",))
-    # with both versions a name stands for its twin of FMI 3.0, too
-    return [job for job in jobs if not fmus or {job[1], fmu_name(job[2], job[0].name, flavour)} & set(fmus)]
+    return [job for job in jobs if not fmus or job[1] in fmus]
 
 
 def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
@@ -169,7 +153,7 @@ def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
     from ..fmi.compile import default_targets, expanded
     from ..fmi.spec import table_of
 
-    kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model, _ in jobs)
+    kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model in jobs)
     return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
 
 
@@ -178,7 +162,6 @@ def _extras_of(
     weights: Path | None,
     trajectory: Path | None,
     unit: str | None,
-    T_s: float | None,
     *,
     windows: bool = True,
     embed_weights: bool = False,
@@ -190,11 +173,10 @@ def _extras_of(
     """
     from ..fmi.weights import load_trained
     from ..logs.log import check_reading
-    from ..machines.machine import check_interval
     from ..plants.trajectory import read_trajectory
 
     extras: dict[str, dict[str, Any]] = {}
-    check_reading(unit, T_s)
+    check_reading(unit, None)
     if weights is not None:
         axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
         load_trained(weights, axis, model)
@@ -203,12 +185,10 @@ def _extras_of(
         raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
     if trajectory is not None:
         axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
-        samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
-        check_interval(trajectory.name, found, axis)
-        extras[model] = {"samples": samples}
+        extras[model] = {"samples": read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]}
     if not windows:
-        if not any(model == "HybridPredictor" for _, _, model, _ in jobs):
-            names = ", ".join(name for _, name, _, _ in jobs)
+        if not any(model == "HybridPredictor" for _, _, model in jobs):
+            names = ", ".join(name for _, name, _ in jobs)
             raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
         extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
     return extras
@@ -231,8 +211,8 @@ def _without_files(jobs: Sequence[Job], option: str, *, named: bool) -> list[Job
 def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
     """Return machine and model of the one FMU of these models to which an option applies."""
     found = [job for job in jobs if job[2] in models]
-    if len({(axis.name, model) for axis, _, model, _ in found}) != 1:
-        names = ", ".join(name for _, name, _, _ in found) or "none"
+    if len({(axis.name, model) for axis, _, model in found}) != 1:
+        names = ", ".join(name for _, name, _ in found) or "none"
         raise ParameterError(
             f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
         )

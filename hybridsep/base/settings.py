@@ -184,6 +184,9 @@ class PredictorSettings(Settings):
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
 
+    KNOWN: ClassVar[tuple[str, ...]] = ("period", "measurement_delay")
+    """Fields that are known of an axis, and not fitted to a log."""
+
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold")
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")

@@ -15,19 +15,16 @@ from ..base.settings import PARAMETERS
 from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
-from ..evaluate.backtest import backtest, replayed_run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
 from ..fmi.archive import build_here, default_flavour
-from ..fmi.flavours import FMI_VERSIONS, versions_of
-from ..fmi.spec import fmu_names
-from ..logs.log import Log, read_log
-from ..machines.machine import PAPER_SETTINGS, Machine, load_machine, paper_machine
+from ..fmi.spec import fmu_name
+from ..machines.machine import PAPER_SETTINGS, Machine, load_machine
 from ..plants.plant import Encoder
 from ..plants.trajectory import archimedean_spiral, spiral, staircase
 from .page import PRINTED, write_page
 
-__all__ = ["COMPENSATED", "demo", "demo_files", "processor_time", "read_recorded"]
+__all__ = ["COMPENSATED", "demo", "demo_files"]
 
 TRAINING_SEED = 1000
 """Noise seed of the training run of a warm compensator; no case uses it."""
@@ -36,41 +33,24 @@ COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hyb
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
 
 Runs = dict[str, Run]
+Summary = dict[str, dict[str, Any]]
+
+MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
+"""The machine of each case."""
+
+SEEDS = 10
+"""Noise seeds that a full demonstration's staircase is averaged over."""
+
+Advance = Callable[[str], object]
+"""Called with the name of each run before it."""
 
 
 def compensate(
-    machine: Machine,
-    plant: Path,
-    command: Array,
-    out: Path,
-    flavour: str,
-    fmi: str = FMI_VERSIONS[0],
-    *,
-    seeds: Sequence[int] = (0,),
-    label: str = "",
-    advance: Callable[[str], object] = lambda message: None,
+    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = (0,)
 ) -> tuple[Runs, dict[str, Any]]:
     """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
 
-    Parameters
-    ----------
-    machine : Machine
-    plant : Path
-        Its plant FMU.
-    command : (n,) array, m
-        Commanded positions.
-    out : Path
-        Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
-    flavour : {"native", "python"}
-        Flavour of the FMU.
-    fmi : str
-        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`.
-    seeds : sequence of int
-        Noise seeds.
-    label : str
-        Name of the case.
-    advance : callable
-        Called with it and the name of each run before that.
+    The FMU goes to the folder ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
 
     Returns
     -------
@@ -80,11 +60,11 @@ def compensate(
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
-    cold = build_here(machine, "SepCompensator", out / "fmus", flavour, fmi=fmi)
-    weights = out / f"{machine.name}.state"
+    flavour, weights = default_flavour(), out / f"{machine.name}.state"
+    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
     advance(f"{label}, a run to learn from")
     train(machine, command, weights)
-    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights, fmi=fmi)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
     for key, choice in COMPENSATED.items():
@@ -122,25 +102,17 @@ def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dic
     return mean
 
 
-Summary = dict[str, dict[str, Any]]
-
-MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
-"""The machine of each case."""
-
-
-def _pair(machine: Machine, out: Path, flavour: str, fmi: str) -> tuple[Path, Path]:
+def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
     """Return a machine's predictor and plant FMU, built."""
-    predictor, plant = (build_here(machine, model, out, flavour, fmi=fmi) for model in ("HybridPredictor", "FeedDrive"))
+    predictor, plant = (build_here(machine, one, out, default_flavour()) for one in ("HybridPredictor", "FeedDrive"))
     return predictor, plant
 
 
-def staircase_case(
-    out: Path, seeds: int, flavour: str, advance: Callable[[str], None], fmi: str = FMI_VERSIONS[0]
-) -> dict[str, Any]:
+def staircase_case(out: Path, seeds: int, advance: Advance) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = _pair(machine, out / "fmus", flavour, fmi)
+    fmus = _pair(machine, out / "fmus")
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
@@ -149,9 +121,7 @@ def staircase_case(
     runs[0].save(out / "staircase.csv")
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
-    compensated, compensation = compensate(
-        machine, fmus[1], command, out, flavour, fmi, seeds=range(seeds), label="staircase", advance=advance
-    )
+    compensated, compensation = compensate(machine, fmus[1], command, out, "staircase", advance, range(seeds))
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
     tracking_figure(compensated, title, out / "staircase_compensated.png")
@@ -165,14 +135,14 @@ def staircase_case(
     }
 
 
-def spiral_case(out: Path, flavour: str, advance: Callable[[str], None], fmi: str = FMI_VERSIONS[0]) -> Summary:
+def spiral_case(out: Path, advance: Advance) -> Summary:
     """Predict and compensate on the spiral, both axes."""
     summary: Summary = {}
     axes: dict[str, Run] = {}
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = _pair(machine, out / "fmus", flavour, fmi)
+        fmus = _pair(machine, out / "fmus")
         advance(label)
         values = PAPER_SETTINGS[machine.name]
         axes[axis] = run = cosimulate(*fmus, command, controller_values=values)
@@ -185,9 +155,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None], fmi: st
         run.save(out / f"spiral_{axis}.csv")
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
-        compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, flavour, fmi, label=label, advance=advance
-        )
+        compensated[axis], case["compensation"] = compensate(machine, fmus[1], command, out, label, advance)
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
@@ -202,26 +170,6 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None], fmi: st
                 "contour_max_um": 1e6 * largest(error),
             }
     return summary
-
-
-def read_recorded(path: str | Path) -> Log:
-    """Read the EMPS recording.
-
-    Raises
-    ------
-    LogError
-        If the file cannot be read as a ``DATA_EMPS.mat``.
-    """
-    return read_log(path, columns=load_machine("emps").log.columns)
-
-
-def recorded_case(log: Log, out: Path) -> dict[str, Any]:
-    """Replay the EMPS recording with its published constants."""
-    predictor = paper_machine("emps").new_predictor()
-    found = backtest(predictor, log.x_d, log.x_meas)
-    run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np)
-    prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
-    return {**found.summary(), **_worse(run), "verdict": str(found.verdict)}
 
 
 def _worse(run: Run) -> dict[str, Any]:
@@ -243,52 +191,24 @@ def _worse(run: Run) -> dict[str, Any]:
     }
 
 
-SEEDS = 10
-"""Noise seeds that a full demonstration's staircase is averaged over."""
-
-_PROCESSOR_TIME = {
-    ("native", False): "10 seconds",
-    ("native", True): "a minute",
-    ("python", False): "2 minutes",
-    ("python", True): "20 minutes",
-}
-"""Rough processor time of a demonstration, by flavour and whether it is a full one."""
-
-Progress = Callable[[str, float], object]
-
-
-def demo_files(
-    out: str | Path, flavour: str, *, full: bool = False, emps: bool = False, fmi: str = FMI_VERSIONS[0]
-) -> list[Path]:
-    """Return all files that :func:`demo` writes, with or without the recorded axis; ParameterError as there."""
-    out = Path(out)
-    own = ["index.html", "summary.json", *(["spiral.png", "spiral_contour.png"] if full else [])]
-    files = [out / name for name in (*own, *(["emps.png"] if emps else []))]
-    for case, name in MACHINES.items() if full else [*MACHINES.items()][:1]:
+def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:
+    """Return all files that :func:`demo` writes."""
+    out, flavour = Path(out), default_flavour()
+    files = [out / name for name in ("index.html", "summary.json", *(["spiral.png", "spiral_contour.png"] * full))]
+    for case, name in list(MACHINES.items())[: len(MACHINES) if full else 1]:
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")
-        names = [fmu_names(load_machine(name), flavour, version) for version in versions_of(fmi, flavour)]
-        for fmu, model in (item for of_version in names for item in of_version.items()):
-            if model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
-                files.append(out / "fmus" / f"{fmu}.fmu")
-            if model == "SepCompensator":
-                files.append(out / "fmus" / "warm" / f"{fmu}.fmu")
+        for model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
+            files.append(out / "fmus" / f"{fmu_name(model, name, flavour)}.fmu")
+        files.append(out / "fmus" / "warm" / f"{fmu_name('SepCompensator', name, flavour)}.fmu")
     return files
-
-
-def processor_time(flavour: str, full: bool = False) -> str:
-    """Return roughly how much processor time a demonstration takes, in words."""
-    return f"about {_PROCESSOR_TIME[flavour, full]}"
 
 
 def demo(
     out: str | Path,
     *,
     full: bool = False,
-    emps: str | Path | None = None,
-    flavour: str | None = None,
-    fmi: str = FMI_VERSIONS[0],
-    progress: Progress = lambda message, fraction: None,
+    progress: Callable[[str, float], object] = lambda message, fraction: None,
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase, write figures, ``summary.json`` and ``index.html``.
 
@@ -301,12 +221,6 @@ def demo(
     full : bool
         Average the staircase over :data:`SEEDS` noise seeds instead of running the first one, and co-simulate the
         spiral's axes too.
-    emps : str or Path, optional
-        A ``DATA_EMPS.mat`` to replay too.
-    flavour : {"native", "python"}, optional
-        Flavour of the FMUs; native where their libraries are there, if left out.
-    fmi : str
-        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both FMUs are written, and 2.0's are run.
     progress : callable
         Called with a message and the fraction done.
 
@@ -318,38 +232,23 @@ def demo(
         ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
         :func:`hybridsep.demo.cases.compensate` found, for the spiral's axes with the contour error of both
         together, ``contour_rms_um`` and ``contour_max_um``.
-
-    Raises
-    ------
-    LogError
-        If ``emps`` cannot be read; nothing has been done then.
-    ParameterError
-        If ``fmi`` is another word, or a version that the flavour has not.
     """
-    flavour = flavour or default_flavour()
-    versions_of(fmi, flavour)
-    recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
     seeds = SEEDS if full else 1
-    cases = len(MACHINES) if full else 1
-    total = seeds + 6 * full + cases * (1 + len(COMPENSATED)) + (recorded is not None)
-    done = 0
+    total, done = seeds + 6 * full + (len(MACHINES) if full else 1) * (1 + len(COMPENSATED)), 0
 
     def advance(message: str) -> None:
         nonlocal done
         progress(message, done / total)
         done += 1
 
-    summary: Summary = {"staircase": staircase_case(out, seeds, flavour, advance, fmi)}
+    summary: Summary = {"staircase": staircase_case(out, seeds, advance)}
     if full:
-        summary |= spiral_case(out, flavour, advance, fmi)
-    if recorded is not None:
-        advance("EMPS, a recorded axis")
-        summary["emps"] = recorded_case(recorded, out)
+        summary |= spiral_case(out, advance)
     for name, case in summary.items():
         case["printed"] = PRINTED[name]
     with written_text(out / "summary.json") as file:
         file.write(json.dumps(summary, indent=2) + "\n")
-    write_page(out, summary, demo_files(out, flavour, full=full, emps=recorded is not None, fmi=fmi))
+    write_page(out, summary, demo_files(out, full=full))
     progress("done", 1.0)
     return summary

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from string import Template
 from typing import Any
 
-from ..base.files import written_text
 from ..base.metrics import shown_figure
+from ..evaluate.report import Report
 
 __all__ = ["PRINTED", "Table", "compensation_table", "prediction_table", "write_page"]
 
@@ -18,7 +16,6 @@ PRINTED = {
     "staircase": {"rms_pb_um": 33.7, "rms_h_um": 14.7, "reduction_percent": 56.4},
     "spiral_x": {"rms_pb_um": 22.0, "rms_h_um": 13.7, "reduction_percent": 38.0},
     "spiral_y": {"rms_pb_um": 130.2, "rms_h_um": 94.5, "reduction_percent": 27.0},
-    "emps": {},
 }
 """Printed figures of the paper for the demonstration's cases, RMS in µm against the measured position."""
 
@@ -96,8 +93,6 @@ def _figures(case: Mapping[str, Any]) -> list[str]:
 
 def _printed(case: Mapping[str, float]) -> str:
     """Return the paper's figures of a case as text, empty if there are none."""
-    if not case:
-        return ""
     return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
 
 
@@ -110,53 +105,27 @@ _PICTURES = {
     "spiral_x.png": "Spiral, X axis: prediction error of the paper's model",
     "spiral_y.png": "Spiral, Y axis: prediction error of the paper's model",
     "spiral.png": "Spiral: path and prediction error of the paper's model",
-    "emps.png": "EMPS, a recorded axis: prediction error of the paper's model",
 }
 """What pictures show, in the order of the page; the first ones are of what compensation is worth."""
 
-_TEMPLATE = Path(__file__).parent / "templates" / "index.html"
 
-
-def write_page(out: Path, summary: Mapping[str, Mapping[str, Any]], files: Sequence[Path]) -> None:
-    """Write ``index.html``.
-
-    Parameters
-    ----------
-    out : Path
-        The folder.
-    summary : mapping
-        As :func:`hybridsep.demo.cases.demo` returns it.
-    files : sequence of Path
-        All files in the folder, the page among them.
-    """
-    names = [path.relative_to(out).as_posix() for path in files if path.name != "index.html"]
-    verdicts = [f"<p>{html.escape(name)}: {html.escape(case['verdict'])}</p>" for name, case in summary.items()]
-    page = Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        compensation=_table(compensation_table(summary)),
-        prediction=_table(prediction_table(summary)),
-        pictures="\n".join(_picture(name, words) for name, words in _PICTURES.items() if name in names),
-        verdicts="\n".join(verdicts),
-        files="\n".join(
-            f'<li><a href="{html.escape(name)}">{html.escape(name)}</a></li>'
-            for name in sorted(names)
-            if name not in _PICTURES
-        ),
+def write_page(out: Path, summary: Summary, files: Sequence[Path]) -> None:
+    """Write ``index.html`` about a demonstration, with links to all ``files``, the page among them."""
+    names = sorted(path.relative_to(out).as_posix() for path in files if path.name != "index.html")
+    about = (
+        "FMUs of a predictor, a compensator and a drive, co-simulated over the paper's trajectories, simulated drives"
     )
-    with written_text(out / "index.html") as file:
-        file.write(page)
-
-
-def _table(table: Table) -> str:
-    head = "".join(f"<th>{html.escape(column)}</th>" for column in ("case", *table.columns))
-    rows = [f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in table.rows]
-    return (
-        f"<h2>{html.escape(table.title)}</h2>\n"
-        f'<div class="tables"><table>\n<tr>{head}</tr>\n' + "\n".join(rows) + "\n</table></div>\n"
-        f'<p class="dim">{html.escape(table.note)}</p>'
-    )
-
-
-def _picture(name: str, words: str) -> str:
-    return (
-        f'<figure><img src="{name}" alt="{html.escape(words)}"><figcaption>{html.escape(words)}</figcaption></figure>'
-    )
+    page = Report("hybridsep demo", about)
+    for table in (compensation_table(summary), prediction_table(summary)):
+        page.heading(table.title)
+        page.table(("case", *table.columns), table.rows)
+        page.paragraph(table.note, "dim")
+    for name, case in summary.items():
+        page.paragraph(f"{name}: {case['verdict']}")
+    page.heading("Pictures")
+    for name, words in _PICTURES.items():
+        if name in names:
+            page.picture(name, words)
+    page.heading("Files")
+    page.links(name for name in names if name not in _PICTURES)
+    page.write(out / "index.html")

@@ -47,6 +47,17 @@ _LAYOUT: dict[str, Any] = {
     "hovermode": "x",
 }
 
+_SCRIPT = """\
+<noscript><p class="dim">The charts need JavaScript.</p></noscript>
+<script>
+  // on paper charts are as wide as A4 and Letter both allow, and lower
+  const charts = [...document.querySelectorAll(".js-plotly-plot")].map((chart) => [chart, chart.layout.height]);
+  addEventListener("beforeprint", () => charts.forEach(([chart, height]) =>
+    Plotly.relayout(chart, { width: 670, height: 0.58 * height })));
+  addEventListener("afterprint", () => charts.forEach(([chart, height]) =>
+    Plotly.relayout(chart, { autosize: true, width: null, height })));
+</script>"""
+
 
 def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
     """Return the indices at which lines are drawn: the extremes in each of so many columns of pixels.
@@ -189,6 +200,16 @@ class Report:
         """Add a list."""
         self._parts.append("<ul>" + "".join(f"<li>{html.escape(item)}</li>" for item in items) + "</ul>")
 
+    def links(self, names: Iterable[str]) -> None:
+        """Add a list of files beside the page."""
+        items = (f'<li><a href="{html.escape(name)}">{html.escape(name)}</a></li>' for name in names)
+        self._parts.append(f"<ul>{''.join(items)}</ul>")
+
+    def picture(self, name: str, caption: str) -> None:
+        """Add a picture in a file beside the page."""
+        words = html.escape(caption)
+        self._parts.append(f'<figure><img src="{name}" alt="{words}"><figcaption>{words}</figcaption></figure>')
+
     def code(self, text: str) -> None:
         """Add text to be copied."""
         self._parts.append(f"<pre>{html.escape(text)}</pre>")
@@ -223,8 +244,9 @@ class Report:
     def write(self, path: str | Path) -> None:
         """Write the HTML file."""
         template = (Path(__file__).parent / "templates" / "report.html").read_text(encoding="utf-8")
+        body = "\n".join([*self._parts, *([_SCRIPT] if self._n_charts else [])])
         page = Template(template).substitute(
-            title=html.escape(self.title), subtitle=html.escape(self.subtitle), body="\n".join(self._parts)
+            title=html.escape(self.title), subtitle=html.escape(self.subtitle), body=body
         )
         with written_text(path) as file:
             file.write(page)

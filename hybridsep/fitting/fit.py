@@ -19,7 +19,6 @@ from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
-from ..evaluate.report import Report
 from ..identify.model import IdentifiedModel, machine_of
 from ..identify.operation import SAMPLES_MIN, TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
@@ -30,14 +29,14 @@ from ..machines.text import machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .advice import Judged, extent, recommendation
+from .advice import Judged, recommendation
 from .build import Built, build_fmus, fit_files, origin_of, sha256_of, step_times, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
-    write_errors,
+    begun_report,
     write_findings,
     write_identification,
     write_other_windows,
@@ -49,10 +48,7 @@ from .report import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["KNOWN", "Fit", "fit"]
-
-KNOWN = ("period", "measurement_delay")
-"""Parameters of the predictor that are known of an axis, and not fitted to a log."""
+__all__ = ["Fit", "fit"]
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -153,19 +149,12 @@ class Fit:
 
     def report(self, path: str | Path, built: Built | None = None) -> None:
         """Write the report, one HTML file that needs nothing else, also about the FMUs that were ``built``."""
-        T_s, replayed, judged = self.machine.T_s, self.judged.replay, self.judged
-        names, look_ahead = ", ".join(log.path.name for log in self.logs), 1e3 * replayed.Np * T_s
-        report = Report(
-            f"Axis {self.machine.name}: from its log to its FMU",
-            f"{names} · {extent(self.logs)} · look-ahead {replayed.Np} samples, {look_ahead:.4g} ms",
-        )
-        report.paragraph(self.advice, "verdict")
-        write_errors(
-            report,
-            judged,
-            "Tested on held-out samples",
+        judged = self.judged
+        settled = any(one.judges_from > one.n_train for one in judged.replay.recordings)
+        report = begun_report(
+            *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
-            "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in replayed.recordings) else ""),
+            "second half." + (_SETTLING if settled else ""),
         )
         write_other_windows(report, self.windows, judged)
         write_findings(report, self.logs, self.findings)
@@ -175,7 +164,7 @@ class Fit:
             write_tracking(report, self.tracking.lines(judged.shown))
         if built is not None and built.fmus:
             fmus = [fmu.name for fmu in built.fmus]
-            write_use(report, fmus[0], built.steps, T_s, replayed.Np)
+            write_use(report, fmus[0], built.steps, judged.T_s, judged.replay.Np)
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
         report.write(path)
 
@@ -277,8 +266,8 @@ def fit(
     progress : callable, optional
         Called with a message and the fraction done.
     **known : float
-        What is known of the axis: of its predictor :data:`KNOWN`; ``v_max``, ``a_max``, ``j_max`` and ``change_max``,
-        the drive's limits, with which a compensator is judged and built, too.
+        What is known of the axis: ``period`` and ``measurement_delay`` of its predictor; ``v_max``, ``a_max``,
+        ``j_max`` and ``change_max``, the drive's limits, with which a compensator is judged and built, too.
 
     Raises
     ------
@@ -293,9 +282,9 @@ def fit(
     logs = (logs,) if isinstance(logs, Log) else tuple(logs)
     T_s, shown = _common(logs), logs[0].shown
     given_limits = drive_limits(known)
-    entries: dict[str, Any] = {entry: known[entry] for entry in KNOWN if entry in known}
-    if unknown := known.keys() - entries.keys() - {one.name for one in DRIVE_LIMIT_ENTRIES.values()}:
-        names = [*KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
+    names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
+    entries: dict[str, Any] = {name: known[name] for name in PredictorSettings.KNOWN if name in known}
+    if unknown := known.keys() - set(names):
         raise ParameterError(f"what is known of an axis must be of {', '.join(names)}, got {listed(sorted(unknown))}")
     findings = {log.path.name: checked(log) for log in logs}
     window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else PARAMETERS["Np"].checked(Np)
@@ -399,7 +388,7 @@ def _machine(
     """Return the machine; without limits that are not required where no compensator is possible with its look-ahead."""
     sections: dict[str, Any] = {"plant": {"kind": "identified", **plant}} if plant else {}
     compensation = {"drive_limits": dict(limits), "compensator": {"compensate": COMPENSATE}} if limits else {}
-    known = {key: value for key in KNOWN if (value := getattr(settings, key))}
+    known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
 
     def made(more: Mapping[str, Any]) -> Machine:
         return machine_of(

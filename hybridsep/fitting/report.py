@@ -14,12 +14,12 @@ from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..identify.model import IdentifiedModel, deviation_words, shown_estimates
 from ..logs.checks import Finding
 from ..logs.log import Log
-from .advice import Judged, peers_in_words
+from .advice import Judged, extent, peers_in_words, recommendation
 from .build import StepTimes
 from .choice import WORTH, Tried, WindowErrors
 
 __all__ = [
-    "write_errors",
+    "begun_report",
     "write_findings",
     "write_identification",
     "write_other_windows",
@@ -35,6 +35,21 @@ _COLOURS = (PHYSICS, HOLD, HYBRID)
 """Their colours."""
 
 _COMMAND = "#1d2733"
+
+
+def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, how: str) -> Report:
+    """Return a report with what to do, and the sections on errors, their ``heading`` and how they came about."""
+    Np = judged.replay.Np
+    names, look_ahead = ", ".join(log.path.name for log in logs), 1e3 * Np * judged.T_s
+    report = Report(title, f"{names} · {extent(logs)} · look-ahead {Np} samples, {look_ahead:.4g} ms")
+    report.paragraph(recommendation(judged), "verdict")
+    _write_figures(report, judged, heading, how)
+    if not np.isnan(judged.replay.errors()[0]).all():  # else nothing judges
+        _write_time(report, judged)
+        _write_windows(report, judged)
+        _write_horizon(report, judged)
+        _write_spectra(report, judged)
+    return report
 
 
 def write_other_windows(report: Report, windows: Sequence[WindowErrors], judged: Judged) -> None:
@@ -112,25 +127,6 @@ def write_tracking(report: Report, lines: Sequence[str]) -> None:
     for line in lines[:-1]:
         report.paragraph(line)
     report.paragraph(lines[-1], "dim")
-
-
-def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
-    """Write the sections on the errors: figures and verdict, over time, over the look-ahead, spectra.
-
-    Parameters
-    ----------
-    report : Report
-    judged : Judged
-    title, how : str
-        Heading of the figures, and how they came about.
-    """
-    _write_figures(report, judged, title, how)
-    if np.isnan(judged.replay.errors()[0]).all():  # nothing judges
-        return
-    _write_time(report, judged)
-    _write_windows(report, judged)
-    _write_horizon(report, judged)
-    _write_spectra(report, judged)
 
 
 def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:

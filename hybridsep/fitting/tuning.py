@@ -10,22 +10,18 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array, as_measured, as_samples
-from ..evaluate.figures import finish_panels, save_figure
-from ..evaluate.report import HOLD, HYBRID, PHYSICS
 from ..logs.checks import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .choice import WORTH, settings_to_try, window_sizes, with_window
+from .choice import WORTH, settings_to_try
 from .replay import Recording, replay
 
 __all__ = [
@@ -36,10 +32,8 @@ __all__ = [
     "default_values",
     "joint_ratio",
     "n_unjudged",
-    "over_windows",
     "replayed_losses",
     "tune",
-    "tuning_figure",
 ]
 
 Piece = tuple[Array, Array]
@@ -92,6 +86,15 @@ class Tuning:
     rms_h: Array
 
     @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """Fields of :data:`TUNED` in which the candidates differ."""
+        return tuple(name for name in TUNED if len({getattr(one, name) for one in self.candidates}) > 1)
+
+    def entries(self, i: int) -> dict[str, Any]:
+        """Return the entries of ``[predictor]`` that candidate ``i`` has for the fields that differ."""
+        return {TUNED[name].name: getattr(self.candidates[i], name) for name in self.fields}
+
+    @cached_property
     def ratio(self) -> Array:
         """Geometric mean over the logs of RMS relative to hold, ``(n_candidates,)``.
 
@@ -125,6 +128,31 @@ class Tuning:
     def n_diverged(self) -> int:
         """Number of candidates whose prediction diverges on some log."""
         return int(np.isinf(self.rms_h).any(axis=1).sum())
+
+    def results(self) -> dict[str, Any]:
+        """Return plain values for JSON, errors in m (or rad); the candidates by their rank."""
+        chosen = self.candidates[self.chosen]
+        return {
+            "Np": chosen.Np,
+            "averaging": chosen.averaging,
+            "logs": {
+                name: {"rms_pb": pb, "rms_hold": hold}
+                for name, pb, hold in zip(self.logs, self.rms_pb.tolist(), self.rms_hold.tolist(), strict=True)
+            },
+            "chosen": self.entries(self.chosen),
+            "ratio_to_hold": float(self.ratio[self.chosen]),
+            "n_diverged": self.n_diverged,
+            "n_alike": len(self.alike),
+            "candidates": [
+                {
+                    **self.entries(i),
+                    "rms_h": dict(zip(self.logs, self.rms_h[i].tolist(), strict=True)),
+                    "ratio_to_hold": float(self.ratio[i]),
+                    "own": i == 0,
+                }
+                for i in self.ranking
+            ],
+        }
 
 
 def joint_ratio(rms: Array, rms_hold: Array) -> float:
@@ -163,43 +191,12 @@ def tune(
     SignalError
         If a log's samples cannot be used; the message names the log.
     """
-    given = tuple(candidates)
-    tasks = [(name, pieces, one) for name, pieces in logs.items() for one in given]
-    return _tuning(logs, given, _losses(model, tasks, jobs, progress))
-
-
-def over_windows(
-    model: ModalModel,
-    logs: Logs,
-    settings: PredictorSettings,
-    *,
-    jobs: int = 1,
-    progress: Progress = lambda _done: None,
-) -> dict[int, Tuning]:
-    """Return the losses of settings with shorter and longer windows, as far as the logs reach, by ``Np``.
-
-    Parameters
-    ----------
-    model, logs, jobs, progress
-        As for :func:`tune`.
-    settings : PredictorSettings
-        Of the controller's window; others have as many of the lags as fit into them.
-    """
-    sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
-    tried = [with_window(settings, Np) for Np in sizes]
-    tasks = [(name, pieces, one) for one in tried for name, pieces in logs.items()]
-    found = _losses(model, tasks, jobs, progress)
-    n = len(logs)
-    return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
-
-
-def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: Sequence[Array]) -> Tuning:
-    """Return the tuning of the losses of each log, one after the other."""
-    by_log = np.reshape(found, (len(logs), -1, 3))
+    tasks = [(name, pieces, one) for name, pieces in logs.items() for one in candidates]
+    by_log = np.reshape(_losses(model, tasks, jobs, progress), (len(logs), -1, 3))
     # A replay that diverges leaves no baselines; all replays of a log have the same.
     sound = np.argmax(~np.isnan(by_log[:, :, 0]), axis=1)
     rms_pb, rms_hold = by_log[np.arange(len(logs)), sound, :2].T
-    return Tuning(tuple(logs), candidates, rms_pb, rms_hold, by_log[:, :, 2].T)
+    return Tuning(tuple(logs), tuple(candidates), rms_pb, rms_hold, by_log[:, :, 2].T)
 
 
 def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Array]:
@@ -311,83 +308,22 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
     Raises
     ------
     ParameterError
-        If a value does not fit the window or has no effect, or there are too many candidates; options are named.
+        If a value does not fit the window or has no effect, or there are too many candidates.
     """
     for name, given in values.items():
         if name in PredictorSettings.AVERAGING and not settings.averaging:
-            raise ParameterError(f"--{TUNED[name].name} has an effect with averaging only: give --averaging true, too")
+            raise ParameterError(f"{TUNED[name].name} has an effect with averaging only: set averaging = true, too")
         for value in given:
             try:
                 replace(settings, **{name: value})
             except ParameterError as error:
-                raise ParameterError(f"--{TUNED[name].name}: {error}") from error
+                raise ParameterError(f"{TUNED[name].name}: {error}") from error
     n = math.prod(len(given) for given in values.values())
     if n > _CANDIDATES_MAX:
-        options = " and ".join(f"--{TUNED[name].name}" for name in values)
-        raise ParameterError(f"{options} have {n} combinations, at most {_CANDIDATES_MAX} are allowed; take fewer")
+        names = " and ".join(TUNED[name].name for name in values)
+        raise ParameterError(f"{names} have {n} combinations, at most {_CANDIDATES_MAX} are allowed; take fewer")
     combined = [
         replace(settings, **dict(zip(values, combination, strict=True)))
         for combination in itertools.product(*values.values())
     ]
     return list(dict.fromkeys([settings, *combined]))
-
-
-_SHOWN = 0.95
-"""Share of the candidates that the span of the errors is chosen for; candidates beyond it are at its edge."""
-
-_VALUES_NAMED = 6
-"""Values that are named below a panel, the first and the last among them."""
-
-
-def tuning_figure(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, path: str | Path) -> None:
-    """Draw the error over each tuned parameter, and over the look-ahead, to a PNG, PDF or SVG.
-
-    Parameters
-    ----------
-    tuning : Tuning
-    windows : mapping
-        Tunings of the chosen settings by ``Np``.
-    values : mapping
-        Values that were tried, by the fields of settings.
-    title : str
-        Heading.
-    path : str or Path
-        The file.
-    """
-    fields = [field for field in values if len({getattr(one, field) for one in tuning.candidates}) > 1]
-    figure = Figure(figsize=(3.2 * (len(fields) + 1), 4.0), layout="constrained")
-    *panels, last = figure.subplots(1, len(fields) + 1, squeeze=False)[0].tolist()
-    Np = tuning.candidates[tuning.chosen].Np
-    figure.suptitle(f"{title}\n{len(tuning.candidates)} candidates, Np = {Np}", fontsize="medium")
-    finite = np.sort(tuning.ratio[np.isfinite(tuning.ratio)])
-    highest = 1.1 * max([*finite[: round(_SHOWN * len(finite))], 1e-3])
-    ratio = np.minimum(tuning.ratio, highest)
-    for axes, field in zip(panels, fields, strict=True):
-        own = [getattr(one, field) for one in tuning.candidates]
-        tried = sorted(set(own))
-        place = np.array([tried.index(value) for value in own])
-        best = [float(ratio[place == i].min()) for i in range(len(tried))]
-        axes.plot(place, ratio, ".", color=HYBRID, markersize=3, alpha=0.35, label="candidates", rasterized=True)
-        axes.plot(range(len(tried)), best, color=HYBRID, linewidth=1.6, label="best over the others")
-        axes.plot(place[tuning.chosen], ratio[tuning.chosen], "*", color="black", markersize=11, label="chosen")
-        axes.plot(place[0], ratio[0], "o", color="black", fillstyle="none", markersize=8, label="machine's own")
-        axes.set_ylim(0.0, 1.05 * highest)
-        shown = np.unique(np.linspace(0, len(tried) - 1, min(len(tried), _VALUES_NAMED)).round().astype(np.intp))
-        axes.set_xticks(shown, [f"{tried[i]:g}" for i in shown], fontsize="small")
-        unit = TUNED[field].unit
-        name = "λ" if field == "lam" else field
-        axes.set_xlabel(name if unit == "1" else f"{name} [{unit.replace('m2', 'm²')}]")
-    sizes = sorted(windows)
-    hybrid = np.array([windows[size].ratio[0] for size in sizes])
-    last.plot(sizes, np.where(np.isfinite(hybrid), hybrid, np.nan), "o-", color=HYBRID, markersize=4)
-    last.plot(sizes, [windows[size].ratio_pb for size in sizes], "--", color=PHYSICS, linewidth=1.2, label="physics")
-    last.axhline(1.0, color=HOLD, linewidth=1.2, linestyle="--", label="hold")
-    last.axvline(Np, color="black", linewidth=0.8, linestyle=":")
-    last.set_ylim(bottom=0.0)
-    last.set_xlabel("look-ahead Np, no choice")
-    figure.supylabel("RMS error relative to hold", fontsize="medium")
-    labelled = [axes.get_legend_handles_labels() for axes in (*panels[:1], last)]
-    named = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
-    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=4, fontsize="small", frameon=False)
-    finish_panels([*panels, last])
-    save_figure(figure, path)

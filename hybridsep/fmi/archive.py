@@ -20,7 +20,7 @@ from ..base.files import written_whole
 from ..fmi import native, python
 from ..machines.machine import Machine
 from .compile import ALL_TARGETS, default_targets, expanded, has_native
-from .flavours import FLAVOURS, FMI_VERSIONS, versions_of
+from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 
 __all__ = ["archived", "build_fmu", "build_here", "default_flavour", "other_platforms"]
@@ -152,54 +152,20 @@ def default_flavour() -> str:
     return "native" if has_native() else "python"
 
 
-def build_here(
-    machine: Machine,
-    model: str,
-    out: Path,
-    flavour: str,
-    *,
-    weights: Path | None = None,
-    fmi: str = FMI_VERSIONS[0],
-    origin: Mapping[str, Any] | None = None,
-) -> Path:
-    """Build one of a machine's FMUs, for this machine, or for all platforms where their libraries are there.
-
-    Parameters
-    ----------
-    machine, out, flavour, weights, origin
-        As in :func:`~hybridsep.fmi.archive.build_fmu`.
-    model : str
-        ``HybridPredictor``, ``FeedDrive``, …
-    fmi : str
-        Of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both versions the first one's path is returned.
-    """
-    paths = [
-        build_fmu(
-            *(machine, fmu_name(model, machine.name, flavour, version), out, flavour),
-            weights=weights,
-            fmi=version,
-            origin=origin,
-        )
-        for version in versions_of(fmi, flavour)
-    ]
-    return paths[0]
+def build_here(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
+    """Build one of a machine's FMUs (``model`` is ``HybridPredictor``, ``FeedDrive``, …); as :func:`build_fmu`."""
+    return build_fmu(machine, fmu_name(model, machine.name, flavour), out, flavour, weights=weights)
 
 
-def other_platforms(fmu: Path, machine: Path, weights: Path | None = None, fmi: str = FMI_VERSIONS[0]) -> str:
+def other_platforms(fmu: Path, machine: Path, weights: Path | None = None) -> str:
     """Return which platforms a native FMU was built for here and the line that builds it for all; empty if it was.
 
-    Parameters
-    ----------
-    fmu, machine, weights : Path
-        The archive, its machine file, and what it has learned.
-    fmi : str
-        As in :func:`build_here`.
+    ``fmu`` is the archive, ``machine`` its machine file, ``weights`` what it has learned.
     """
     targets = expanded(default_targets())
     if set(targets) == set(ALL_TARGETS):
         return ""
     line: list[object] = ["hybridsep", "build", fmu.stem, "--target", "all", "-m", machine]
     line += [] if weights is None else ["--weights", weights]
-    line += ["--fmi", fmi] if fmi in FMI_VERSIONS[1:] else []
     line += ["--out", fmu.parent]
     return f"native FMUs are for {', '.join(targets)}; for all platforms: {shlex.join(map(str, line))}"

@@ -5,13 +5,15 @@ An invalid file is refused with a message that names the file, the entry, what w
 
 from __future__ import annotations
 
+import json
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..base.errors import MachineError, ParameterError, brief, first_line, listed
+from ..base.errors import FmuError, MachineError, ParameterError, brief, first_line, listed
 from ..base.files import data_folder
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
@@ -20,6 +22,7 @@ from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import (
     COMPENSATOR,
+    NAME_PATTERN,
     PREDICTOR,
     DriveLimitsSection,
     FeedDriveSection,
@@ -44,12 +47,6 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-
-import re
-
-from ..base.errors import FmuError
-from .sections import NAME_PATTERN
 
 if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..compensate.compensator import SepCompensator
@@ -314,13 +311,15 @@ def machine_path(machine: str | Path) -> Path:
     return bundled
 
 
-def load_machine(machine: str | Path) -> Machine:
+def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
     """Read a machine file.
 
     Parameters
     ----------
     machine : str or Path
         Path of a ``.toml`` file, or name of a bundled machine.
+    changes : iterable of str
+        Entries with other values than the file's, each as ``predictor.p=20``; a word needs no quotes.
 
     Raises
     ------
@@ -332,10 +331,30 @@ def load_machine(machine: str | Path) -> Machine:
         content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {first_line(error)}") from error
+    for change in changes:
+        content = _with(content, _parsed(change))
     try:
         return machine_from_table(content)
     except ParameterError as error:
         raise MachineError(f"{path.name}: {error}") from error
+
+
+def _parsed(change: str) -> dict[str, Any]:
+    """Return the tables that ``ENTRY=VALUE`` stands for."""
+    entry, equals, value = change.partition("=")
+    for line in (change, f"{entry}={json.dumps(value.strip())}") if equals else ():
+        try:
+            return dict(tomllib.loads(line))
+        except ValueError:
+            continue
+    raise MachineError(f"an entry is set as in predictor.p=20, got {brief(change)}")
+
+
+def _with(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables with what changes in them."""
+    both = [name for name, one in changes.items() if isinstance(one, Mapping) and isinstance(table.get(name), Mapping)]
+    inner = {name: _with(table[name], changes[name]) for name in both}
+    return {**table, **changes, **inner}
 
 
 def machine_from_table(content: Mapping[str, Any]) -> Machine:

@@ -243,12 +243,13 @@ def _settings_entry(known: Mapping[str, Parameter], check: Callable[[dict[str, A
     by_entry = {parameter.name: (name, parameter) for name, parameter in known.items()}
 
     def read(value: Any, place: str, problems: list[str]) -> Any:
+        found = _Settings()
+        found.table = {}
         if not isinstance(value, Mapping):
             problems.append(f"{place} must be a table, got {brief(value)}")
-            return _Settings()
+            return found
         before = len(problems)
         _refuse_unknown(value, by_entry, place, problems)
-        found, found.table = _Settings(), {}
         for entry, (name, parameter) in by_entry.items():
             if value.get(entry) is not None:
                 found[name] = found.table[entry] = _checked(

@@ -26,7 +26,7 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
     rows = [line.split() for line in out.splitlines() if line.strip()]
     assert ["x_d", "m", "4000", "0.001", "commanded"] in rows
     assert ["torque", "m", "2000", "0.002"] in rows
-    status, out, err = hybridsep("backtest", path, "-m", "spring_mass_damper", "--list-channels", "--json")
+    status, out, err = hybridsep("fit", path, "--list-channels", "--json")
     assert (status, err) == (0, "")
     listed = {one["name"]: one for one in json.loads(out)[str(path)]}
     assert listed["x"] == {"name": "x", "unit": "m", "role": "x", "n_samples": 2000, "interval": 0.002}
@@ -38,7 +38,7 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
 
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:
     path = recording(tmp_path / "log.csv")
-    replay = ("backtest", path, "-m", "spring_mass_damper", "--Np", "20", "--p", "5", "--json")
+    replay = ("backtest", path, "-m", "spring_mass_damper", "--json")
     status, _, err = hybridsep(*replay)
     assert status == 2
     assert "'x_d' has 4000 samples every 0.001 s, 'x' has 2000 samples every 0.002 s" in err

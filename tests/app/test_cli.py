@@ -9,14 +9,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from command_line import Run, write_log, write_rows
+from command_line import Run, predictor, write_log, write_rows
 from places import EMPS
 from staircase_data import commanded
 
 from hybridsep import Encoder, cosimulate, load_machine, staircase
-from hybridsep.app.options import PREDICTOR_ENTRIES
 from hybridsep.base.files import data_folder
-from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest
 
@@ -24,7 +22,7 @@ from hybridsep.evaluate.backtest import backtest
 @pytest.mark.slow
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=6001)
-    paper = ("-m", "spring_mass_damper", "--averaging", "false")
+    paper = ("-m", "spring_mass_damper", *predictor(averaging="false"))
     status, out, _ = hybridsep("backtest", log, *paper, "--json", "--out", tmp_path / "batches.csv")
     summary = json.loads(out)
     assert status == 0
@@ -40,7 +38,7 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert "after warm-up" in out
     assert " ".join(summary["verdict"].split()) in " ".join(out.split())
     assert summary["verdict"].startswith("Better than the physics model: 0.4")
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "true", "--t_init", 0)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="true", t_init=0))
     assert status == 0
     assert "RMS" in out
     assert "after warm-up" not in out
@@ -51,19 +49,19 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     rows[1500] = rows[1500].rpartition(",")[0] + ","
     log = tmp_path / "log.csv"
     log.write_text("\n".join(rows))
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "true", "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 1999
     assert "1 of 2000 measurements was missing, and not learned" in json.loads(out)["verdict"]
-    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "false")
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="false"))
     assert status == 2
-    assert "measured position 1500 is missing; it is replayed with averaging alone (--averaging true)" in said
+    assert "1500 is missing; it is replayed with averaging alone (--set predictor.averaging=true)" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", header="time,command,position", scale=1e3)
     names = ("--t", "time", "--x_d", "command", "--x", "position", "--unit", "mm")
-    sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lambda", 1e-11, "--t_init", 0.2)
+    sizes = predictor(Np=50, p=20, q=1, lambda_=1e-11, t_init=0.2)
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
     assert status == 0
     assert json.loads(out)["n_batches"] == 50
@@ -94,7 +92,7 @@ def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: s
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
 def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
     """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
-    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--averaging", "false", "--t_init", 1.242, "--json")
+    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", *predictor(averaging="false", t_init=1.242), "--json")
     summary = json.loads(out)
     assert status == 0
     assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
@@ -104,15 +102,15 @@ def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
 
 def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "short.csv", n=150)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--averaging", "false", "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="false"), "--json")
     assert status == 0
     assert json.loads(out)["rms_h_um_after_warm_up"] is None
 
 
 def test_build(hybridsep: Run, tmp_path: Path) -> None:
-    status, out, _ = hybridsep("build", "FeedDrivePy", "--flavour", "python", "--out", tmp_path, "--json")
+    status, out, _ = hybridsep("build", "FeedDrivePy", "--flavour", "python", "--out", tmp_path)
     assert status == 0
-    assert json.loads(out) == [str(tmp_path / "FeedDrivePy.fmu")]
+    assert out.startswith(f"{tmp_path / 'FeedDrivePy.fmu'}  ")
     status, out, _ = hybridsep("build", "-m", "emps", "--flavour", "python", "--out", tmp_path)
     assert status == 0
     assert "HybridPredictorPy_emps.fmu" in out
@@ -120,14 +118,11 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_build_for_both_versions_of_fmi(hybridsep: Run, tmp_path: Path) -> None:
-    names = ["FeedDrive", "FeedDriveFmi3"]
-    options = ("--fmi", "both", "--target", "host", "--out", tmp_path, "--json")
-    status, out, err = hybridsep("build", *names, *options)
+def test_build_for_fmi_3(hybridsep: Run, tmp_path: Path) -> None:
+    options = ("--fmi", "3", "--target", "host", "--out", tmp_path)
+    status, _, err = hybridsep("build", "FeedDriveFmi3", *options)
     assert status == 0, err
-    assert json.loads(out) == [str(tmp_path / f"{name}.fmu") for name in names]
-    versions = [fmpy.read_model_description(str(tmp_path / f"{name}.fmu")).fmiVersion for name in names]
-    assert versions == ["2.0", "3.0"]
+    assert fmpy.read_model_description(str(tmp_path / "FeedDriveFmi3.fmu")).fmiVersion == "3.0"
 
 
 @pytest.mark.slow
@@ -136,13 +131,13 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     np.savetxt(
         path, np.column_stack((np.arange(1500) * 1e-3, commanded()[:1500])), delimiter=",", header="t,x_d", comments=""
     )
-    options = ("--flavour", "python", "--seed", 2, "--out", tmp_path / "run.npz")
+    options = ("--set", "plant.seed=2", "--out", tmp_path / "run.npz")
     status, out, _ = hybridsep("cosim", "--trajectory", path, *options, "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 1500
     with np.load(tmp_path / "run.npz") as arrays:
         assert len(arrays["x_h"]) == 1500
-    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, "--p", 30, "--force", "--json")
+    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, *predictor(p=30), "--force", "--json")
     assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
 
 
@@ -169,8 +164,8 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert "planned by the hybrid 9" in out
     # Preview and knots follow a window of another length.
     short = write_rows(tmp_path / "short.csv", commanded()[:400], commanded()[:400])
-    sizes = ("--Np", 25, "--p", 20, "--q", 3, "--trajectory", short)
-    assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
+    sizes = [word for entry in ("Np=25", "p=20", "q=3") for word in ("--set", f"compensator.{entry}")]
+    assert hybridsep("cosim", "--compensate", "physics", *sizes, "--trajectory", short)[0] == 0
 
 
 @pytest.mark.slow
@@ -201,19 +196,14 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
     figure = tmp_path / "made" / "run.png"
-    assert hybridsep("cosim", "--flavour", "python", "--figure", figure)[0] == 0
+    assert hybridsep("cosim", "--figure", figure)[0] == 0
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
-    status, out, _ = hybridsep("backtest", "--help")
-    text = " ".join(out.split())
-    assert status == 0
-    for name in ("Np", "p", "q", "lambda", "t_init"):
-        assert PARAMETERS[name].range_text in text
-    assert "[m2]" in text
+def test_help_lists_the_commands_in_whole_sentences(hybridsep: Run) -> None:
     status, out, _ = hybridsep("--help")
-    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init", "tune"))
+    assert status == 0
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "init", "tune"))
     listed = out.partition("Commands:")[2].partition("An error is")[0]
     assert "From the log of an axis to its model, FMUs and a report." in listed
     assert "..." not in listed
@@ -224,8 +214,14 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     ("arguments", "message"),
     [
         (["backtest", "{log}", "-m", "robot"], "error: no machine 'robot'"),
-        (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
-        (["backtest", "{log}", "-m", "spring_mass_damper", "--lambda", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
+        (
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--set", "predictor.p=200"],
+            "p must be 1 … Np = 100, got 200",
+        ),
+        (
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--set", "predictor.lambda=0"],
+            "lambda must be 1e-40 … 1e+12 m2, got 0",
+        ),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
         (
             ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "furlong"],
@@ -235,29 +231,33 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["build", "SepCompensatorPy", "-m", "emps", "--flavour", "python"], "; emps has no [drive_limits], which a"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
         (["build", "--flavour", "cobol"], "flavour must be one of"),
-        (["build", "--fmi", "4"], "--fmi must be one of 2, 3, both, got '4'"),
-        (["build", "--fmi", "both", "--flavour", "python"], "--fmi both is for native FMUs, pythonfmu's are of FMI 2"),
+        (["build", "--fmi", "4"], "the version of FMI must be one of 2, 3, got '4'"),
+        (["build", "--fmi", "3", "--flavour", "python"], "FMUs of the Python flavour are of FMI 2 alone"),
         (["build", "FeedDriveFmi3", "--target", "host"], "; FMUs of FMI 3.0 need --fmi 3"),
         (
-            ["cosim", "-m", "emps", "--flavour", "python"],
+            ["cosim", "-m", "emps"],
             "machine emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant",
         ),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
-        (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
+        (["cosim", "--set", "predictor.Np=10"], "p must be 1 … Np = 10, got 50"),
         (["cosim", "--compensate", "magic"], "--compensate must be one of off, physics, hybrid, got 'magic'"),
-        (["cosim", "--compensate", "hybrid", "--p", "51"], "p must be 1 … Np = 50, got 51"),
+        (["cosim", "--compensate", "hybrid", "--set", "compensator.p=51"], "p must be 1 … Np = 50, got 51"),
         (
             ["cosim", "--compensate", "hybrid", "-m", "emps", "--plant", "plant.fmu"],
             "machine emps has no [drive_limits], which a compensator must keep",
         ),
         (
-            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu", "--flavour", "python"],
+            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu"],
             "no FMU at none.fmu; build it first",
         ),
         (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
         (["cosim", "--figure", "run.pdf"], "--figure must end in .png, got 'run.pdf'"),
-        (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
+        (["cosim", "--set", "plant.seed=99999999999"], "plant.seed: seed must be 0 … 2147483647, got 99999999999"),
+        (["cosim", "--set", "plant.sed=1"], "plant.sed is not an entry of a machine file"),
+        (["cosim", "--set", "predictor=1"], "predictor must be a table, got 1"),
+        (["cosim", "--set", "predictor.p"], "an entry is set as in predictor.p=20, got 'predictor.p'"),
+        (["cosim", "--set", "plant.seed=1", "--plant", "p.fmu"], "is for an FMU that is built here; leave out --plant"),
         (["cosim", "--out", "{log}/run.csv"], "is a file, not a folder"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
         (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "is a file, not a folder"),
@@ -273,17 +273,10 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
     assert len(err.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "message"),
-    [
-        ("--p", "10.5", "Invalid value for '--p': must be a whole number, got '10.5'"),
-        ("--lambda", "1,5", "Invalid value for '--lambda': must be a number, got '1,5'"),
-    ],
-)
-def test_a_value_that_is_no_number_is_named(hybridsep: Run, option: str, value: str, message: str) -> None:
-    status, out, err = hybridsep("backtest", "log.csv", "-m", "spring_mass_damper", option, value)
+def test_a_value_that_is_no_number_is_named(hybridsep: Run) -> None:
+    status, out, err = hybridsep("fit", "log.csv", "--Np", "10.5")
     assert (status, out) == (2, "")
-    assert message in " ".join(err.split())
+    assert "Invalid value for '--Np': must be a whole number, got '10.5'" in " ".join(err.split())
 
 
 def test_missing_columns_are_named_by_options(hybridsep: Run, tmp_path: Path) -> None:
@@ -315,42 +308,3 @@ def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path:
     status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 2
     assert "sampled every 0.004 s, but machine spring_mass_damper has T_s = 0.001 s" in " ".join(err.split())
-
-
-@pytest.mark.parametrize("name", sorted(PREDICTOR_ENTRIES))
-def test_each_parameter_of_the_predictor_is_an_option(hybridsep: Run, name: str) -> None:
-    parameter = PREDICTOR_ENTRIES[name]
-    for command in ("backtest", "cosim"):
-        _, out, _ = hybridsep(command, "--help")
-        assert f"--{parameter.name}" in out
-        assert " ".join(parameter.help.split()) in " ".join(out.split())
-
-
-@pytest.mark.slow
-def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
-    command = write_log(tmp_path / "log.csv", n=600)
-    given = (
-        "--Np",
-        40,
-        "--p",
-        10,
-        "--q",
-        2,
-        "--lambda",
-        1e-9,
-        "--spacing",
-        4,
-        "--no_reversal",
-        "false",
-    )
-    run = ("cosim", "--trajectory", command, "--flavour", "python", "--json")
-    status, out, _ = hybridsep(*run, "--compensate", "physics", *given)
-    assert status == 0
-    assert json.loads(out)["share_physics"] == 1.0
-    for option, value in (("--preview", 90), ("--no_reversal", "true"), ("--jerk_weight", 2)):
-        status, _, err = hybridsep(*run, option, value)
-        assert status == 2
-        assert f"{option.replace('jerk-', 'jerk_')} must come with --compensate" in err
-    status, _, err = hybridsep(*run, "--compensate", "physics", "--no_reversal", "maybe")
-    assert status == 2
-    assert "'maybe' is neither true nor false" in " ".join(err.split())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from arx_oracle import arx_by_definition, free_run_by_definition
-from command_line import Run, write_log
+from command_line import Run, predictor, write_log
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
@@ -41,11 +41,11 @@ def test_gaps_and_jitter_are_noted(hybridsep: Run, tmp_path: Path) -> None:
 def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
     keep = np.setdiff1d(np.arange(3000), np.random.default_rng(5).integers(1, 2999, 30))
     log = rows_of(tmp_path / "log.csv", keep)
-    status, out, err = hybridsep("backtest", log, *MACHINE, "--averaging", "true", "--resample", "--json")
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--resample", "--json")
     assert status == 0, err
     assert json.loads(out)["n_samples"] == len(keep)
     whole = rows_of(tmp_path / "whole.csv", np.arange(3000))
-    of_whole = json.loads(hybridsep("backtest", whole, *MACHINE, "--averaging", "true", "--json")[1])
+    of_whole = json.loads(hybridsep("backtest", whole, *MACHINE, "--json")[1])
     assert json.loads(out)["rms_h_um"] == pytest.approx(of_whole["rms_h_um"], rel=0.1)
     assert json.loads(hybridsep("backtest", log, *MACHINE, "--json")[1])["n_samples"] == len(keep)
 
@@ -68,9 +68,7 @@ def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path:
     drawn = []
     for t_init in (0.0, 0.3):
         figure = tmp_path / "figure.svg"
-        status, _, err = hybridsep(
-            "backtest", log, *MACHINE, "--averaging", "true", "--t_init", t_init, "--figure", figure, "--force"
-        )
+        status, _, err = hybridsep("backtest", log, *MACHINE, *predictor(t_init=t_init), "--figure", figure, "--force")
         assert status == 0, err
         drawn.append(figure.read_text(encoding="utf-8"))
     assert "<!-- linear hybrid model -->" in drawn[0]
@@ -89,7 +87,7 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     warm = json.loads(hybridsep("backtest", log, *MACHINE, "--weights", state, "--json")[1])
     assert warm["rms_h_um"] < 0.8 * cold["rms_h_um"]
     assert warm["rms_pb_um"] == pytest.approx(cold["rms_pb_um"], rel=1e-12)
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, "--p", 20)
+    status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, *predictor(p=20))
     assert status == 2
     assert "my.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
     assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
@@ -99,7 +97,7 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
 def test_arx_models_stand_beside_hold(hybridsep: Run, tmp_path: Path) -> None:
     n, Np, warm = 800, 100, 200
     x_d, x, log = commanded()[:n], measured(0)[:n], write_log(tmp_path / "log.csv", n=n)
-    command = ("backtest", log, *MACHINE, "--Np", Np, "--p", 20, "--t_init", 1e-3 * warm)
+    command = ("backtest", log, *MACHINE, *predictor(Np=Np, p=20, t_init=1e-3 * warm))
     figures = json.loads(hybridsep(*command, "--json")[1])
     status, out, err = hybridsep(*command)
     assert status == 0, err
@@ -139,7 +137,9 @@ def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("backtest", log, *MACHINE)
     assert status == 0, err
     assert "x[b]axis[red].csv: prediction error in µm" in " ".join(out.split())
-    status, out, err = hybridsep("tune", log, *MACHINE, "--Np", 50, "--p", 5, "--q", 0, "--lambda", 1e-9, "--jobs", 1)
+    status, out, err = hybridsep(
+        "tune", log, *MACHINE, *predictor(Np=50), "--try", "p=5", "--try", "q=0", "--try", "forgetting=0"
+    )
     assert status == 0, err
     assert "x[b]axis[red].csv" in out
     status, _, err = hybridsep("backtest", log, *MACHINE, "--x", "[bold]")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import Run, write_log
+from command_line import Run, predictor, write_log
 from log_files import columns, write
 
 from hybridsep.cosim.adapters import FmuDrive
@@ -73,7 +73,7 @@ def test_hostile_machine_files(hybridsep: Run, tmp_path: Path, old: str, new: st
     assert MACHINE_FILE.count(old) == 1
     machine = tmp_path / "machine.toml"
     machine.write_text(MACHINE_FILE.replace(old, new), encoding="utf-8")
-    assert message in refusal(hybridsep, "cosim", "-m", machine, "--flavour", "python")
+    assert message in refusal(hybridsep, "cosim", "-m", machine)
 
 
 @pytest.mark.parametrize("t", [[0.0, 5e-324, 1e-323, 1.5e-323], [0.0, 1e-310, 2e-310], [-1e308, 0.0, 1e308]])
@@ -92,9 +92,9 @@ def test_numbers_of_5000_digits(hybridsep: Run, tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text(f"t,x_d,x\n0,0,0\n0.001,0,{DIGITS}\n0.002,0,0\n")
     assert "column 'x' must be finite, got inf" in refusal(hybridsep, "backtest", log, "-m", MACHINE)
-    assert "lambda must be finite" in refusal(hybridsep, "cosim", "--lambda", DIGITS)
-    assert "seed must be 0 … 2147483647, got" in refusal(hybridsep, "cosim", "--seed", "9" * 300)
-    assert "seed must be a number, got" in refusal(hybridsep, "cosim", "--seed", "9" * 4000)
+    assert "lambda must be finite" in refusal(hybridsep, "cosim", "--set", f"predictor.lambda={DIGITS}")
+    assert "seed must be 0 … 2147483647, got" in refusal(hybridsep, "cosim", "--set", f"plant.seed={'9' * 300}")
+    assert "seed must be a number, got" in refusal(hybridsep, "cosim", "--set", f"plant.seed={'9' * 4000}")
 
 
 @pytest.mark.parametrize("n", [3000, 5000])
@@ -145,7 +145,7 @@ def test_memory_that_there_is_not(hybridsep: Run, tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (8 << 30, before[1]))
     try:
-        sizes = ("--Np", 100_000, "--p", 100_000)
+        sizes = predictor(Np=100_000, p=5000)
         status, out, err = hybridsep("backtest", log, "-m", MACHINE, *sizes)
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
@@ -199,7 +199,7 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     done = command("backtest", log, "-m", MACHINE, env=ascii_only)
     assert done.returncode == 0, done.stderr
     assert b"prediction error in ?m against" in done.stdout
-    done = command("backtest", log, "-m", MACHINE, "--p", 200, env=ascii_only)
+    done = command("backtest", log, "-m", MACHINE, *predictor(p=200), env=ascii_only)
     assert done.returncode == 2
     assert b"p must be 1 ? Np = 100, got 200" in done.stderr
 

@@ -78,7 +78,7 @@ def test_cosim_does_not_overwrite_what_it_reads(
     trajectory = command_file(tmp_path)
     before = trajectory.read_bytes()
     out = linked(link, trajectory, ".csv")
-    arguments = ("--trajectory", trajectory, "--flavour", "python", "--out", out)
+    arguments = ("--trajectory", trajectory, "--out", out)
     assert f"--out {out} is the same file as the trajectory {trajectory}" in refusal(hybridsep, "cosim", *arguments)
     assert trajectory.read_bytes() == before
     outputs = ("--out", tmp_path / "run.npz", "--figure", tmp_path / "run.png")
@@ -95,13 +95,6 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
     assert machine.read_bytes() == before
 
 
-def test_demo_does_not_overwrite_its_recording(hybridsep: Run, tmp_path: Path) -> None:
-    recording = write(tmp_path / "recording.csv", {"t": [0, 1], "qg": [0, 0], "qm": [0, 0]})
-    (tmp_path / "staircase.csv").hardlink_to(recording)
-    err = refusal(hybridsep, "demo", "--emps", recording, "--out", tmp_path)
-    assert f"staircase.csv is the same file as the recording {recording}" in err
-
-
 # An existing file --------------------------------------------------------------------------------------------------
 
 
@@ -112,7 +105,7 @@ def test_demo_does_not_overwrite_its_recording(hybridsep: Run, tmp_path: Path) -
         ("cosim", "--trajectory", "{log}", "--out", "{there}"),
         ("cosim", "--trajectory", "{log}", "--figure", "{there}"),
         ("build", "FeedDrive", "--out", "{folder}"),
-        ("init", "{there}", "--tau", "0.006"),
+        ("init", "{there}"),
         ("demo", "--out", "{folder}"),
         ("fit", "{log}", "--out", "{folder}"),
     ],
@@ -192,16 +185,12 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["demo", "--emps", "missing.mat"], "missing.mat: there is no such file"),
-        (["demo", "--emps", "{log}"], "log.csv: columns 'qg' (x_d), 'qm' (x) are missing"),
-        (["demo", "--flavour", "cobol"], "flavour must be one of native, python, got 'cobol'"),
         (["build", "--target", "sparc"], "no target sparc; there are host"),
         (["build", "HybridPredictor", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
         (
             ["build", "FeedDrive", "--unit", "furlong"],
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
-        (["build", "FeedDrive", "--T_s", "-1"], "T_s must be"),
         (["cosim", "--predictor", "{log}"], "log.csv is not a readable FMU"),
         (["cosim", "--plant", "none.fmu"], "no FMU at none.fmu; build it first"),
         (["cosim", "--plant", "{fmu}"], "HybridPredictorPy.fmu is no plant: it has no input x_d"),
@@ -210,7 +199,6 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
             ["cosim", "--unit", "furlong"],
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
-        (["cosim", "--T_s", "0"], "T_s must be"),
         (["backtest", "{log}", "-m", MACHINE, "--out", "{folder}"], "--out must be a file, got the folder"),
     ],
 )
@@ -249,8 +237,8 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
 
 
 def test_the_demos_list_of_files_needs_no_demo(tmp_path: Path) -> None:
-    files = demo_files(tmp_path, "python", full=True, emps=True)
-    assert len(files) == len(set(files)) == 5 + 3 * (4 + 1 + 3 + 1)
+    files = demo_files(tmp_path, full=True)
+    assert len(files) == len(set(files)) == 4 + 3 * (4 + 1 + 3 + 1)
 
 
 def test_a_file_that_has_the_folders_name_is_named(hybridsep: Run, tmp_path: Path, log: Path) -> None:

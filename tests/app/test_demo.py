@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from built_once import built_once
-from places import EMPS, ROOT
+from places import ROOT
 from rich.console import Console
 
 from benchmarks.pictures import RECORD, demonstrated
@@ -21,14 +21,11 @@ from hybridsep.app import console, start
 from hybridsep.base.metrics import shown_figure
 from hybridsep.demo import cases
 from hybridsep.demo.cases import COMPENSATED, demo, demo_files
-from hybridsep.fmi.archive import default_flavour
 from hybridsep.plants.trajectory import spiral
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")
 PNG = b"\x89PNG\r\n\x1a\n"
 CASES = ("staircase", "spiral_x", "spiral_y")
-FLAVOUR = default_flavour()
-"""As on the page of figures; the Python flavour takes ten times as long and comes to the same figures."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +38,12 @@ class Demonstration:
         return [self.summary[case]["compensation"][kind][figure] for kind in COMPENSATED]
 
 
-def shown_once(folder: Path, *, full: bool, emps: Path | None) -> Demonstration:
+def shown_once(folder: Path, *, full: bool) -> Demonstration:
     """Run the demonstration once a session for all workers."""
 
     def run(out: Path) -> None:
         fractions: list[float] = []
-        demo(out / "demo", full=full, flavour=FLAVOUR, emps=emps, progress=lambda _, done: fractions.append(done))
+        demo(out / "demo", full=full, progress=lambda _, done: fractions.append(done))
         (out / "fractions.json").write_text(json.dumps(fractions), encoding="utf-8")
 
     out = built_once(folder, run)
@@ -56,19 +53,19 @@ def shown_once(folder: Path, *, full: bool, emps: Path | None) -> Demonstration:
 
 @pytest.fixture(scope="session")
 def shown(session_folder: Path) -> Demonstration:
-    return shown_once(session_folder / "demo", full=False, emps=EMPS if EMPS.exists() else None)
+    return shown_once(session_folder / "demo", full=False)
 
 
 @pytest.fixture(scope="session")
 def full(session_folder: Path) -> Demonstration:
-    return shown_once(session_folder / "full demo", full=True, emps=None)
+    return shown_once(session_folder / "full demo", full=True)
 
 
-def check_files(shown: Demonstration, figures: list[str], *, full: bool, emps: bool) -> None:
+def check_files(shown: Demonstration, figures: list[str], *, full: bool) -> None:
     for name in figures:
         assert (shown.out / f"{name}.png").read_bytes().startswith(PNG)
     written = {path for path in shown.out.rglob("*") if path.is_file()}
-    assert written == set(demo_files(shown.out, FLAVOUR, full=full, emps=emps))
+    assert written == set(demo_files(shown.out, full=full))
     assert shown.fractions == sorted(shown.fractions)
     assert shown.fractions[-1] == 1.0
     assert len(set(shown.fractions)) == len(shown.fractions)
@@ -83,10 +80,10 @@ def check_case(case: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
-    assert list(shown.summary) == ["staircase", *(["emps"] if EMPS.exists() else [])]
+    assert list(shown.summary) == ["staircase"]
     for case in shown.summary.values():
         check_case(case)
-    check_files(shown, ["staircase", "staircase_compensated"], full=False, emps=EMPS.exists())
+    check_files(shown, ["staircase", "staircase_compensated"], full=False)
     assert (shown.out / "staircase_compensated.csv").read_text().startswith("t,x_d,x_dm,")
     assert len(list((shown.out / "fmus").glob("*.fmu"))) == 3
 
@@ -134,18 +131,11 @@ def test_the_pictures_of_the_pages_show_these_figures(shown: Demonstration) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
-def test_demo_with_the_recorded_axis(shown: Demonstration) -> None:
-    assert shown.summary["emps"]["rms_h_um"] <= 5.55
-    assert (shown.out / "emps.png").read_bytes().startswith(PNG)
-
-
-@pytest.mark.slow
 def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first half second; all of it at night."""
     monkeypatch.setattr(cases, "spiral", lambda: [axis[:500] for axis in spiral()])
     said: list[str] = []
-    summary = cases.spiral_case(tmp_path, FLAVOUR, said.append)
+    summary = cases.spiral_case(tmp_path, said.append)
     assert list(summary) == ["spiral_x", "spiral_y"]
     assert len(said) == len(set(said)) == 2 * (1 + 2 + 1 + len(COMPENSATED))
     for case in summary.values():
@@ -155,7 +145,7 @@ def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.Mo
     assert contours[0] == contours[1]
     assert contours[0][1] < contours[0][0]
     written = {path for path in tmp_path.rglob("*") if path.is_file()}
-    assert written <= set(demo_files(tmp_path, FLAVOUR, full=True))
+    assert written <= set(demo_files(tmp_path, full=True))
     drawn = {path.stem for path in written if path.suffix == ".png"}
     assert drawn == {
         "spiral",
@@ -170,7 +160,7 @@ def test_a_full_demo_writes_all_it_promises(full: Demonstration) -> None:
     for case in full.summary.values():
         check_case(case)
     figures = [*CASES, "spiral", "spiral_contour", *(f"{case}_compensated" for case in CASES)]
-    check_files(full, figures, full=True, emps=False)
+    check_files(full, figures, full=True)
     assert len(list((full.out / "fmus").glob("*.fmu"))) == 9
     assert len(list((full.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
 

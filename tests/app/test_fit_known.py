@@ -13,7 +13,6 @@ from identification_cases import T_S, measured
 from hybridsep import PAPER_LIMITS, HybridPredictor, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import read_description
-from hybridsep.identify.output_error import in_time
 from hybridsep.identify.periodic import residual_period
 
 AXIS = ModalModel([Mode(35.0, 0.4, (70 * np.pi) ** 2)])
@@ -103,17 +102,3 @@ def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
         assert one == pytest.approx(other, rel=0.01)
     # Judged with what arrives: the last residuals of a window are not known yet.
     assert results[LATE]["judged"]["rms_h"] < 2 * results[0]["judged"]["rms_h"]
-
-
-@pytest.mark.slow
-def test_identify_takes_a_late_encoder(hybridsep: Run, tmp_path: Path) -> None:
-    x_d = long_moves(3, n=4)
-    x = screw(x_d, 0.0)
-    late = np.concatenate((np.full(LATE, x[0]), x[:-LATE]))
-    log, out = write_rows(tmp_path / "axis.csv", x_d, late), tmp_path / "axis.toml"
-    status, said, err = hybridsep("identify", log, "--measurement_delay", LATE, "--out", out, "--json")
-    assert status == 0, err
-    machine = load_machine(out)
-    assert machine.predictor_settings.measurement_delay == LATE
-    assert machine.model.dead_time == json.loads(said)["dead_time"] == 0
-    np.testing.assert_array_equal(in_time(x_d, late, LATE)[1], x[: len(x) - LATE])

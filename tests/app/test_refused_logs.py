@@ -10,7 +10,6 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 MACHINE = ("--machine", "spring_mass_damper")
-AVERAGING = ("--averaging", "true")
 
 
 @pytest.fixture
@@ -22,10 +21,8 @@ def without_measurement(tmp_path: Path) -> Path:
     "command",
     [
         ("fit", "--out", "deep/new"),
-        ("identify", "--out", "new/machine.toml"),
-        ("backtest", *MACHINE, *AVERAGING, "--out", "new/batches.csv"),
-        ("tune", *MACHINE, *AVERAGING, "--p", "10", "--Np", "50", "--out", "new/tuned.toml"),
-        ("report", *MACHINE, *AVERAGING, "--out", "new/page.html"),
+        ("backtest", *MACHINE, "--out", "new/batches.csv", "--report", "new/page.html"),
+        ("tune", *MACHINE, "--try", "p=10", "--out", "new/tuned.toml"),
     ],
     ids=lambda command: command[0],
 )

@@ -59,7 +59,7 @@ def test_a_machine_file_that_fit_wrote_is_named(
     assert "It is the axis's machine file, which hybridsep fit axis.csv writes" in " ".join(err.split())
     Path("axis").mkdir()
     Path("axis/machine.toml").touch()
-    for command in ("backtest", "report"):
+    for command in ("backtest", "tune"):
         status, _, err = hybridsep(command, "axis.csv")
         assert status == 2
         assert "There is axis/machine.toml: add -m axis/machine.toml" in " ".join(err.split())

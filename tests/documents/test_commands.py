@@ -25,8 +25,6 @@ PAGES = [
 RUN = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np 100 --v_max ")
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
-BY_NIGHT = ("hybridsep identify recordings/log.csv",)
-"""Begin of lines that run at night: ``test_identify_command`` has identify read a log."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 3001
@@ -65,14 +63,13 @@ def test_the_pages_run_from_first_to_last(
     without_other_windows(monkeypatch)
     if not whole:
         monkeypatch.setattr("hybridsep.staircase", lambda: staircase()[:MOVES])
-    elsewhere = ELSEWHERE if whole else (*ELSEWHERE, *BY_NIGHT)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     done: set[str] = set()
     for page in PAGES:
         for language, text in RUN.findall(page.read_text(encoding="utf-8")):
             for piece in [text] if language == "python" else text.splitlines():
-                if piece in done or piece.startswith(elsewhere):
+                if piece in done or piece.startswith(ELSEWHERE):
                     continue
                 done.add(piece)
                 if language == "python":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run, write_rows
+from command_line import Run, predictor, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine
@@ -38,7 +38,7 @@ def test_losses_are_those_of_a_replay_without_its_first_window() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", [0, FIRST])
-def test_both_figures_are_said(hybridsep: Run, tmp_path: Path, first: int) -> None:
+def test_both_figures_are_said(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, first: int) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[first:2000], measured(0)[first:2000])
     machine = ("--machine", "spring_mass_damper")
     status, out, err = hybridsep("backtest", log, *machine, "--json")
@@ -52,7 +52,8 @@ def test_both_figures_are_said(hybridsep: Run, tmp_path: Path, first: int) -> No
     )
     if first:
         assert figures["without_first_window"]["rms_pb_um"] < 0.7 * figures["rms_pb_um"]
-    few = ("--p", "10", "--q", "1", "--lambda", "1e-10", "--Np", NP, "--jobs", "1")
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    few = (*predictor(Np=NP), "--try", "p=10", "--try", "q=1", "--try", "forgetting=0")
     status, _, err = hybridsep("tune", log, *machine, *few)
     assert status == 0, err
     assert ("axis.csv: begins in motion, and is ranked without its first window" in err) == (first > 0)

@@ -1,4 +1,4 @@
-"""Tuning on several logs: ranking, choice, windows, processes."""
+"""Tuning on several logs: ranking, choice, processes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from predictor_cases import MODEL, small_signals
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.fitting.tuning import Logs, Tuning, over_windows, replayed_losses, tune
+from hybridsep.fitting.tuning import Logs, Tuning, replayed_losses, tune
 
 PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, averaging=False, t_init=0.0)
 CANDIDATES = [PAPER, *(replace(PAPER, p=p, lam=lam) for p in (1, 20) for lam in (1e-10, 1e-6))]
@@ -56,20 +56,6 @@ def test_a_log_that_hold_predicts_exactly_decides_alone() -> None:
     found = of([[0.0, 1.0], [1e-9, 0.5]], [0.0, 1.0])
     assert found.ratio.tolist() == [1.0, math.inf]
     assert of([[0.0, 1.0], [0.5, 0.5]], [1.0, 1.0]).ratio.tolist() == [0.0, 0.5]
-
-
-def test_the_error_over_windows_is_that_of_as_many_lags_as_fit() -> None:
-    done: list[float] = []
-    found = over_windows(MODEL, LOGS, replace(PAPER, p=15, q=6), progress=done.append)
-    assert list(found) == [4, 10, 20, 40]
-    for Np, tuning in found.items():
-        fitting = replace(PAPER, Np=Np, p=min(15, Np), q=min(6, Np - 1))
-        assert tuning.candidates == (fitting,)
-        expected = [replayed_losses(MODEL, pieces, fitting)[2] for pieces in LOGS.values()]
-        np.testing.assert_allclose(tuning.rms_h[0], expected, rtol=1e-9)
-    assert done == sorted(done)
-    short: Logs = {**LOGS, "short": [small_signals(30)]}
-    assert list(over_windows(MODEL, short, PAPER)) == [4, 10, 20]
 
 
 @pytest.mark.slow

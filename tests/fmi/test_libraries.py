@@ -107,8 +107,8 @@ def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path
     """As ``fit`` prints it; run for this machine alone."""
     machine = tmp_path / "axis.toml"
     hybridsep("init", machine)
-    fmu = build_here(load_machine(machine), "HybridPredictor", tmp_path, "native", fmi="3")
-    says, _, line = other_platforms(fmu, machine, fmi="3").partition("; for all platforms: ")
+    fmu = build_here(load_machine(machine), "HybridPredictor", tmp_path, "native")
+    says, _, line = other_platforms(fmu, machine).partition("; for all platforms: ")
     program, *arguments = shlex.split(line)
     assert (says, program) == (f"native FMUs are for {host_target()}", "hybridsep")
     first = fmu.read_bytes()
@@ -120,7 +120,7 @@ def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path
 def test_nothing_is_said_of_platforms_where_all_are_there(without: Path) -> None:
     fmu, machine, weights = Path("axis/HybridPredictor.fmu"), Path("axis/machine.toml"), Path("axis/trained.state")
     line = f"build HybridPredictor --target all -m {machine} --weights {weights} --out axis"
-    assert other_platforms(fmu, machine, weights, "both").endswith(line)
+    assert other_platforms(fmu, machine, weights).endswith(line)
     fill(without / "shipped", ALL)
     assert other_platforms(fmu, machine, weights) == ""
 

@@ -37,11 +37,16 @@ class Run:
         return status, out, err
 
 
+def predictor(**values: object) -> list[str]:
+    """Return the options that set entries of ``[predictor]``; a name ends in ``_`` where it is a word of Python's."""
+    return [word for name, one in values.items() for word in ("--set", f"predictor.{name.rstrip('_')}={one}")]
+
+
 def run_line(text: str, hybridsep: Run) -> None:
     """Run a line as a shell would."""
     program, *arguments = shlex.split(text)
     if program == "hybridsep":
-        status, _, err = hybridsep(*arguments, *(["--jobs", "1"] if arguments[0] == "tune" else []))
+        status, _, err = hybridsep(*arguments)
         assert status == 0, f"{text}: {err}"
     else:
         assert program == "python", text

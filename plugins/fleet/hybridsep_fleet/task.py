@@ -17,11 +17,10 @@ from hybridsep.base.errors import MachineError, brief
 from hybridsep.base.files import plain
 from hybridsep.base.metrics import rms_ratio
 from hybridsep.base.threads import one_blas_thread
-from hybridsep.evaluate.report import Report
-from hybridsep.fitting.advice import Judged, extent, recommendation
+from hybridsep.fitting.advice import Judged, recommendation
 from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording, Replay, replay
-from hybridsep.fitting.report import write_errors, write_findings
+from hybridsep.fitting.report import begun_report, write_findings
 from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
 from hybridsep.machines.machine import Machine, check_interval, check_unit, load_machine, machine_name
@@ -100,9 +99,8 @@ def _replayed(task: AxisTask, path: Path) -> _Judged:
     judged = Judged(replay(predictor, recordings).with_peers(), log.T_s, log.shown, "the log")
     folder = _folder(task)
     if task.settings.reports:
-        report = Report(f"{machine.title}: {path.name}", extent([log]))
-        report.paragraph(recommendation(judged), "verdict")
-        write_errors(report, judged, "Errors of the replay", "The predictor began without any knowledge.")
+        words = "The predictor began without any knowledge."
+        report = begun_report(f"{machine.title}: {path.name}", [log], judged, "Errors of the replay", words)
         write_findings(report, [log], findings)
         report.write(folder / "report.html")
     return _Judged(judged, machine, findings, (), _below(task, folder))
