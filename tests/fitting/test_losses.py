@@ -42,12 +42,18 @@ def one_by_one(pieces: Sequence[Piece], candidate: PredictorSettings) -> Array:
     return np.asarray(np.sqrt(np.nanmean(np.concatenate(errors, axis=1) ** 2, axis=1)))
 
 
+GAPS = cut(333, start=-2.0, ends=(101, 240))
+
+
 @pytest.mark.parametrize(
-    "pieces",
-    [cut(613), cut(600, start=0.3), cut(613, start=-2.0, ends=(101, 340)), cut(45, ends=(20,)), cut(7)],
-    ids=["a short last window", "start offset", "gaps", "few windows", "less than a window"],
+    ("pieces", "change"),
+    [
+        (cut(313), {}),  # a short last window
+        (cut(45, ends=(20,)), {}),
+        (cut(7), {}),
+        *((GAPS, change) for change in ({}, {"t_init": 0.05}, {"averaging": True}, {"p": 20, "q": 19})),
+    ],
 )
-@pytest.mark.parametrize("change", [{}, {"t_init": 0.05}, {"averaging": True}, {"p": 20, "q": 19}])
 def test_losses_are_those_of_backtests(pieces: list[Piece], change: dict[str, Any]) -> None:
     candidate, done = replace(PAPER, **change), list[float]()
     found = replayed_losses(MODEL, pieces, candidate, done.append)
