@@ -241,19 +241,6 @@ def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
 
 
 @pytest.mark.slow
-def test_a_restored_compensator_goes_on() -> None:
-    sep, x_d = SepCompensator.from_bytes(learned()), moves()
-    plan = sep.plan(x_d[:200])
-    restored = SepCompensator.from_bytes(sep.to_bytes())
-    for one in (sep, restored):
-        one.update(plan.x_h)
-    again = [one.plan(x_d[50:250]) for one in (sep, restored)]
-    assert again[0].state is SepState.HYBRID
-    assert np.abs(again[0].x_dm - again[0].x_d).max() > 1e-6
-    np.testing.assert_array_equal(again[0].x_dm, again[1].x_dm)
-
-
-@pytest.mark.slow
 def test_positions_in_another_unit_are_commanded_the_same() -> None:
     def commands(unit: float) -> Array:
         limits = Limits(*(unit * limit for limit in (0.1, 16.0, 5000.0)))

@@ -154,14 +154,6 @@ def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
     assert beyond(x_dm, DRIVE_LIMITS) <= 1.0
 
 
-def test_the_command_is_continuous_where_the_model_changes() -> None:
-    sep = compensator(limits=None)
-    loop = cosimulate(sep, plant(), commanded()[:1500], encoder=Encoder(5e-6, 1))
-    switch = int(np.flatnonzero(np.diff(loop.state) != 0)[0]) + 1
-    third = np.abs(np.diff(loop.x_dm, 3))
-    assert np.max(third[switch - 4 : switch + 4]) < np.max(third)
-
-
 def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     sep = compensator(Np=50, p=10, t_init=0.0)
     ahead = np.zeros(2000)

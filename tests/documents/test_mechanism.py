@@ -9,7 +9,6 @@ import pytest
 from mechanism import (
     Drive,
     coulomb,
-    lifted,
     linear_mode,
     quadratic,
     response,
@@ -63,23 +62,6 @@ def test_response_is_eqs_8_to_10(disturbance: object) -> None:
     np.testing.assert_allclose(e_pb, run.e_pb, rtol=0, atol=1e-11 * size)
     for k in (0, 1, 2, 3, 400):
         assert response(drive, X_D, run.h, k) == pytest.approx(run.x[k], rel=0, abs=1e-15)
-
-
-def test_the_papers_example_written_out() -> None:
-    """Eqs. (7) to (10) for three samples, with ``Γ x_d²`` as printed."""
-    A, B, C, gamma = DRIVE.A, DRIVE.B, DRIVE.C, SQUARING.Gamma
-    x_d = np.array([3e-3, -1e-3, 2e-3, 5e-3])
-    run = simulate(SQUARING, x_d, squared_command)
-    np.testing.assert_array_equal(run.h, x_d**2)
-    x_pb = [C @ B * x_d[0], C @ A @ B * x_d[0] + C @ B * x_d[1]]
-    x_pb.append(C @ A @ A @ B * x_d[0] + C @ A @ B * x_d[1] + C @ B * x_d[2])
-    e_pb = [C @ gamma * x_d[0] ** 2, C @ A @ gamma * x_d[0] ** 2 + C @ gamma * x_d[1] ** 2]
-    e_pb.append(C @ A @ A @ gamma * x_d[0] ** 2 + C @ A @ gamma * x_d[1] ** 2 + C @ gamma * x_d[2] ** 2)
-    np.testing.assert_allclose(run.x_pb[1:], x_pb, rtol=1e-12)
-    np.testing.assert_allclose(run.x[1:], np.add(x_pb, e_pb), rtol=1e-12)
-    np.testing.assert_allclose(run.e_pb[1:], e_pb, rtol=1e-9)
-    np.testing.assert_allclose(lifted(A, gamma, C, 3)[2], [C @ A @ A @ gamma, C @ A @ gamma, C @ gamma], rtol=1e-12)
-    assert np.all(np.triu(lifted(A, gamma, C, 3), 1) == 0.0)
 
 
 def test_demonstration() -> None:

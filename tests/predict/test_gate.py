@@ -120,23 +120,6 @@ def test_an_axis_that_stands_is_believed() -> None:
     assert believed(x, x_pb).all()
 
 
-def ringing(frequency: float) -> Array:
-    """Return measured positions, m: from rest a drive rings, of which the model knows nothing."""
-    n = 20 * NP
-    x = 1e-4 * np.sin(2.0 * np.pi * frequency * 1e-3 * np.arange(n)) * (np.arange(n) >= 5 * NP)
-    return np.asarray(x + np.random.default_rng(2).normal(0.0, 2e-7, n))
-
-
-def test_what_rings_is_learned() -> None:
-    x = ringing(20.0)
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0))
-    errors = []
-    for i in range(0, len(x), NP):
-        errors.append(x[i : i + NP] - predictor.predict(np.zeros(NP)).x_h)
-        predictor.update(x[i : i + NP])
-    assert rms(np.concatenate(errors[10:])) < 0.1 * rms(x[10 * NP :])
-
-
 def test_missing_samples_are_counted_and_bridged() -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     x_d = staircase()[:2000]

@@ -132,14 +132,6 @@ def test_the_last_accepted_residual_of_the_paper_s_model_is_what_was_measured_la
     assert predictor.residual.last == pytest.approx(x[56] - predicted.x_pb[6], abs=1e-15)
 
 
-def test_memory_does_not_grow() -> None:
-    predictor = trained(50)
-    size = len(predictor.to_bytes())
-    x_d, x = small_signals(950)
-    replay(predictor, x_d, x)
-    assert len(predictor.to_bytes()) - size <= 8  # only the digits of the counters
-
-
 @pytest.mark.parametrize(
     ("use", "message"),
     [

@@ -15,7 +15,6 @@ from averaged_cases import averaged, averaged_model, cycles, friction, physics, 
 from hybridsep.base.errors import StateError
 from hybridsep.base.signals import Array
 from hybridsep.base.state import pack, unpack
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 WAYS: dict[str, Callable[[HybridPredictor], HybridPredictor]] = {
@@ -85,17 +84,6 @@ def test_before_anything_is_learned(samples: int) -> None:
     predictor.predict(np.linspace(0.0, 1e-3, 100))
     twin = HybridPredictor.from_bytes(predictor.to_bytes())
     assert twin.to_bytes() == predictor.to_bytes()
-
-
-@pytest.mark.slow
-def test_with_dead_time_first_order_hold_and_a_restart() -> None:
-    x_d, x = signals()
-    model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 4)
-    predictor = HybridPredictor(model, averaged(input_hold="foh", Np=20, p=20).settings)
-    run(predictor, x_d[:300], x[:300], 20)
-    predictor.restart(0.1)
-    twin = HybridPredictor.from_bytes(predictor.to_bytes())
-    np.testing.assert_array_equal(run(twin, x_d, x, 20), run(predictor, x_d, x, 20))
 
 
 def test_memory_does_not_grow() -> None:

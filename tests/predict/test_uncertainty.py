@@ -13,9 +13,6 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import PREDICTION_MAX, Array
 from hybridsep.base.state import numbers_of, unsound, with_numbers
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.machines.machine import load_machine
-from hybridsep.plants.plant import Encoder, simulate
-from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.uncertainty import N_COMPONENTS, PredictedError, Uncertainty, first_variance
 
@@ -161,22 +158,6 @@ def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:
     """Return the share of measurements within the intervals of :data:`LEVELS`."""
     result = backtest(predictor, x_d, x)
     return [coverage(x - result.x_h, result.x_h_std, level) for level in LEVELS]
-
-
-@pytest.mark.slow
-def test_a_warm_run_over_the_staircase_covers_at_each_third_of_the_window() -> None:
-    machine = load_machine("spring_mass_damper")
-    x_d = staircase()
-    x = simulate(machine.new_plant(), x_d, machine.T_s)
-    predictor = machine.new_predictor(PredictorSettings(t_init=-1.0))
-    backtest(predictor, x_d, Encoder(5e-6, 0).measure_all(x))
-    predictor.restart()
-    measured = Encoder(5e-6, 1000).measure_all(x)
-    result = backtest(predictor, x_d, measured)
-    third = np.arange(len(x_d)) % 100 * 3 // 100
-    for part in (third >= 0, *(third == i for i in range(3))):
-        shares = [coverage((measured - result.x_h)[part], result.x_h_std[part], level) for level in LEVELS]
-        np.testing.assert_allclose(shares, LEVELS, atol=0.05)
 
 
 @pytest.mark.parametrize(("averaging", "atol"), [(True, 0.04), (False, 0.07)])
