@@ -157,8 +157,9 @@ def fmu_variables() -> str:
         "`spring_mass_damper`; start values "
         "follow from the machine file that an FMU is built from, and there are as many `mode[i].*` as modes. "
         "[How they are wired](../howto/run-fmus.md), [when inputs are read](../explanation/timing.md).",
-        "Parameters are fixed, set before the initialization has ended, but for two of SepCompensator that are "
-        "tunable: `compensate` and `change_max` [may change in a run](../howto/close-the-loop.md#in-a-run).",
+        "Parameters are fixed, set before the initialization has ended, but for three of SepCompensator that are "
+        "tunable: `compensate`, `change_max` and `following_error_max` "
+        "[may change in a run](../howto/close-the-loop.md#in-a-run).",
     ]
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]

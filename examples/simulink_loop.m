@@ -19,8 +19,8 @@ ports.ReferenceTrajectory.inputs = {};
 ports.ReferenceTrajectory.outputs = {'r'};
 ports.HybridPredictor.inputs = {'x_d_ahead', 'x_meas'};
 ports.HybridPredictor.outputs = {'x_d', 'x_pb', 'x_h', 'x_h_std', 'e_servo', 'hybrid_active', 'rms_pb', 'rms_h', 'rms_hold', 'batch', 'n_rejected'};
-ports.SepCompensator.inputs = {'x_d_ahead', 'x_meas'};
-ports.SepCompensator.outputs = {'x_dm', 'x_d', 'x_pb', 'x_h', 'x_h_std', 'e_servo', 'sep_state', 'rms_e', 'rms_pb', 'rms_h', 'rms_hold', 'batch', 'n_rejected', 'no_measurement'};
+ports.SepCompensator.inputs = {'x_d_ahead', 'x_meas', 'reset'};
+ports.SepCompensator.outputs = {'x_dm', 'x_d', 'x_pb', 'x_h', 'x_h_std', 'e_servo', 'sep_state', 'rms_e', 'rms_pb', 'rms_h', 'rms_hold', 'batch', 'n_rejected', 'no_measurement', 'alarm'};
 ports.FeedDrive.inputs = {'x_d'};
 ports.FeedDrive.outputs = {'x', 'v', 'x_meas'};
 

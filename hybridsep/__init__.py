@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .base.errors import HybridSepError
     from .base.settings import CompensatorSettings, Limits, PredictorSettings
     from .compensate.compensator import SepCompensator
-    from .compensate.planning import SepState
     from .cosim.adapters import Compensator
     from .cosim.fmu import FmuInstance
     from .cosim.loop import cosimulate
@@ -86,7 +85,7 @@ _MODULES = {
     "PredictorSettings": "base.settings",
     "Run": "cosim.run",
     "SepCompensator": "compensate.compensator",
-    "SepState": "compensate.planning",
+    "SepState": "online.look_ahead",
     "backtest": "evaluate.backtest",
     "build_fmu": "fmi.archive",
     "cosimulate": "cosim.loop",

@@ -24,6 +24,7 @@
  *                            | at a window's end a plan, m^3 / 6, and a bounded share|
  *                            | of its solution in each of the samples that follow    |
  *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
+ *   hsep_compensator_reset   | constant                                              | nothing
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
  * Costs are multiply-adds; n: features, p + q, with averaging p and a few more, 74 at least; s: 38 of them at most,
@@ -130,8 +131,9 @@ HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i);
  */
 typedef struct hsep_compensator hsep_compensator;
 
-/* Model that plans the commands of a window; as the setting compensate: the best model allowed. */
-typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
+/* Model that plans the commands of a window, or tripped: none does, until a reset. As the setting compensate: the best
+ * model allowed. */
+typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2, HSEP_SEP_TRIPPED = 3 } hsep_sep_state;
 
 typedef struct {
     hsep_predictor_outputs
@@ -139,6 +141,7 @@ typedef struct {
     hsep_real x_dm;       /* m, now */
     hsep_sep_state state; /* of the plan that x_dm follows now */
     int no_measurement;   /* whether the change fades, as none came for measurement_timeout */
+    int alarm;            /* whether it has tripped */
 } hsep_compensator_outputs;
 
 /* Bytes of the block; 0 as the predictor's, and if spacing does not divide Np, preview < Np + 4 spacing + 3, or a
@@ -156,11 +159,18 @@ HSEP_API hsep_began hsep_compensator_init(
 /* As hsep_predictor_valid. */
 HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
 
-/* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
+/* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0;
+ * following_error_max, m, from the next sample on, 0: none.
  * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
  * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. Return
  * whether they were taken: not, with nothing changed, where one is out of its range. */
-HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max);
+HSEP_API int hsep_compensator_change(
+    hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max);
+
+/* End a trip where the level of the reset rises. It trips where x_meas is farther from the command as it came than
+ * following_error_max for three samples in a row: from the next window on the change fades, as with compensate off; what
+ * was learned stays. */
+HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas);

@@ -35,15 +35,12 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         return SepCompensator(self.new_predictor(model), settings)
 
     def retune(self) -> None:
-        """Take over ``compensate`` and ``change_max``."""
+        """Take over the tunable parameters and the level of ``reset``."""
         compensator = self.look_ahead.planner
         assert isinstance(compensator, SepCompensator)
-        now = compensator.compensate, compensator.settings.change_max
-        if now != (self.values["compensate"], self.values["change_max"]):
-            given = CompensatorSettings.from_fmi(self.values)
-            compensator.change(compensate=given.compensate, change_max=given.change_max)
+        compensator.retune(self.values)
 
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:
     value = getattr(look_ahead, name)
-    return int(value) if name in ("sep_state", "batch", "n_rejected", "no_measurement") else float(value)
+    return int(value) if name in ("sep_state", "batch", "n_rejected", "no_measurement", "alarm") else float(value)

@@ -28,6 +28,7 @@ _MORE = """
 # acceleration = 10.0           # m/s2
 # jerk = 1000.0                 # m/s3
 # change_max = 1e-3             # m, about twice the servo error
+# following_error_max = 6.5e-4  # m, about 1.3 times the largest: above it the compensator trips
 
 # How the logs of the axis are read, where their columns do not say it.
 # [log]

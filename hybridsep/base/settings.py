@@ -332,6 +332,9 @@ class CompensatorSettings(Settings):
     change_max : float, optional
         Bound on the magnitude of the change, m; none if None. About twice the servo error without compensation: hybrid
         plans that ask for far more end for the run (:func:`~hybridsep.compensate.newton.runs_away`).
+    following_error_max : float
+        Measured following error above which, for three samples in a row, the compensator trips, m; 0: none. About 1.3
+        times the largest one without compensation (:class:`~hybridsep.online.monitor.Monitor`).
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of the velocity of ``x_d``: where it turns, friction changes its
         sign. It has no effect without ``limits``. Plans of a model with ``averaging`` follow the friction and may turn.
@@ -342,7 +345,7 @@ class CompensatorSettings(Settings):
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
-    ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max")
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max", "following_error_max")
 
     preview: int | None = whole(
         *(200, 8, 2000, "samples of the command that are planned ahead, at least Np + 4·spacing + 3"), unless_given=None
@@ -357,6 +360,13 @@ class CompensatorSettings(Settings):
     limits: Limits | None = None
     change_max: float | None = real(
         1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm", tunable=True
+    )
+    following_error_max: float = real(
+        *(0.0, 0.0, 10.0, "m"),
+        "following error above which, for three samples in a row, the command's change fades until reset; 0: none",
+        display_unit="mm",
+        nonzero=1e-12,
+        tunable=True,
     )
     no_reversal: bool = flag(True, "whether the modified command never turns while the commanded position moves")
     compensate: str = choice(
@@ -479,7 +489,10 @@ PARAMETERS: Mapping[str, Parameter] = {
 }
 """All parameters by their names in FMUs."""
 
-DRIVE_LIMIT_ENTRIES = {**Limits.parameters(), "change_max": PARAMETERS["change_max"]}
+DRIVE_LIMIT_ENTRIES = {
+    **Limits.parameters(),
+    **{name: PARAMETERS[name] for name in ("change_max", "following_error_max")},
+}
 """Parameters of the section ``[drive_limits]`` of a machine file, by their entries."""
 
 

@@ -13,7 +13,7 @@ from that remainder: there is always a feasible plan, and where no other can be 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,14 +22,15 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
-from ..base.signals import Array, as_measured, as_published, as_samples
-from ..base.state import Saved, pack, unpack
+from ..base.signals import as_measured, as_published, as_samples
+from ..base.state import Saved, arrays_of, pack, restored, unpack
 from ..base.threads import one_blas_thread
-from ..online.look_ahead import LookAhead, PublishedWindow
+from ..online.look_ahead import LookAhead, PublishedWindow, SepState
+from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview, SepState
+from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis, direct_samples
 
@@ -48,6 +49,8 @@ class SepCompensator:
 
     Sample by sample, call :meth:`step`. Or for each window, call :meth:`plan` with the commanded positions ahead, send
     its ``x_dm`` to the drive, then call :meth:`update` with the measured positions.
+
+    Where its :attr:`monitor` has tripped, or lost the measurement, no model plans, and the change of the command fades.
 
     Parameters
     ----------
@@ -100,11 +103,13 @@ class SepCompensator:
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
         self._hybrid_ended = False
-        self._missing = 0  # measurements one after another
-        # Coefficients of the remainder of the last plan; last three values of δ and of x_d
+        self.monitor = Monitor(
+            samples_before(self.settings.measurement_timeout, self.T_s), self.settings.following_error_max
+        )
+        # Coefficients of the remainder of the last plan; last values of δ and of x_d
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
-        self._x_d_before = np.full(3, np.nan)
+        self._x_d_before = np.full(max(3, predictor.settings.n_late), np.nan)
         self._pending: PendingPlan | None = None
 
     @property
@@ -117,12 +122,14 @@ class SepCompensator:
 
         Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at ``x_d``. With
         ``compensate="off"`` the command follows that remainder, so its change fades within the preview. Where the
-        remainder is larger than a new ``change_max``, it is the bound.
+        remainder is larger than a new ``change_max``, it is the bound. ``following_error_max`` counts from the next
+        sample on; 0 ends no trip.
 
         Parameters
         ----------
         **settings
-            ``compensate`` or ``change_max``, as in :class:`~hybridsep.base.settings.CompensatorSettings`.
+            ``compensate``, ``change_max`` or ``following_error_max``, as in
+            :class:`~hybridsep.base.settings.CompensatorSettings`.
 
         Raises
         ------
@@ -131,11 +138,20 @@ class SepCompensator:
         """
         fixed = [name for name in settings if name not in _TUNABLE]
         if fixed:
-            raise ParameterError(f"{', '.join(fixed)} cannot change in a run, {' and '.join(_TUNABLE)} can")
+            raise ParameterError(f"{', '.join(fixed)} cannot change in a run, {', '.join(_TUNABLE)} can")
         changed = replace(self.settings, **settings)
         if changed != self.settings:
             self.settings = changed
+            self.monitor.error_max = changed.following_error_max
             self._planning.adopt(self._bounds(changed), changed)
+
+    def retune(self, values: Mapping[str, Any]) -> None:
+        """Take over an FMU's tunable parameters and the level of its ``reset``, by the names of its variables."""
+        self.monitor.take_reset(bool(values["reset"]))
+        tunable = [self.settings.parameters()[name] for name in _TUNABLE]
+        given = {one.name: one.from_fmi(values[one.name]) for one in tunable}
+        if any(getattr(self.settings, name) != value for name, value in given.items()):
+            self.change(**given)
 
     @property
     def T_s(self) -> float:
@@ -199,8 +215,9 @@ class SepCompensator:
             predictor.rest_at(float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        preview = Preview(command, self._x_d_before, self._delta_before, self._previous_plan)
-        compensate = SepState.OFF if self.is_lost(np.empty(0)) else self.compensate
+        preview = Preview(command, self._x_d_before[-3:], self._delta_before, self._previous_plan)
+        fades = self.monitor.is_tripped or self.monitor.is_lost
+        compensate = SepState.OFF if fades else self.compensate
         most = min(compensate, SepState.PHYSICS) if self._hybrid_ended else compensate
         chosen = self._planning.choose(predictor, preview, most)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
@@ -236,31 +253,18 @@ class SepCompensator:
         predictor, Np = self.predictor, self.predictor.Np
         measured = as_measured(x, "x", Np)
         predictor.update(measured, learn=predictor.k >= self.lead_in)
-        self._missing = self._missing_after(measured)
+        x_d = np.concatenate((self._x_d_before, pending.x_d))
+        first = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
+        for error in (measured - x_d[first : first + Np])[self.monitor.n_taken :].tolist():
+            self.monitor.take_in(error)
+        self.monitor.n_taken = 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
-        self._delta_before, self._x_d_before = (
-            _last_three(self._delta_before, pending.delta),
-            _last_three(self._x_d_before, pending.x_d),
-        )
+        self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
+        self._x_d_before = x_d[-len(self._x_d_before) :]
         self._state_before = pending.state
         self._hybrid_ended |= pending.ends_hybrid
         self._pending = None
-
-    def is_lost(self, x: Array) -> bool:
-        """Return whether no measurement came for ``measurement_timeout``: the change of the command fades then.
-
-        Parameters
-        ----------
-        x : (n,) array, m
-            Positions measured since the last :meth:`update`, NaN where missing.
-        """
-        return 0 < samples_before(self.settings.measurement_timeout, self.T_s) <= self._missing_after(x)
-
-    def _missing_after(self, x: Array) -> int:
-        """Return the number of measurements that are missing one after another at the end of ``x``, ``(n,)``, m."""
-        came = np.flatnonzero(~np.isnan(x))
-        return len(x) - 1 - int(came[-1]) if len(came) else self._missing + len(x)
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
         return DriveBounds(
@@ -280,13 +284,13 @@ class SepCompensator:
             "lead_in": self.lead_in,
             "state_before": int(self._state_before),
             "hybrid_ended": self._hybrid_ended,
-            "missing": self._missing,
             "pending": pending and [int(pending.state), int(pending.ends_hybrid), pending.prediction.n_warm_up],
         }
         arrays = {
             "previous_plan": self._previous_plan,
             "delta_before": self._delta_before,
             "x_d_before": self._x_d_before,
+            **arrays_of(self.monitor),
         }
         if pending is not None:
             arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
@@ -304,27 +308,27 @@ class SepCompensator:
         """
         saved = Saved(_KIND, *unpack(_KIND, blob))
         predictor = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
-        restored = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
+        kept = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
         with saved.consistent():
             compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
-        compensator.predictor = restored  # the constructor has restarted the other one
+        compensator.predictor = kept  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
-        compensator._state_before = SepState(saved.whole("state_before", max(SepState)))
+        compensator._state_before = SepState(saved.whole("state_before", SepState.HYBRID))
         compensator._hybrid_ended = saved.flag("hybrid_ended")
-        compensator._missing = saved.whole("missing")
         n, Np = len(compensator._previous_plan), predictor.Np
+        compensator.monitor = restored(compensator.monitor, saved)
         compensator._previous_plan, compensator._delta_before = (
             saved.array("previous_plan", n),
             saved.array("delta_before", 3),
         )
-        compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
+        compensator._x_d_before = saved.array("x_d_before", len(compensator._x_d_before), finite=False)
         if saved.field("pending") is not None:
             state, ends_hybrid, n_warm_up = saved.numbers("pending", 3)
             if (
-                state not in tuple(SepState)
+                state not in range(SepState.TRIPPED)
                 or ends_hybrid not in (0, 1)
                 or n_warm_up not in range(Np + 1)
-                or restored.n_pending != Np
+                or kept.n_pending != Np
             ):
                 raise saved.error("the pending window must be planned and predicted")
             # A hybrid prediction that is not used may diverge.
@@ -343,7 +347,3 @@ class SepCompensator:
                 ends_hybrid == 1,
             )
         return compensator
-
-
-def _last_three(before: Array, window: Array) -> Array:
-    return np.concatenate((before, window))[-3:]

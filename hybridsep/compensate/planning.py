@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
+from ..online.look_ahead import SepState
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
@@ -32,17 +32,8 @@ __all__ = [
     "Planning",
     "Preview",
     "PublishedPosition",
-    "SepState",
     "has_stable_poles",
 ]
-
-
-class SepState(IntEnum):
-    """Model that the commands of a window are planned with."""
-
-    OFF = 0
-    PHYSICS = 1
-    HYBRID = 2
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from ..base.metrics import (
     shares,
 )
 from ..base.signals import Array
-from ..compensate.planning import SepState
+from ..online.look_ahead import SepState
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -107,7 +107,7 @@ class Run:
     x_h_std : (n,) array, m
         Standard deviation of ``x_meas − x_h``; 0 where it is not known.
     state : (n,) array of int
-        :class:`~hybridsep.compensate.planning.SepState` of each sample: the model that predicts, or that planned.
+        :class:`~hybridsep.online.look_ahead.SepState` of each sample: the model that predicts, or that planned.
     T_s : float
         Sampling interval, s.
     Np : int

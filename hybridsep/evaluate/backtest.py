@@ -19,8 +19,8 @@ from ..base.errors import SignalError
 from ..base.metrics import RunningErrors, html_table, last_residual, line_plot, one_line, reduction_percent, rms_ratio
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
-from ..compensate.planning import SepState
 from ..cosim.run import PREDICTOR, Run
+from ..online.look_ahead import SepState
 from ..predict.predictor import HybridPredictor
 from .verdict import Tally, Verdict
 

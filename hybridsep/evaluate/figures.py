@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 from ..base.files import written_whole
 from ..base.metrics import rms
 from ..base.signals import Array
-from ..compensate.planning import SepState
 from ..cosim.run import Run
 from ..logs.units import DisplayUnits, shown_in
+from ..online.look_ahead import SepState
 from .report import HOLD, HYBRID, PHYSICS, drawn_places
 
 __all__ = [
@@ -53,7 +53,11 @@ CASES = {
 }
 """Compensated runs in the order of their expected error, largest first: key → label, colour."""
 
-_SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
+_SPANS = {
+    SepState.OFF: ("not compensated", HOLD),
+    SepState.PHYSICS: ("planned by the physics model", PHYSICS),
+    SepState.TRIPPED: ("tripped", HOLD),
+}
 """Shading of spans that a lesser model planned than others of the run."""
 
 

@@ -41,6 +41,10 @@ MARGINS = np.array([1.25, 2.0, 5.0])
 """Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
 library."""
 
+FOLLOWING_ERROR = 1.3
+"""``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
+error below that was above it (``python -m benchmarks.faults``)."""
+
 LIMITS_WORDS = (
     f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
     "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
@@ -59,7 +63,8 @@ _HOW = (
 def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
 
-    :func:`~hybridsep.fitting.fit.fit` takes a ``change_max`` that is not among them from the log.
+    :func:`~hybridsep.fitting.fit.fit` takes ``change_max`` and ``following_error_max`` from the log where they are not
+    among them.
 
     Raises
     ------
@@ -81,16 +86,17 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
     """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
 
     They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
-    largest servo error.
+    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it.
     """
     long = [one for one in recordings if len(one.x_d) > 3]
     peaks = np.array([peak_derivatives(one.x_d, T_s) for one in long]).reshape(-1, 3).max(axis=0, initial=0.0)
     error = max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in long), default=0.0)
-    values = dict(zip(DRIVE_LIMIT_ENTRIES, (*(MARGINS * peaks).tolist(), 2.0 * error), strict=True))
+    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
+    values = dict(zip(DRIVE_LIMIT_ENTRIES, bounds, strict=True))
     found: dict[str, Any] = {}
     for name, value in values.items():
         declared = DRIVE_LIMIT_ENTRIES[name]
-        if not value >= (declared.minimum or 0.0):
+        if not value >= (declared.minimum or declared.nonzero):
             return {}
         found[name] = min(float(f"{value:.4g}"), float(declared.maximum or value))
     return {**found, "estimated": True}
@@ -108,8 +114,8 @@ class Tracking:
         Estimates with each model; None where a plan diverges, too.
     limits : mapping
         Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
-    change_max : float
-        Largest change of the command, m.
+    change_max, following_error_max : float
+        Largest change of the command, and following error above which the compensator trips, m.
     """
 
     none: float | None
@@ -117,6 +123,7 @@ class Tracking:
     hybrid: float | None
     limits: Mapping[str, Mapping[str, float]]
     change_max: float | None
+    following_error_max: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
@@ -130,6 +137,8 @@ class Tracking:
             f"physics model (compensate = {COMPENSATE}), with which the FMU starts.",
             PHYSICS_ALONE,
             f"change_max is {figure(self.change_max)}. {binding_words(self.limits.get('hybrid', {}))}",
+            f"Where the measured following error is above following_error_max = {figure(self.following_error_max)} for "
+            "three samples in a row, the compensator trips: its change of the command fades until reset.",
             _HOW,
         ]
 
@@ -158,7 +167,8 @@ def expected_tracking(
             bound[model] = limits_that_bind(judged.x_d, judged.x_dm, settings.T_s, compensator)
         progress((i + 1) / 2)
     none, physics, hybrid = (found.get(name) for name in ("none", "physics", "hybrid"))
-    return Tracking(none, physics, hybrid, bound, machine.compensator_settings.change_max)
+    allowed = machine.compensator_settings
+    return Tracking(none, physics, hybrid, bound, allowed.change_max, allowed.following_error_max)
 
 
 def binding_words(shares: Mapping[str, float]) -> str:

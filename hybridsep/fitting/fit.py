@@ -267,7 +267,8 @@ def fit(
         Called with a message and the fraction done.
     **known : float
         What is known of the axis: ``period`` and ``measurement_delay`` of its predictor; ``v_max``, ``a_max``,
-        ``j_max`` and ``change_max``, the drive's limits, with which a compensator is judged and built, too.
+        ``j_max``, ``change_max`` and ``following_error_max``, the drive's limits, with which a compensator is judged
+        and built, too; the last two are from the log if left out.
 
     Raises
     ------

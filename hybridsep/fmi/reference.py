@@ -64,7 +64,7 @@ class ReferenceModel(Protocol):
         """Return all outputs, in the order of the table."""
 
     def sample(self, *inputs: float) -> None:
-        """Do one step of T_s, with all inputs in the order of the table."""
+        """Do one step of T_s, with all positions that enter in the order of the table."""
 
 
 def reference_files(spec: FmuSpec, model: ReferenceModel, drive: ReferenceModel | None = None) -> dict[str, bytes]:
@@ -80,7 +80,8 @@ def reference_files(spec: FmuSpec, model: ReferenceModel, drive: ReferenceModel 
     machine, table = spec.machine, spec.table
     T_s = machine.T_s
     outputs = {name: variable.kind for name, variable in table.named("output").items()}
-    names, given = list(outputs), list(table.named("input"))
+    names = list(outputs)
+    given = [name for name, variable in table.named("input").items() if variable.kind == "Real"]
     if table.model in ("HybridPredictor", "SepCompensator"):
         measure = _measurement(machine, drive)
         rows = _look_ahead_run(machine, table.parameters, names, model, measure)
@@ -233,7 +234,7 @@ class _HostFmu:
         self._slave.exitInitializationMode()
         gets = {"Real": self._slave.getReal, "Boolean": self._slave.getBoolean}
         variables = list(enumerate(table.variables))
-        self._inputs = [i for i, variable in variables if variable.causality == "input"]
+        self._inputs = [i for i, variable in variables if variable.causality == "input" and variable.kind == "Real"]
         outputs = [(i, variable.kind) for i, variable in variables if variable.causality == "output"]
         self._outputs = [
             (gets.get(kind, self._slave.getInteger), [i for i, _ in same])
@@ -245,7 +246,7 @@ class _HostFmu:
         return [float(value) for get, references in self._outputs for value in get(references)]
 
     def sample(self, *inputs: float) -> None:
-        """Do one step of T_s, with all inputs in the order of the table."""
+        """Do one step of T_s, with all positions that enter in the order of the table."""
         self._slave.setReal(self._inputs, inputs)
         self._slave.doStep(self._k * self._T_s, self._T_s)
         self._k += 1

@@ -50,6 +50,7 @@ _REJECTED = "measurements that were missing or not plausible, with averaging; co
 _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
+_ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
     "input": "Inputs",
@@ -240,7 +241,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     ----------
     parameters : mapping
         Start values of the predictor's parameters and of ``preview``, ``spacing``, ``jerk_weight``, ``v_max``,
-        ``a_max``, ``j_max``, ``change_max``, ``compensate``, ``measurement_timeout``.
+        ``a_max``, ``j_max``, ``change_max``, ``following_error_max``, ``compensate``, ``measurement_timeout``.
     modes : sequence of mappings
         ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
     """
@@ -251,6 +252,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),
+        Variable("reset", "Boolean", "input", "discrete", "a rising edge ends a trip; what was learned stays", False),
         _position("x_dm", "output", "modified command now; wire it to the drive", initially_from=ahead),
         _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
         _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
@@ -281,8 +283,8 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
             "discrete",
             state,
             initially_from=model,
-            items=_COMPENSATE.choices,
-            item_meanings=_COMPENSATE.meanings,
+            items=(*_COMPENSATE.choices, "tripped"),
+            item_meanings=(*_COMPENSATE.meanings, "none: the change of the command fades until a reset"),
         ),
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
@@ -291,6 +293,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
         Variable("no_measurement", "Boolean", "output", "discrete", _NO_MEASUREMENT),
+        Variable("alarm", "Boolean", "output", "discrete", _ALARM),
         *_look_ahead_parameters(parameters),
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         *_modes(modes),
@@ -458,7 +461,7 @@ class FmuTable:
         if not self.windows:
             table = [variable for variable in table if variable.causality != "local"]
         table = [
-            replace(variable, start=self.rest) if variable.causality == "input" else variable for variable in table
+            replace(one, start=self.rest) if one.causality == "input" and one.kind == "Real" else one for one in table
         ]
         return tuple(map(_angular, table) if self.is_angular else table)
 

@@ -258,6 +258,8 @@ class Machine(Section):
     def _compensation(self) -> CompensatorSettings:
         limits, change_max = self.command_limits()
         own = self._compensator_entries(CompensatorSettings)
+        if self.drive_limits is not None:
+            own["following_error_max"] = self.drive_limits.following_error_max
         return CompensatorSettings(**own, limits=limits, change_max=change_max)
 
     def _compensator_entries(self, kind: type[Settings]) -> dict[str, Any]:
@@ -281,7 +283,8 @@ class Machine(Section):
         """Return the drive's limits and the bound on the change of the command, m; None without ``[drive_limits]``."""
         if self.drive_limits is None:
             return None, None
-        return Limits(**self.drive_limits.values("change_max", "estimated")), self.drive_limits.change_max
+        own = {name: getattr(self.drive_limits, name) for name in Limits.parameters()}
+        return Limits(**own), self.drive_limits.change_max
 
 
 def machine_names() -> list[str]:

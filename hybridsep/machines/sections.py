@@ -375,6 +375,7 @@ class DriveLimitsSection(LimitsSection):
     """Limits of the drive for the modified command, wider than the trajectory's; ``estimated``: from a log's motion."""
 
     change_max: float = parameter_entry("change_max", PARAMETERS["change_max"].default)
+    following_error_max: float = parameter_entry("following_error_max", 0.0)
     estimated: bool = _flag_entry(False)
 
 

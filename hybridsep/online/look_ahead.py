@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -25,8 +26,18 @@ from ..base.signals import POSITION_MAX, Array, as_measured, check_position
 from ..base.state import Saved, pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
+from .monitor import Monitor
 
-__all__ = ["LookAhead", "Planner", "PublishedWindow", "Unmodified", "WindowPlanner"]
+__all__ = ["LookAhead", "Planner", "PublishedWindow", "SepState", "Unmodified", "WindowPlanner"]
+
+
+class SepState(IntEnum):
+    """Model that the commands of a window are planned with; as an output also that the monitor tripped."""
+
+    OFF = 0
+    PHYSICS = 1
+    HYBRID = 2
+    TRIPPED = 3
 
 
 @dataclass(frozen=True)
@@ -42,7 +53,7 @@ class PublishedWindow:
     x_h_std : (Np,) array, m
         Standard deviation of the error of ``x_h``; 0 where it is not known.
     state : int
-        Model that planned it (:class:`~hybridsep.compensate.planning.SepState`); 0 without a planner.
+        Model that planned it (:class:`SepState`); 0 without a planner.
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
     n_followed, state_before : int
@@ -82,10 +93,13 @@ class WindowPlanner(Protocol):
     predictor : HybridPredictor
     preview : int
         Samples of a plan, at least ``Np``.
+    monitor : Monitor
+        Takes in each sample that is measured, before its window is updated.
     """
 
     predictor: HybridPredictor
     preview: int
+    monitor: Monitor
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``, m, for ``lead_in`` samples; what was learned is kept."""
@@ -95,15 +109,6 @@ class WindowPlanner(Protocol):
 
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
-
-    def is_lost(self, x: Array) -> bool:
-        """Return whether no measurement came for so long that changes of the command fade.
-
-        Parameters
-        ----------
-        x : (n,) array, m
-            Positions measured since the window began, NaN where missing.
-        """
 
     @property
     def is_planned(self) -> bool:
@@ -134,7 +139,7 @@ class Unmodified:
     """
 
     def __init__(self, predictor: HybridPredictor, *, at_rest: bool) -> None:
-        self.predictor, self.preview = predictor, predictor.Np
+        self.predictor, self.preview, self.monitor = predictor, predictor.Np, Monitor()
         self._at_rest = at_rest
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
@@ -153,10 +158,6 @@ class Unmodified:
         if not self._at_rest:
             self.predictor.update(x)
         self._at_rest = False
-
-    def is_lost(self, x: Array) -> bool:
-        """Return that no change fades, as there is none."""
-        return False
 
     @property
     def is_planned(self) -> bool:
@@ -284,13 +285,20 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """Model that planned the commands of now (``SepState``); 0 with a predictor alone."""
+        """Model that planned the commands of now, or tripped (``SepState``); 0 with a predictor alone."""
+        if self.alarm:
+            return SepState.TRIPPED
         return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
 
     @property
     def no_measurement(self) -> bool:
         """Whether the change of the command fades, as no measurement came for ``measurement_timeout``."""
-        return self.planner.is_lost(self._measured[: self.k % self.Np])
+        return self.planner.monitor.is_lost
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the following error was above ``following_error_max``: the change fades until a reset."""
+        return self.planner.monitor.is_tripped
 
     @property
     def rms_e(self) -> float:
@@ -332,6 +340,7 @@ class LookAhead:
         if self.predictor.settings.measurement_delay < 0:
             x_meas, self._next = self._next, x_meas
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
+        self.planner.monitor.take_in(float(x_meas - self._compared[0, self.k % self.Np]))
         if self.k >= self._first_compared and not math.isnan(x_meas):
             self._residual = float(x_meas - self._compared[1, self.k % self.Np])
         if self.k >= self._first_scored and not math.isnan(x_meas):

@@ -14,7 +14,8 @@
  * fb. The line of commands goes on in all of them. The change is the model's, which keeps the drive's limits, or, where
  * there is no model, what is left of it fades within them. A run of the model begins at rest alone: when the command
  * has stood for look-ahead periods, and no change is left. What ends one in motion (reset, another period) ends its
- * plans, and the model follows the remainder of the last one until then.
+ * plans, and the model follows the remainder of the last one until then. A trip of its following-error monitor ends
+ * none: reset ends the trip, and the model plans on.
  *
  * Real time: axis_step allocates nothing, locks nothing and opens no file; it costs as much as hsep_compensator_sample
  * (hsep.h). A begin costs some 100 us more: the state is filled anew.
@@ -66,7 +67,8 @@ enum {
     AXIS_INACTIVE = 0,
     AXIS_DELAYS = 1,
     AXIS_PHYSICS = 2,
-    AXIS_HYBRID = 3
+    AXIS_HYBRID = 3,
+    AXIS_TRIPPED = 4
 };
 
 /* Pins and parameters, in HAL's memory. Positions are in machine units. */
@@ -119,8 +121,8 @@ static double *axis_value(axis_data *self, size_t place) { return &self->instanc
 
 /* What the two components differ in: the model's change of the command in this sample; the model that may plan until
  * the parameter is set, the machine file's; the pin state while the model has measurements; the time without a
- * measurement, s, after which the change fades, 0: never; which model may plan the next windows; and limits of the
- * drive, of which a predictor, that changes nothing, knows none: those of a slow one. */
+ * measurement, s, after which the change fades, 0: never; which model may plan the next windows, and the reset, which
+ * ends a trip; and limits of the drive, of which a predictor, that changes nothing, knows none: those of a slow one. */
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
 static double axis_planned(axis_data *self) { return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d); }
 static unsigned axis_first_model(axis_data *self) { return *axis_value(self, HSEP_VR_compensate) > 1.0 ? 2 : 1; }
@@ -130,6 +132,7 @@ static void axis_choose(axis_data *self, int plans)
 {
     const hsep_sep_state model = self->pins->model == 1 ? HSEP_SEP_PHYSICS : HSEP_SEP_HYBRID;
     *axis_value(self, HSEP_VR_compensate) = plans ? (double)model : (double)HSEP_SEP_OFF;
+    *axis_value(self, HSEP_VR_reset) = *self->pins->reset ? 1.0 : 0.0;
 }
 #define HSEP_LIMIT(self, name, slow) *axis_value(self, HSEP_VR_##name)
 #else
@@ -370,7 +373,8 @@ static void axis_step(void *data, long period)
     if (resets) {
         self->faulty = self->said = 0;
     }
-    self->ending |= resets || is_wrong;
+    const int is_tripped = self->runs && axis_state(self) == AXIS_TRIPPED;
+    self->ending |= (resets && !is_tripped) || is_wrong;
     if ((!self->runs || self->ending) && !self->faulty && !is_wrong && self->still >= self->n_ring &&
         self->change == 0.0) {
         axis_begin(self);
@@ -384,7 +388,8 @@ static void axis_step(void *data, long period)
     } else {
         axis_fade(self);
     }
-    const int works = self->runs ? axis_lost(self) ? AXIS_NO_MEASUREMENT : axis_state(self) : AXIS_DELAYS;
+    const int is_lost = axis_lost(self) && !is_tripped;
+    const int works = self->runs ? is_lost ? AXIS_NO_MEASUREMENT : axis_state(self) : AXIS_DELAYS;
     axis_write(self, delayed, is_wrong ? AXIS_WRONG_PERIOD : self->faulty || self->held ? AXIS_FAULT : works);
     if (self->runs) {
         axis_process(self);

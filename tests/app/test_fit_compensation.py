@@ -50,6 +50,7 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     assert "by the hybrid (compensate = hybrid), and about" in words
     assert "The physics model alone may leave more error than no compensation does" in words
     assert re.search(r"change_max is [\d.]+ µm\. (No limit binds|Limits bind) the compensated command", words)
+    assert re.search(r"above following_error_max = [\d.]+ µm for three samples in a row", words)
     assert "An estimate: the compensator plans in closed loop on the identified model" in words
     assert "Compensation" in (out / "report.html").read_text(encoding="utf-8")
     machine = load_machine(out / "machine.toml")
@@ -58,6 +59,7 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     assert (limits.velocity, limits.acceleration, limits.jerk) == (0.3, 30, 2e4)
     # As large as without the options, where a millimetre applied silently
     assert machine.drive_limits.change_max == pytest.approx(2 * np.abs(x_d - x).max(), rel=1e-3)
+    assert machine.compensator_settings.following_error_max == pytest.approx(1.3 * np.abs(x_d - x).max(), rel=1e-3)
     assert machine.compensator_settings.compensate == "physics"
     fmus = sorted(path.stem for path in out.glob("SepCompensator*.fmu"))
     assert fmus == ["SepCompensator_axis"]

@@ -90,7 +90,9 @@ def test_only_what_is_tunable_changes_in_a_run() -> None:
     """How it fades, on every implementation: tests/suite/test_tunable.py."""
     sep = compensator()
     before = sep.to_bytes()
-    with pytest.raises(ParameterError, match="preview, spacing cannot change in a run, change_max and compensate can"):
+    with pytest.raises(
+        ParameterError, match="preview, spacing cannot change in a run, change_max, following_error_max, compensate can"
+    ):
         sep.change(preview=300, spacing=1, compensate="off")
     with pytest.raises(ParameterError, match="compensate must be one of off, physics, hybrid, got 'none'"):
         sep.change(compensate="none")

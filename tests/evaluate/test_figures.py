@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from drawn import cut_off, figures_drawn, hiding_legends
 
-from hybridsep.compensate.planning import SepState
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
 from hybridsep.evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
+from hybridsep.online.look_ahead import SepState
 
 
 def made_run(kind: Kind, n: int, peak: int | None = None) -> Run:

@@ -147,6 +147,24 @@ def test_states_and_what_they_end_with(folder: Path) -> None:
     assert run.component.messages == 0
 
 
+def test_a_trip_fades_in_motion_and_ends_with_reset(folder: Path) -> None:
+    monitored = changed(folder, "monitored", ("change_max", "following_error_max = 0.01\nchange_max"))
+    run = Run(Component(monitored, folder))
+    run.stay(100)
+    for k in range(700):
+        fb = run.fb + 30.0 if k in (300, 301, 302) else None
+        run.step(20.0 * math.sin(8e-3 * k), math.nan if 400 <= k < 500 else fb, reset=k == 550)
+    state, change = run.column(STATE)[100:], np.abs(run.column(OUT) - run.column(DELAYED))[100:]
+    assert set(state[100:303]) <= {2, 3}
+    assert set(state[304:550]) == {4}
+    assert state[552] == 1
+    assert set(state[620:]) <= {2, 3}
+    assert np.max(change[200:300]) > 0.1
+    assert np.max(change[400:551]) < 1e-9
+    assert np.max(change[620:]) > 0.1
+    assert_no_step(run)
+
+
 @pytest.mark.parametrize(("cmd", "said"), [(math.nan, "finite, got nan"), (2e6, "within ±1000 m, got 2000")])
 def test_a_command_that_is_none_is_held(folder: Path, cmd: float, said: str) -> None:
     run = Run(Component(load_machine(X), folder))
@@ -293,7 +311,9 @@ def test_nothing_steps(
     tmp_path_factory: pytest.TempPathFactory, events: list[tuple[str, int, float]], seed: int
 ) -> None:
     """Between two periods out moves as the command of look-ahead periods ago did, plus what the limits allow."""
-    component = Component(load_machine(X), tmp_path_factory.getbasetemp())
+    base = tmp_path_factory.getbasetemp()
+    monitored = changed(base, "monitored", ("change_max", "following_error_max = 0.01\nchange_max"))
+    component = Component(monitored, base)
     run, rng = Run(component), np.random.default_rng(seed)
     held, velocity, enable, origins = [0.0], 0.0, True, [0.0]  # before the first step
     n_active: list[bool] = []

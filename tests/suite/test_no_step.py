@@ -11,11 +11,14 @@ from properties import share
 from stream import COMPENSATOR, OUTPUTS, Array, Stream
 from streams import StreamMaker, on_all
 
+FADED = 20 + 60
+"""Samples after which the change has faded: the window and the preview of the streams."""
+
 LIMITS = {"v_max": 0.1, "a_max": 16.0, "j_max": 5000.0}
 
 
 def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
-    """Step through rests, moves up to ten times as fast as the limit, jumps, gaps and changed parameters."""
+    """Step through rests, moves up to ten times as fast as the limit, jumps, gaps, trips and changed parameters."""
     rng = np.random.default_rng(seed)
     position = velocity = wanted = x = 0.0
     gap, outputs = 0, []
@@ -32,6 +35,10 @@ def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
             stream.set("compensate", int(rng.integers(0, 3)))
         elif what == 6:
             stream.set("change_max", float(10.0 ** rng.uniform(-6.0, -2.0)))
+        elif what == 7:
+            stream.set("following_error_max", float(10.0 ** rng.uniform(-3.5, -1.0)))
+        elif what < 14:
+            stream.set("reset", bool(what % 2))
         velocity += np.clip(wanted - velocity, -8.0 * T_S, 8.0 * T_S)
         position += float(velocity) * T_S
         stream.set("x_d_ahead", position)
@@ -44,7 +51,7 @@ def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
 
 
 @on_all((COMPENSATOR,))
-@pytest.mark.parametrize("seed", range(share(30)))
+@pytest.mark.parametrize("seed", range(3, 3 + share(30)))
 def test_whatever_comes_in(new_stream: StreamMaker, seed: int) -> None:
     stream = new_stream()
     initialise(stream, measurement_timeout=0.05, **LIMITS)
@@ -54,3 +61,7 @@ def test_whatever_comes_in(new_stream: StreamMaker, seed: int) -> None:
     for order, limit in enumerate(LIMITS.values(), start=1):
         allowed = np.maximum(np.abs(np.diff(x_d, order)), limit * T_S**order)
         assert np.all(np.abs(np.diff(x_dm, order)) <= allowed * (1 + 1e-6) + 1e-12), order
+    for begins in np.flatnonzero(np.diff(outputs[:, OUTPUTS[COMPENSATOR].index("alarm")]) > 0.0):
+        alarm = outputs[begins + 1 :, OUTPUTS[COMPENSATOR].index("alarm")]
+        ends = begins + 1 + (int(np.argmin(alarm)) if alarm.min() < 1.0 else len(alarm))
+        assert np.all(np.abs(x_dm - x_d)[begins + FADED : ends] < 1e-12)

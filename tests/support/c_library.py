@@ -130,6 +130,7 @@ class CompensatorOutputs(ctypes.Structure):
         ("x_dm", ctypes.c_double),
         ("state", ctypes.c_int),
         ("no_measurement", ctypes.c_int),
+        ("alarm", ctypes.c_int),
     )
 
 

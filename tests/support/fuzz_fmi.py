@@ -191,15 +191,17 @@ class Fuzzer:
         for _ in range(self.random.randint(1, 100)):
             odd = self._chance(0.05)
             for name in names:
-                self.library.set(instance, name, self._number() if odd else self.random.gauss(0, 1e-2))
+                value = self._number() if odd else self.random.gauss(0, 1e-2)
+                self.library.set(instance, name, value > 0.0 if name == "reset" else value)
             t = self.times[instance]
             usual = self.random.choice([1e-3, 1e-3, 3e-4, 8e-3, self.random.uniform(0.0, 0.05)])
             h = self.random.choice([1e-7, 0.0, -1e-3, 1.3, self._number()]) if odd else usual
             if not self.is_3 and self._chance(0.1):
-                n = len(names)
-                references = (c_uint * n)(*(self.library.references[name] for name in names))
-                orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in names))
-                slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in names))
+                sloping = [name for name in names if odd or name != "reset"]
+                n = len(sloping)
+                references = (c_uint * n)(*(self.library.references[name] for name in sloping))
+                orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in sloping))
+                slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in sloping))
                 self._call("SetRealInputDerivatives", instance, references, n, orders, slopes)
             before, at = self._reals(instance), self._number() if self._chance(0.02) else t
             self.library.messages.clear()

@@ -11,7 +11,6 @@ from library_models import library_look_ahead, library_plant, numbered, restored
 from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep import HybridSepError
-from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.online.look_ahead_inputs import LookAheadInputs
@@ -30,7 +29,7 @@ def refusing() -> Iterator[None]:
 def start_values(model: str) -> dict[str, Any]:
     """Return the start values of a model's inputs and parameters."""
     table = table_of_model(model)
-    inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0}
+    inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0, "reset": False}
     return {**inputs, **table.parameters, **numbered(table.modes)}
 
 
@@ -92,10 +91,7 @@ class LookAheadStream(LibraryStream):
     def _tune(self) -> None:
         compensator = self._look_ahead.planner
         if isinstance(compensator, SepCompensator):
-            now = compensator.compensate, compensator.settings.change_max
-            if now != (self._values["compensate"], self._values["change_max"]):
-                given = CompensatorSettings.from_fmi(self._values)
-                compensator.change(compensate=given.compensate, change_max=given.change_max)
+            compensator.retune(self._values)
 
     def outputs(self) -> list[float]:
         return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]

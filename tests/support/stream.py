@@ -62,7 +62,7 @@ OUTPUTS = {
     ),
     COMPENSATOR: (
         *("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state"),
-        *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected", "no_measurement"),
+        *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected", "no_measurement", "alarm"),
     ),
     TRAJECTORY: ("r",),
     DRIVE: ("x", "v", "x_meas"),

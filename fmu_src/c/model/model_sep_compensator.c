@@ -46,7 +46,10 @@ HSEP_API hsep_online_parameters hsep_online_derive(const double values[], hsep_p
 
 HSEP_API void hsep_online_tune(hsep_online *self, const double values[])
 {
-    (void)hsep_compensator_change(self, (hsep_sep_state)values[HSEP_VR_compensate], values[HSEP_VR_change_max]);
+    hsep_compensator_reset(self, values[HSEP_VR_reset] != 0.0);
+    (void)hsep_compensator_change(
+        self, (hsep_sep_state)values[HSEP_VR_compensate], values[HSEP_VR_change_max],
+        values[HSEP_VR_following_error_max]);
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self); }
@@ -73,6 +76,7 @@ HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *
     values[HSEP_VR_batch] = (double)predicted->batch;
     values[HSEP_VR_n_rejected] = (double)predicted->n_rejected;
     values[HSEP_VR_no_measurement] = (double)outputs.no_measurement;
+    values[HSEP_VR_alarm] = (double)outputs.alarm;
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
@@ -86,7 +90,7 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     values[HSEP_VR_x_h_std] = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
     values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = 0.0;
     values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = values[HSEP_VR_rms_hold] = 0.0;
-    values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = values[HSEP_VR_no_measurement] = 0.0;
+    values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = values[HSEP_VR_no_measurement] = values[HSEP_VR_alarm] = 0.0;
     values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
 }
 

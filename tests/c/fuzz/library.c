@@ -108,7 +108,8 @@ static void compensate(source *from, const hsep_parameters *parameters)
         (void)hsep_compensator_init(compensator, parameters, position(from), NULL, 0);
         for (; from->left > 0 && k < 400; k++) {
             if (byte(from) == 0) {
-                hsep_compensator_change(compensator, (hsep_sep_state)(byte(from) % 3), 1e-3);
+                hsep_compensator_change(compensator, (hsep_sep_state)(byte(from) % 3), 1e-3, fabs(position(from)));
+                hsep_compensator_reset(compensator, byte(from) % 2);
             }
             const double x_d = position(from);
             (void)hsep_compensator_sample(compensator, x_d, position(from));

@@ -35,10 +35,11 @@ Sensor = Callable[[int, float], float]
 
 
 class Loop(NamedTuple):
-    """A run: modified commands and true positions, ``(n,)``, m; NaN from where the compensator refused to go on."""
+    """A run: modified commands, true positions, ``(n,)``, m, and states; NaN from where it refused to go on."""
 
     x_dm: Array
     x: Array
+    state: Array
 
 
 def settings_of(recipe: Recipe) -> tuple[PredictorSettings, CompensatorSettings, Array]:
@@ -64,7 +65,7 @@ def settings_of(recipe: Recipe) -> tuple[PredictorSettings, CompensatorSettings,
     )
 
 
-def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = lambda _k, x: x) -> Loop:
+def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = lambda _k, x: x, **more: float) -> Loop:
     """Return a cold run of a drive behind its compensator.
 
     Parameters
@@ -75,6 +76,8 @@ def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = la
     compensate : {"off", "physics", "hybrid"}
     sensor : callable, optional
         Called as ``sensor(k, x_meas)``; returns what is measured in its place.
+    **more
+        Parameters of the compensator's FMU besides.
     """
     predictor, compensator, x_d = settings_of(recipe)
     assert compensator.preview is not None
@@ -85,15 +88,15 @@ def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = la
     values = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     values |= {**predictor.to_fmi(), **compensator.to_fmi(), "dead_time": recipe.model.dead_time}
     assert compensator.limits is not None
-    values |= {**compensator.limits.to_fmi(), "compensate": PARAMETERS["compensate"].to_fmi(compensate)}
+    values |= {**compensator.limits.to_fmi(), "compensate": PARAMETERS["compensate"].to_fmi(compensate), **more}
     core = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
     drive = TwoMassDrive(replace(axis, change_at=axis.change_at + late), start)
-    ahead, measured, modified = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_dm"))
+    ahead, measured, modified, state = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_dm", "sep_state"))
     n, T_s, noise, quantum = len(x_d), axis.T_s, recipe.noise.tolist(), recipe.encoder.quantum
-    commands, out = [*x_d.tolist(), *[float(x_d[-1])] * late], np.full((2, n + late), np.nan)
+    commands, out = [*x_d.tolist(), *[float(x_d[-1])] * late], np.full((3, n + late), np.nan)
     for k, command in enumerate(commands):
         x, x_dm = drive.x, float(core.values[modified])
-        out[:, k] = x_dm, x
+        out[:, k] = x_dm, x, core.values[state]
         core.values[ahead] = command
         core.values[measured] = sensor(k - late, quantum * round((x + noise[k % n]) / quantum))
         drive.step(x_dm)

@@ -171,7 +171,6 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
     const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
     if (self->averaged ? compensator_advance(self, left) : compensator_step(self, due)) {
-        self->solving = 0;
         self->state = self->averaged ? hsep_compensator_averaged(self)->planned : self->state;
         compensator_publish(self, predictor->Np);
     }
@@ -193,8 +192,9 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     return status;
 }
 
-/* Begin a plan on the paper's model, or on the physics model where the paper's must not plan. */
-static void compensator_plan(hsep_compensator *self)
+/* Begin a plan on the paper's model, or on the physics model where the paper's must not plan; return whether it is left
+ * to solve. */
+static int compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_plan_status status = HSEP_PLAN_FAILED;
@@ -206,7 +206,7 @@ static void compensator_plan(hsep_compensator *self)
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
-    self->solving = status == HSEP_PLAN_BOUNDED;
+    return status == HSEP_PLAN_BOUNDED;
 }
 
 /* Begin a plan on the residual model with averaging; which model planned is known when the plan is made. */
@@ -224,17 +224,27 @@ static void compensator_plan_averaged(hsep_compensator *self)
         .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
         .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
     hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, &before, best);
-    self->solving = 1;
 }
 
-HSEP_API int hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max)
+HSEP_API int hsep_compensator_change(
+    hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max)
 {
-    if (!(change_max > 0.0 && isfinite(change_max)) || (hsep_int)compensate > HSEP_SEP_HYBRID) {
+    if (!(change_max > 0.0 && isfinite(change_max)) || (hsep_int)compensate > HSEP_SEP_HYBRID ||
+        !(following_error_max >= 0.0 && isfinite(following_error_max))) {
         return 0;
     }
     self->compensate_next = (hsep_int)compensate;
     self->change_max_next = change_max;
+    self->error_max = following_error_max;
     return 1;
+}
+
+HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level)
+{
+    if (level && !self->was_reset) {
+        self->over = 0;
+    }
+    self->was_reset = level != 0;
 }
 
 /* Whether no measurement came for so long that the change of the command fades. */
@@ -243,7 +253,7 @@ static int compensator_lost(const hsep_compensator *self) { return self->n_lost 
 HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 {
     hsep_planner *planner = hsep_compensator_planner(self);
-    self->compensate = compensator_lost(self) ? HSEP_SEP_OFF : self->compensate_next;
+    self->compensate = compensator_lost(self) || self->over == HSEP_OVER ? HSEP_SEP_OFF : self->compensate_next;
     if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
         hsep_planner_limit_change(planner, self->change_max_next);
     }
@@ -251,10 +261,9 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     hsep_predictor_begin(predictor);
     if (self->averaged) {
         compensator_plan_averaged(self);
-    } else {
-        compensator_plan(self);
     }
-    compensator_publish(self, self->solving ? compensator_pinned(self) : predictor->Np);
+    const int solving = self->averaged || compensator_plan(self);
+    compensator_publish(self, solving ? compensator_pinned(self) : predictor->Np);
     if (predictor->n_published == 0) {
         compensator_solve(self);
     }
@@ -269,16 +278,29 @@ static void compensator_next_window(hsep_compensator *self)
     hsep_compensator_begin(self);
 }
 
+/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing. */
+static void compensator_monitor(hsep_compensator *self, hsep_real error)
+{
+    if (isnan(error)) {
+        self->missing += self->missing < self->n_lost;
+        return;
+    }
+    self->missing = 0;
+    if (self->over < HSEP_OVER) {
+        self->over = self->error_max > 0.0 && hsep_fabs(error) > self->error_max ? self->over + 1 : 0;
+    }
+}
+
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const int is_missing = isnan(predictor->early ? predictor->next : x_meas);
-    self->missing = is_missing ? self->missing + (self->missing < self->n_lost) : 0;
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
+    compensator_monitor(self, (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np]);
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas)) {
         compensator_next_window(self);
         return 1;
     }
-    if (self->solving) {
+    if (predictor->n_published < predictor->Np) {
         compensator_solve(self);
     }
     return 0;
@@ -295,6 +317,7 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
         outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */
     }
     outputs->x_dm = hsep_at_const(self, self->x_dm)[i];
-    outputs->state = (hsep_sep_state)(follows ? self->before : self->state);
+    outputs->alarm = self->over == HSEP_OVER;
+    outputs->state = outputs->alarm ? HSEP_SEP_TRIPPED : (hsep_sep_state)(follows ? self->before : self->state);
     outputs->no_measurement = compensator_lost(self);
 }

@@ -35,8 +35,13 @@ typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
     hsep_sep_state compensate;
-    hsep_int n_lost; /* samples without a measurement after which the change fades; 0: never */
+    hsep_int n_lost;     /* samples without a measurement after which the change fades; 0: never */
+    hsep_real error_max; /* m, largest following error; 0: none */
 } hsep_compensator_parameters;
+
+/* Samples in a row above the largest following error that trip: one or two may be outliers of the sensor. Missing ones
+ * do not count. */
+#define HSEP_OVER 3
 
 struct hsep_compensator {
     hsep_int compensate;       /* hsep_sep_state, the best model allowed in the window, */
@@ -44,9 +49,11 @@ struct hsep_compensator {
     hsep_real change_max_next; /* m, of the command, likewise */
     hsep_int state;            /* hsep_sep_state of the window, */
     hsep_int before;           /* and of the window before, whose plan the first samples follow with averaging */
-    hsep_int solving;          /* whether its plan is being solved */
     hsep_int n_lost;           /* as the parameter */
     hsep_int missing;          /* measurements that were missing one after another, n_lost at most */
+    hsep_real error_max;       /* m, largest following error; 0: none */
+    hsep_int over;             /* samples above it one after another, HSEP_OVER at most: it has tripped */
+    hsep_int was_reset;        /* last level of the reset */
     /* Offsets in words from the beginning of the struct */
     hsep_int x_dm;      /* (Np,) m, the window: modified commands */
     hsep_int trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
@@ -58,7 +65,7 @@ struct hsep_compensator {
     hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */
 };
 
-HSEP_ASSERT_WORDS(hsep_compensator, 17);
+HSEP_ASSERT_WORDS(hsep_compensator, 19);
 
 HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */

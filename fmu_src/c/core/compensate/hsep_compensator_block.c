@@ -63,6 +63,7 @@ HSEP_API void hsep_compensator_block_init(
     }
     self->compensate = self->compensate_next = (hsep_int)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];
+    self->error_max = parameters->error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
@@ -87,8 +88,8 @@ HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensa
     memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
     return memcmp(&got, block, sizeof got) == 0 && got.compensate <= HSEP_SEP_HYBRID &&
            got.compensate_next <= HSEP_SEP_HYBRID && got.change_max_next > 0.0 && isfinite(got.change_max_next) &&
-           got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.solving <= 1 &&
-           got.missing <= got.n_lost && (got.solving || online.n_published == predictor->settings.Np) &&
+           got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.missing <= got.n_lost &&
+           got.over <= HSEP_OVER && got.was_reset <= 1 && got.error_max >= 0.0 && isfinite(got.error_max) &&
            (online.divergence ||
             hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&

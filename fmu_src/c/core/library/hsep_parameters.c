@@ -143,6 +143,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
         .no_reversal = settings->no_reversal != 0,
         .pinned = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER};
     derived.compensate = (hsep_sep_state)settings->compensate;
+    derived.error_max = settings->following_error_max;
     derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     return derived;
 }

@@ -33,6 +33,7 @@
     RANGE(hsep_real, a_max, 16.0, 1e-06, 1000000.0, 0.0, 1e-06, 0) \
     RANGE(hsep_real, j_max, 5000.0, 1e-06, 1000000000000.0, 0.0, 1e-06, 0) \
     RANGE(hsep_real, change_max, 0.001, 1e-12, 10.0, 0.0, 1e-12, 0) \
+    RANGE(hsep_real, following_error_max, 0.0, 0.0, 10.0, 1e-12, 0.0, 0) \
     RANGE(hsep_int, no_reversal, 1.0, 0.0, 1.0, 0.0, 0.0, 0) \
     RANGE(hsep_int, compensate, 2.0, 0.0, 2.0, 0.0, 0.0, 0) \
     RANGE(hsep_real, measurement_timeout, 1.0, 0.0, 10000.0, 1e-05, 0.0, 0)

@@ -53,6 +53,8 @@
     SETTING(hsep_real, j_max) \
     /* largest change of the command, m */ \
     SETTING(hsep_real, change_max) \
+    /* following error above which, for three samples in a row, the command's change fades until reset; 0: none, m */ \
+    SETTING(hsep_real, following_error_max) \
     /* whether the modified command never turns while the commanded position moves */ \
     SETTING(hsep_int, no_reversal) \
     /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \

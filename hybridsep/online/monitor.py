@@ -1,0 +1,71 @@
+"""Monitor of what is measured, as drives have one: following error, and measurements that are missing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ..base.state import FIXED
+
+__all__ = ["Monitor"]
+
+_N_OVER = 3
+"""Samples in a row above the limit that trip: one or two may be outliers of the sensor. Missing ones do not count."""
+
+
+@dataclass
+class Monitor:
+    """Counts of samples without a measurement, and above the largest following error.
+
+    Attributes
+    ----------
+    n_lost : int
+        Samples without a measurement after which it is lost; 0: never.
+    error_max : float
+        Largest following error, m; 0: none.
+    n_missing : int
+        Measurements that were missing one after another.
+    n_over : int
+        Samples above ``error_max`` one after another, three from when it tripped on.
+    n_taken : int
+        Samples taken in since the window began.
+    was_reset : bool
+        Last level of the reset.
+    """
+
+    n_lost: int = field(default=0, metadata=FIXED)
+    error_max: float = field(default=0.0, metadata=FIXED)
+    n_missing: int = 0
+    n_over: int = 0
+    n_taken: int = 0
+    was_reset: bool = False
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether no measurement came for so long that the change of the command fades, until one comes."""
+        return 0 < self.n_lost <= self.n_missing
+
+    @property
+    def is_tripped(self) -> bool:
+        """Whether the change of the command fades until a reset."""
+        return self.n_over >= _N_OVER
+
+    def take_in(self, error: float) -> None:
+        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing."""
+        self.n_taken += 1
+        if math.isnan(error):
+            self.n_missing += 1
+            return
+        self.n_missing = 0
+        if not self.is_tripped:
+            self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
+
+    def reset(self) -> None:
+        """End a trip; what was learned is kept."""
+        self.n_over = 0
+
+    def take_reset(self, level: bool) -> None:
+        """End a trip where the level of a reset rises."""
+        if level and not self.was_reset:
+            self.reset()
+        self.was_reset = level
