@@ -70,20 +70,16 @@ def test_without_compiler_and_libraries_build_says_what_to_do(without: Path, hyb
     assert needs in " ".join(error.split())
 
 
-def test_the_libraries_of_a_wheel_need_no_compiler(without: Path) -> None:
+def test_the_libraries_of_a_wheel_need_no_compiler(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fill(without / "shipped", ALL)
     assert has_native()
     assert default_targets() == ready_targets() == ALL_TARGETS
+    monkeypatch.setenv("HYBRIDSEP_TARGETS", "win64,x86_64-linux")
+    assert default_targets() == ("x86_64-windows", "x86_64-linux")
     found = libraries("FeedDrive", ("host", "darwin64"))
     assert found == {
         target: f"FeedDrive for {target}".encode() for target in (host_target(), "x86_64-darwin", "aarch64-darwin")
     }
-
-
-def test_platforms_can_be_left_out(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fill(without / "shipped", ALL)
-    monkeypatch.setenv("HYBRIDSEP_TARGETS", "win64,x86_64-linux")
-    assert default_targets() == ("x86_64-windows", "x86_64-linux")
 
 
 def test_a_wheel_has_this_machines_libraries_unless_others_are_chosen(
@@ -166,13 +162,6 @@ def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkey
     module._version.cache_clear()
     assert kept(("FeedDrive", "x86_64-linux")) is None
     module._version.cache_clear()
-
-
-def test_only_a_few_versions_are_kept(without: Path) -> None:
-    for i in range(7):
-        fill(without / "kept" / f"version {i}", [("FeedDrive", "x86_64-linux")])
-    module._forget_old_versions()
-    assert len(list((without / "kept").iterdir())) == 4
 
 
 def test_the_build_requirement_is_the_compiler_of_the_libraries() -> None:

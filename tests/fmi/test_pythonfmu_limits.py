@@ -18,6 +18,7 @@ import pytest
 import pythonfmu_calls
 from c_compiler import run_compiler
 from elf import symbols
+from places import ROOT
 from pythonfmu_calls import CAUGHT
 
 from hybridsep import FmuInstance, build_fmu, load_machine
@@ -26,7 +27,7 @@ from hybridsep.fmi.python import checked_version
 
 Fmu = Callable[[str], Path]
 
-HOST = Path(__file__).parent / "foreign" / "host.c"
+HOST = ROOT / "tests" / "c" / "host.c"
 
 
 @pytest.fixture
