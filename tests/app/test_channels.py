@@ -47,10 +47,3 @@ def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run
     assert status == 2  # the machine has 1 kHz
     assert "sampled every 0.002 s, but machine spring_mass_damper has T_s = 0.001 s" in err
     assert len(read_log(path, resample=True).t) == 2000
-
-
-def test_columns_that_may_be_meant_are_proposed(tmp_path: Path, hybridsep: Run) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("Zeit;Sollwert [mm];Ist\n0,0;1;1\n0,001;2;1\n")
-    _, out, _ = hybridsep("fit", path, "--list-channels")
-    assert out.endswith(f"name it: hybridsep fit {path} --x_d 'Sollwert [mm]' --x Ist\n")

@@ -13,8 +13,7 @@ from command_line import Run, write_log
 from log_files import write
 
 from hybridsep.app.console import written_before
-from hybridsep.demo.cases import demo_files
-from hybridsep.machines.machine import machine_name, machine_path
+from hybridsep.machines.machine import machine_path
 
 MACHINE = "spring_mass_damper"
 
@@ -45,42 +44,26 @@ def refusal(run: Run, *arguments: object) -> str:
 
 # An output that is an input ----------------------------------------------------------------------------------------
 
-LINKS = pytest.mark.parametrize(
-    "link", [lambda file, other: None, os.symlink, os.link], ids=["itself", "symbolic", "hard"]
-)
 
-
-def linked(link: Callable[[Path, Path], object], file: Path, suffix: str) -> Path:
-    """Return another name of a file, or its own."""
-    other = file.with_name(f"other{suffix}")
-    link(file, other)
-    return other if other.exists() else file
-
-
-@LINKS
-@pytest.mark.parametrize("force", [[], ["--force"]])
-def test_backtest_does_not_overwrite_its_log_or_machine(
-    hybridsep: Run, tmp_path: Path, log: Path, link: Callable[[Path, Path], object], force: list[str]
+@pytest.mark.parametrize("link", [os.symlink, os.link, None], ids=["symbolic", "hard", "itself"])
+def test_what_is_read_is_not_overwritten(
+    hybridsep: Run, tmp_path: Path, log: Path, link: Callable[[Path, Path], object] | None
 ) -> None:
-    machine = own_machine(tmp_path)
-    for file, what in ((log, "log"), (machine, "machine file")):
-        before = file.read_bytes()
-        out = linked(link, file, f"_{what}.csv")
-        err = refusal(hybridsep, "backtest", log, "-m", machine, "--out", out, *force)
-        assert f"--out {out} is the same file as the {what} {file}; choose another name" in err
+    machine, trajectory = own_machine(tmp_path), command_file(tmp_path)
+    for i, (file, what, suffix, command) in enumerate(
+        (
+            (log, "log", ".csv", ("backtest", log, "-m", machine, "--force")),
+            (machine, "machine file", ".csv", ("backtest", log, "-m", machine)),
+            (machine, "machine file", ".toml", ("tune", log, "-m", machine)),
+            (trajectory, "trajectory", ".csv", ("cosim", "--trajectory", trajectory)),
+        )
+    ):
+        before, out = file.read_bytes(), file if link is None else tmp_path / f"other{i}{suffix}"
+        if link is not None:
+            link(file, out)
+        said = refusal(hybridsep, *command, "--out", out)
+        assert f"--out {out} is the same file as the {what} {file}; choose another" in said
         assert file.read_bytes() == before
-
-
-@LINKS
-def test_cosim_does_not_overwrite_what_it_reads(
-    hybridsep: Run, tmp_path: Path, link: Callable[[Path, Path], object]
-) -> None:
-    trajectory = command_file(tmp_path)
-    before = trajectory.read_bytes()
-    out = linked(link, trajectory, ".csv")
-    arguments = ("--trajectory", trajectory, "--out", out)
-    assert f"--out {out} is the same file as the trajectory {trajectory}" in refusal(hybridsep, "cosim", *arguments)
-    assert trajectory.read_bytes() == before
     outputs = ("--out", tmp_path / "run.npz", "--figure", tmp_path / "run.png")
     (tmp_path / "run.png").symlink_to(tmp_path / "run.npz")
     assert f"is the same file as --out {outputs[1]}" in refusal(hybridsep, "cosim", *outputs)
@@ -108,13 +91,20 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
         ("init", "{there}"),
         ("demo", "--out", "{folder}"),
         ("fit", "{log}", "--out", "{folder}"),
+        ("tune", "{log}", "-m", MACHINE, "--out", "{there}"),
     ],
     ids=lambda arguments: f"{arguments[0]} {arguments[-2]}",
 )
 def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path, arguments: tuple[str, ...]) -> None:
     folder = tmp_path / "there"
     folder.mkdir()
-    names = {"build": "FeedDrive.fmu", "demo": "summary.json", "init": "axis.toml", "fit": "machine.toml"}
+    names = {
+        "build": "FeedDrive.fmu",
+        "demo": "summary.json",
+        "init": "axis.toml",
+        "tune": "axis.toml",
+        "fit": "machine.toml",
+    }
     there = folder / names.get(arguments[0], "run.png" if "--figure" in arguments else "run.csv")
     there.write_text("my own")
     words = [word.format(log=log, there=there, folder=folder) for word in arguments]
@@ -141,12 +131,6 @@ def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, t
     assert written_before(out / "fit.json", [log]) == {path for path in out.iterdir() if path != machine}
 
 
-def test_logs_of_two_days_have_a_folder_each() -> None:
-    days = [machine_name(Path(f"logs/spindle.2026-11-{day}.csv")) for day in (26, 27)]
-    assert days == ["spindle_2026_11_26", "spindle_2026_11_27"]
-    assert machine_name(Path("my_axis.csv.gz"), "X") == "my_axis_X"
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -168,61 +152,100 @@ def test_names_that_cannot_be_written_are_refused_before_the_work(
 # All arguments before any work -------------------------------------------------------------------------------------
 
 
-def test_weights_that_are_none_are_refused_before_a_loop_is_run(
-    hybridsep: Run, tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """They are loaded once, where the FMU is built."""
+DIGITS = "9" * 4000
+UNITS = "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'"
+REFUSED = [
+    ("backtest {log} -m robot", "error: no machine 'robot'"),
+    ("backtest {log} {m} --set predictor.p=200", "p must be 1 … Np = 100, got 200"),
+    ("backtest {log} {m} --set predictor.lambda=0", "lambda must be 1e-40 … 1e+12 m2, got 0"),
+    ("backtest {log} {m} --x pos", "column 'pos' (x) is missing, the file has 't', 'x_d', 'x'; name it: --x NAME"),
+    ("backtest {log} {m} --unit furlong", UNITS),
+    ("backtest nothing.csv {m}", "nothing.csv"),
+    ("backtest {log} {m} --out {folder}", "--out must be a file, got the folder"),
+    ("backtest {log} {m} --figure a.jpg", "--figure must end in .png or .pdf or .svg, got 'a.jpg'"),
+    ("backtest {log} {m} --save a.bin", "--save must end in .state or .csv or .npz"),
+    ("backtest {log} {m} --report page.pdf", "--report must end in"),
+    ("build SepCompensatorPy -m emps --flavour python", "; emps has no [drive_limits], which a"),
+    ("build Robot --flavour python", "no FMU Robot; there are HybridPredictorPy_als25010_x"),
+    ("build --flavour cobol", "flavour must be one of"),
+    ("build --fmi 4", "the version of FMI must be one of 2, 3, got '4'"),
+    ("build --fmi 3 --flavour python", "FMUs of the Python flavour are of FMI 2 alone"),
+    ("build --target sparc", "no target sparc; there are host"),
+    ("build FeedDriveFmi3 --target host", "; FMUs of FMI 3.0 need --fmi 3"),
+    ("build FeedDrivePy --flavour python --out {log}", "is a file, not a folder"),
+    ("build HybridPredictor --weights {log}", "a saved state of kind 'predictor' was expected"),
+    ("build FeedDrive --unit furlong", UNITS),
+    ("cosim -m emps", "emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant"),
+    ("cosim --trajectory zigzag", "zigzag"),
+    ("cosim --unit furlong", UNITS),
+    ("cosim --out run.xlsx", "--out must end in .csv or .npz, got 'run.xlsx'"),
+    ("cosim --out {log}/run.csv", "is a file, not a folder"),
+    ("cosim --figure run.pdf", "--figure must end in .png, got 'run.pdf'"),
+    ("cosim --set predictor.Np=10", "p must be 1 … Np = 10, got 50"),
+    ("cosim --compensate magic", "--compensate must be one of off, physics, hybrid, got 'magic'"),
+    ("cosim --compensate hybrid --set compensator.p=51", "p must be 1 … Np = 50, got 51"),
+    ("cosim --compensate hybrid -m emps --plant p.fmu", "emps has no [drive_limits], which a compensator must keep"),
+    ("cosim --compensate hybrid --predictor none.fmu", "no FMU at none.fmu; build it first"),
+    ("cosim --compensate physics --predictor {fmu}", "is no compensator: it has no output x_dm"),
+    ("cosim --predictor {log}", "log.csv is not a readable FMU"),
+    ("cosim --plant {fmu}", "HybridPredictorPy.fmu is no plant: it has no input x_d"),
+    ("cosim --weights w.state --predictor p.fmu", "--weights go into an FMU that is built here"),
+    ("cosim --set plant.seed=99999999999", "plant.seed: seed must be 0 … 2147483647, got 99999999999"),
+    (f"cosim --set plant.seed={DIGITS}", "seed must be "),
+    (f"cosim --set predictor.lambda={DIGITS}", "lambda must be "),
+    ("cosim --set plant.sed=1", "plant.sed is not an entry of a machine file"),
+    ("cosim --set predictor=1", "predictor must be a table, got 1"),
+    ("cosim --set predictor.p", "an entry is set as in predictor.p=20, got 'predictor.p'"),
+    ("cosim --set plant.seed=1 --plant p.fmu", "is for an FMU that is built here; leave out --plant"),
+    ("tune {log} {m} --try p=5,105", "p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
+    ("tune {log} {m} --try lambda=1e-12:1e-6", "--try lambda must be a number, got '1e-12:1e-6'"),
+    ("tune {log} {m} --try p=5,50.5", "--try p must be a whole number, got 50.5"),
+    (
+        "tune {log} {m} --try Np=5",
+        "--try must be as p=5,10,50, of p, q, lambda, effect, noise_std, ",
+    ),
+    (
+        "tune {log} {m} --set predictor.averaging=false --try effect=1e-5",
+        "has an effect with averaging only: set",
+    ),
+    ("tune {log} {m} --out x.csv", "--out must end in .toml, got 'x.csv'"),
+    ("fit {log} --out {folder} --name no-name", "--name must be"),
+    ("fit {log} --out {log}/deeper", "log.csv is a file, not a folder; choose another"),
+]
 
-    def run(*_: object, **__: object) -> None:
-        raise AssertionError("a loop is run")
 
-    monkeypatch.setattr("hybridsep.cosim.loop.cosimulate", run)
-    said = refusal(hybridsep, "cosim", "--weights", str(log), "--out", str(tmp_path / "run.csv"))
-    assert "a saved state of kind 'predictor' was expected" in said
-    assert not (tmp_path / "run.csv").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["build", "--target", "sparc"], "no target sparc; there are host"),
-        (["build", "HybridPredictor", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
-        (
-            ["build", "FeedDrive", "--unit", "furlong"],
-            "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
-        ),
-        (["cosim", "--predictor", "{log}"], "log.csv is not a readable FMU"),
-        (["cosim", "--plant", "none.fmu"], "no FMU at none.fmu; build it first"),
-        (["cosim", "--plant", "{fmu}"], "HybridPredictorPy.fmu is no plant: it has no input x_d"),
-        (["cosim", "--compensate", "physics", "--predictor", "{fmu}"], "is no compensator: it has no output x_dm"),
-        (
-            ["cosim", "--unit", "furlong"],
-            "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
-        ),
-        (["backtest", "{log}", "-m", MACHINE, "--out", "{folder}"], "--out must be a file, got the folder"),
-    ],
-)
+@pytest.mark.parametrize(("command", "message"), REFUSED, ids=[command[:60] for command, _ in REFUSED])
 def test_arguments_are_checked_before_any_work(
     hybridsep: Run,
     tmp_path: Path,
     log: Path,
     python_fmu: Callable[[str], Path],
     monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
+    command: str,
     message: str,
 ) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work has begun")
 
-    folder = tmp_path / "here"
+    folder, before = tmp_path / "here", log.read_bytes()
     folder.mkdir()
     monkeypatch.chdir(folder)
-    for module in ("hybridsep.fmi.archive", "hybridsep.fmi.archive"):
-        monkeypatch.setattr(f"{module}.build_fmu", work)
-    monkeypatch.setattr("hybridsep.evaluate.backtest.backtest", work)
-    names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy")}
-    assert message in refusal(hybridsep, *(argument.format(**names) for argument in arguments))
+    for place in ("fmi.archive.build_fmu", "evaluate.backtest.backtest", "cosim.loop.cosimulate"):
+        monkeypatch.setattr(f"hybridsep.{place}", work)
+    names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy"), "m": f"-m {MACHINE}"}
+    said = refusal(hybridsep, *command.format(**names).split())
+    assert message in said
+    assert len(said.replace(str(tmp_path), "")) < 1000
     assert [path for path in folder.rglob("*") if path.is_file()] == []
+    assert log.read_bytes() == before
+
+
+def test_weights_that_are_none_are_refused_before_a_loop_is_run(
+    hybridsep: Run, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are loaded once, where the FMU is built."""
+    monkeypatch.setattr("hybridsep.cosim.loop.cosimulate", None)
+    assert "a saved state of kind 'predictor' was expected" in refusal(hybridsep, "cosim", "--weights", log)
 
 
 def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, log: Path) -> None:
@@ -234,16 +257,3 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
     again = ("backtest", log, "-m", MACHINE, "--out", out, "--force")
     assert "column 'x' must be a number, got 'broken'" in refusal(hybridsep, *again)
     assert out.read_bytes() == before
-
-
-def test_the_demos_list_of_files_needs_no_demo(tmp_path: Path) -> None:
-    files = demo_files(tmp_path, full=True)
-    assert len(files) == len(set(files)) == 4 + 3 * (4 + 1 + 3 + 1)
-
-
-def test_a_file_that_has_the_folders_name_is_named(hybridsep: Run, tmp_path: Path, log: Path) -> None:
-    before = log.read_bytes()
-    for out in (log, log / "deeper"):
-        err = refusal(hybridsep, "fit", log, "--out", out)
-        assert f"--out {out / 'machine.toml'}: {log} is a file, not a folder; choose another" in err
-    assert log.read_bytes() == before

@@ -32,8 +32,8 @@ def screw(x_d: Array, amplitude: float, seed: int = 0, friction: float = 3e-6) -
     return measured(AXIS, rubbed + amplitude * np.sin(2 * np.pi * x_d / PITCH + 1.0), "zoh", 5e-7, seed)
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("friction", [0.0, 3e-6, 20e-6])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("friction", [0.0, 20e-6])
 def test_a_period_is_found_where_there_is_one_only(seed: int, friction: float) -> None:
     x_d = long_moves(seed)
     for amplitude, period in ((0.0, 0.0), (2e-6 + friction, PITCH)):

@@ -36,10 +36,9 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
-@pytest.mark.parametrize("name", ["cnc_a_axis2", pytest.param("cnc_a_axis6", marks=pytest.mark.nightly)])
 @pytest.mark.usefixtures("quick_fit")
-def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path, name: str) -> None:
-    log = RECORDINGS / f"{name}.csv"
+def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path) -> None:
+    log = RECORDINGS / "cnc_a_axis2.csv"
     used = read_log(log)
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
     assert status == 0, err

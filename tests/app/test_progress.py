@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
-from threading import Timer
 
 import pytest
+from command_line import Run
+from places import ROOT
 
 from hybridsep.app import console
 from hybridsep.app.console import progress_bar
@@ -53,28 +52,16 @@ def test_what_is_quick_and_what_prints_json_says_nothing(clock: Clock, capsys: p
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.slow
-def test_the_demo_says_in_a_pipe_how_long_it_takes_and_where_it_is(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hybridsep", "demo", "--out", str(tmp_path / "demo")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        assert process.stdout is not None
-        late = Timer(120.0, process.kill)
-        late.start()
-        try:
-            said = [process.stderr.readline().rstrip() for _ in range(2)]
-        finally:
-            late.cancel()
-            process.kill()
-        out = process.stdout.read()
-    assert said[0] == "note: this takes about 10 seconds of processor time"
-    assert all(re.fullmatch(r"\[ *\d+%\] staircase, .+", line) for line in said[1:])
-    assert out == ""
+def test_the_demo_and_the_readme_say_how_long_it_takes(
+    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
 
-
-def test_the_readme_says_how_long_its_first_command_takes() -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    before, _, after = readme.partition(".venv/bin/hybridsep demo --out demo\n```\n")
-    told = " ".join(after[:800].split())
-    assert before
-    assert "about 10 seconds of processor time" in told
+    monkeypatch.setattr("hybridsep.demo.cases.demo", interrupted)
+    status, out, err = hybridsep("demo", "--out", tmp_path / "demo")
+    assert (status, out) == (130, "")
+    assert err.startswith("note: this takes about 10 seconds of processor time")
+    _, found, after = (ROOT / "README.md").read_text(encoding="utf-8").partition("hybridsep demo --out demo\n```\n")
+    assert found
+    assert "about 10 seconds of processor time" in " ".join(after[:800].split())

@@ -62,3 +62,7 @@ def test_a_refusal_names_its_file_and_itself_once(
     assert err.startswith("error: axis.csv: columns swapped: x_d follows x, ")
     assert err.count("error:") == 1
     assert "  hybridsep fit axis.csv --out fit --x_d 'x [m]' --x x_d  # the two columns exchanged" in err
+    status, out, err = hybridsep("backtest", "axis.csv", *MACHINE, "--report", "page.html")
+    assert (status, out) == (2, "")
+    assert err.startswith("error: axis.csv: columns swapped: x_d follows x, ")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["axis.csv"]

@@ -49,15 +49,3 @@ def test_a_warm_start_is_said(hybridsep: Run, log: Path, tmp_path: Path) -> None
     assert status == 0, err
     assert "Use the hybrid: its error is 0." in out
     assert "began with what an earlier run had learned" in (tmp_path / "other.html").read_text(encoding="utf-8")
-
-
-def test_faults_are_refused(hybridsep: Run, tmp_path: Path) -> None:
-    log = write_rows(tmp_path / "axis.csv", commanded()[:1500], -measured(0)[:1500])
-    page = tmp_path / "page.html"
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--report", page)
-    assert status == 2
-    assert "moves opposite to the command" in err
-    assert not page.exists()
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--report", tmp_path / "page.pdf")
-    assert status == 2
-    assert "--report must end in" in err

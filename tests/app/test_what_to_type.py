@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_line import Run, write_log, write_rows
 from staircase_data import commanded, measured
@@ -30,23 +29,6 @@ def test_a_replay_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run)
     status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 2
     assert f"  hybridsep backtest {log} -m spring_mass_damper --unit mm " in err
-
-
-def test_a_binary_file_says_what_it_is(tmp_path: Path, hybridsep: Run) -> None:
-    log = tmp_path / "axis.csv"
-    log.write_bytes(np.random.default_rng(0).bytes(5000))
-    status, _, err = hybridsep("fit", log)
-    assert status == 2
-    assert "axis.csv: is binary, though its name says text" in err
-
-
-def test_a_log_without_names_says_what_to_put_above(tmp_path: Path, hybridsep: Run) -> None:
-    log = tmp_path / "axis.csv"
-    np.savetxt(log, np.zeros((20, 3)), delimiter=",", fmt="%g")
-    status, _, err = hybridsep("fit", log)
-    assert status == 2
-    assert "axis.csv: has no line of names, its first line is numbers ('0', '0#2', '0#3'); put one above" in err
-    assert "such as t,x_d,x: time, commanded and measured position" in err
 
 
 def test_a_machine_file_that_fit_wrote_is_named(
@@ -78,14 +60,6 @@ def test_channels_of_a_text_are_told(tmp_path: Path, hybridsep: Run) -> None:
     assert status == 0
     words = "none is read as the commanded and measured position; name it: hybridsep fit "
     assert f"{words}{log} --x_d NAME --x NAME" in out
-
-
-def test_a_log_at_rest_is_refused(tmp_path: Path, hybridsep: Run) -> None:
-    log = write_rows(tmp_path / "axis.csv", np.full(600, 0.1), np.full(600, 0.1))
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
-    assert (status, out) == (2, "")
-    assert "axis.csv: no motion: the commanded and the measured position never change: an axis" in err
-    assert not (tmp_path / "fit" / "machine.toml").exists()
 
 
 def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:

@@ -55,6 +55,9 @@ def test_formats_without_a_reader(tmp_path: Path, content: bytes, message: str) 
     (tmp_path / "log.mat").write_bytes(bytes(range(256)))
     with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB"):
         read_log(tmp_path / "log.mat")
+    (tmp_path / "log.csv").write_bytes(bytes(range(256)) * 20)
+    with pytest.raises(LogError, match=r"log\.csv: is binary, though its name says text"):
+        read_log(tmp_path / "log.csv")
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
@@ -113,6 +116,8 @@ def time_at(i: int, value: float, n: int = 25_000) -> Array:
         (time_at(7, np.nan), r"sample 8 \(the first is 1\): column 't' must be finite, got nan"),
         (time_at(7, 1e20), r"sample 8 .*: time 't' must be within ±1e\+19, got 1e\+20"),
         (np.zeros(50), r"log.npz: time 't' must increase, it never does"),
+        (np.array([0.0, 5e-324, 1e-323, 1.5e-323]), "time 't' must be "),
+        (np.array([-1e308, 0.0, 1e308]), "time 't' must be "),
         (np.arange(50) // 4 * 0.01, r"rounded too coarsely, 75\.5 % .*, about 0\.0025 s \(--T_s 0\.0025\)$"),
         (np.arange(50) * 1e-3 % 0.002, r"time 't' is rounded too coarsely, 49 % of the times are not above the one"),
         (1e6 + np.arange(50, dtype=np.float32) / 16, r"time 't' is rounded too coarsely, 0 % .*, about 0\.062 s"),

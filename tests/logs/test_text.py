@@ -88,7 +88,10 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         ("t,x_d,x\n0,1,2\n00:01.5,1,2\n", r"line 3: column 't' must be a number, got '00:01\.5'; write times of"),
         ("a\nb;c\n# d\n1;2\n", r"columns 't', 'x_d', 'x' are missing, the file has 'b', 'c'"),
         ("# nothing\n# else\n", r"columns 't', 'x_d', 'x' are missing, the file has 'nothing'"),
-        (TWO_ROWS, r"has no line of names, its first line is numbers \('0', '1', '2'\)"),
+        (
+            TWO_ROWS,
+            r"has no line of names, its first line is numbers \('0', '1', '2'\); put one above.* as t,x_d,x: ",
+        ),
         ("10:20:30,1,2\n10:20:31,3,4\n", "has no line of names, its first line is numbers"),
         ("t,x_d,x\n0,0,0\n1,nan,0\n", r"log\.csv, line 3: column 'x_d' must be finite, got nan$"),
         ("t,x_d,x\n0,0,0\n1,0,inf\n", "line 3: column 'x' must be finite, got inf$"),
