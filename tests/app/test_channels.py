@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from command_line import Run
+from command_line import Run, write_log
 from recorders import twincat_csv
 from staircase_data import commanded, measured
 
@@ -31,9 +31,11 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
     listed = {one["name"]: one for one in json.loads(out)[str(path)]}
     assert listed["x"] == {"name": "x", "unit": "m", "role": "x", "n_samples": 2000, "interval": 0.002}
     assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
-    status, out, err = hybridsep("fit", tmp_path / "none.csv", "--list-channels")
-    assert (status, out) == (2, "")
-    assert "there is no such file" in err
+    odd = write_log(tmp_path / "odd.csv", n=20, header="t,goal,present")
+    status, out, _ = hybridsep("fit", odd, "--list-channels")
+    assert status == 0
+    words = "none is read as the commanded and measured position; name it: hybridsep fit "
+    assert f"{words}{odd} --x_d NAME --x NAME" in out
 
 
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:

@@ -47,21 +47,6 @@ def test_a_machine_file_that_fit_wrote_is_named(
         assert "There is axis/machine.toml: add -m axis/machine.toml" in " ".join(err.split())
 
 
-def test_channels_of_a_text_are_told(tmp_path: Path, hybridsep: Run) -> None:
-    status, out, err = hybridsep(
-        "fit", write_log(tmp_path / "axis.csv", header="t [s],x_d [m],x [m]"), "--list-channels"
-    )
-    assert (status, err) == (0, "")
-    rows = [line.split() for line in out.splitlines() if line.strip()]
-    assert ["x_d", "[m]", "m", "2500", "0.001", "commanded"] in rows
-    assert "name it" not in out
-    log = write_log(tmp_path / "odd.csv", header="t,goal,present")
-    status, out, _ = hybridsep("fit", log, "--list-channels")
-    assert status == 0
-    words = "none is read as the commanded and measured position; name it: hybridsep fit "
-    assert f"{words}{log} --x_d NAME --x NAME" in out
-
-
 def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
     logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
     status, _, err = hybridsep("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")

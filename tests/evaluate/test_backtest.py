@@ -7,10 +7,7 @@ import math
 import numpy as np
 import pytest
 from hold_oracle import held
-from hypothesis import given
-from hypothesis import strategies as st
 from places import EMPS
-from properties import examples
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -140,18 +137,6 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
     warm.restart()
     score = backtest(warm, x_d, x_d).overall
     assert (score.rms_pb, score.reduction_percent) == (0.0, -math.inf)
-
-
-@given(k=st.integers(60, 1009), step=st.floats(-1e-3, 1e-3))
-@examples(25)
-def test_no_prediction_depends_on_what_is_measured_in_its_window_or_later(k: int, step: float) -> None:
-    x_d, x = log()
-    x_other = x.copy()
-    x_other[k:] += step
-    first, other = backtest(predictor(), x_d, x), backtest(predictor(), x_d, x_other)
-    end = 20 * (k // 20 + 1)
-    np.testing.assert_array_equal(first.x_h[:end], other.x_h[:end])
-    np.testing.assert_array_equal(first.x_hold[:end], other.x_hold[:end])
 
 
 def test_on_batch_over_arrays() -> None:

@@ -90,20 +90,6 @@ def test_windows_are_free_runs_from_what_was_measured_before(missing: range) -> 
             np.testing.assert_allclose(refitted[k : k + NP], expected, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("delay", [0, 7, 40])
-def test_no_prediction_knows_its_window(delay: int) -> None:
-    x_d, x = axis()
-    late = np.concatenate((np.full(delay, x[0]), x))[: len(x)]
-    other = late.copy()
-    other[450:] += 1e-5
-    one, two = (predict_peers([Piece(x_d, given, 300, 300)], NP, delay=delay) for given in (late, other))
-    for first, second in zip(one, two, strict=True):
-        assert not first.diverged
-        changed = first.predictions[0] != second.predictions[0]
-        assert not changed[300 : 450 + delay].any()  # predictions stand where their measurements do
-        assert changed[450 + NP + delay :].all()
-
-
 @pytest.mark.parametrize("delay", [3, 30])
 def test_late_measurements_are_those_of_earlier_positions(delay: int) -> None:
     x_d, x = axis()

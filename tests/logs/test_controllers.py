@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Callable
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -301,49 +303,36 @@ def test_capture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_log(path, columns={"x": "DES_POS|4"}).x_meas, log.x_d)
 
 
-def spoiled(what: str) -> str:
-    content = recording()
-    header, payload = content["Header"], content["Payload"]
-    match what:
-        case "cycle":
-            header["CycleTimeMs"] = 0
-        case "signals":
-            header["SignalListHFData"] = {}
-        case "signal":
-            del header["SignalListHFData"][2]["Axis"]
-        case "row":
-            payload[0]["HFData"][3] = [1.0]
-        case "value":
-            payload[3]["HFData"][4][1] = "1"
-        case "rows":
-            payload[3]["HFData"] = None
-        case "huge":
-            payload[0]["HFData"][0][0] = 10**400
-        case "nan":
-            payload[0]["HFData"][1][3] = float("nan")
-        case "deep":
-            return '{"SignalListHFData"' + ":[" * 100_000
-    return json.dumps(content)
+def signals_of(content: dict[str, Any]) -> list[dict[str, Any]]:
+    return cast(list[dict[str, Any]], content["Header"]["SignalListHFData"])
+
+
+def rows_of(content: dict[str, Any], block: int) -> list[Any]:
+    return cast(list[Any], content["Payload"][block]["HFData"])
 
 
 @pytest.mark.parametrize(
-    ("what", "message"),
+    ("spoil", "message"),
     [
-        ("cycle", "Header.CycleTimeMs must be a number of milliseconds above 0, got 0"),
-        ("signals", "Header.SignalListHFData must be a list, got dict"),
-        ("signal", r"Header\.SignalListHFData\[2\] must have a Name and an Axis, got {'Name'"),
-        ("row", r"Payload\[0\]\.HFData\[3\] must have 5 values, one a signal, got 1"),
-        ("value", r"Payload\[3\]\.HFData\[4\]\[1\] must be a number, got '1'"),
-        ("rows", r"Payload\[3\]\.HFData must be a list, got NoneType"),
-        ("huge", "a value is no floating-point number"),
-        ("nan", r"sample 2 \(the first is 1\): column 'DES_POS\|4' must be finite, got nan"),
-        ("deep", "is truncated, damaged or not JSON"),
+        (lambda c: c["Header"].update(CycleTimeMs=0), "Header.CycleTimeMs must be a number of milliseconds above 0"),
+        (lambda c: c["Header"].update(SignalListHFData={}), "Header.SignalListHFData must be a list, got dict"),
+        (lambda c: signals_of(c)[2].pop("Axis"), r"Header\.SignalListHFData\[2\] must have a Name and an Axis, got "),
+        (lambda c: rows_of(c, 0).insert(3, [1.0]), r"Payload\[0\]\.HFData\[3\] must have 5 values, one a signal"),
+        (lambda c: rows_of(c, 3)[4].__setitem__(1, "1"), r"Payload\[3\]\.HFData\[4\]\[1\] must be a number, got '1'"),
+        (lambda c: c["Payload"][3].update(HFData=None), r"Payload\[3\]\.HFData must be a list, got NoneType"),
+        (lambda c: rows_of(c, 0)[0].__setitem__(0, 10**400), "a value is no floating-point number"),
+        (lambda c: rows_of(c, 0)[1].__setitem__(3, math.nan), r"sample 2 .* 'DES_POS\|4' must be finite, got nan"),
     ],
 )
-def test_refused_captures(tmp_path: Path, what: str, message: str) -> None:
+def test_refused_captures(tmp_path: Path, spoil: Callable[[dict[str, Any]], object], message: str) -> None:
+    content = recording()
+    spoil(content)
     path = tmp_path / "recording.json"
-    path.write_text(spoiled(what))
+    path.write_text(json.dumps(content))
     with pytest.raises(LogError, match=rf"recording\.json.*{message}"):
+        read_log(path)
+    path.write_text('{"SignalListHFData"' + ":[" * 100_000)
+    with pytest.raises(LogError, match="is truncated, damaged or not JSON"):
         read_log(path)
 
 

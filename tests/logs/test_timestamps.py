@@ -23,19 +23,7 @@ SECOND = 1_000_000_000
 
 @dataclass(frozen=True)
 class Spelling:
-    """One way in which a recorder writes timestamps.
-
-    Attributes
-    ----------
-    date, time : str
-        The date and what stands before the time of day, as ``strftime`` takes them; the time of day.
-    end : str
-        What follows the decimals.
-    digits : int
-        Decimals; with none there is no decimal mark.
-    mark, delimiter : str
-        Decimal mark, of the timestamps and of the numbers, and delimiter.
-    """
+    """One way in which a recorder writes timestamps: date, time of day and end as ``strftime`` takes them, decimals."""
 
     date: str
     time: str

@@ -12,11 +12,9 @@ from averaged_cases import TS, cycles, physics, run
 from numpy.typing import ArrayLike
 from predictor_cases import MODEL
 
-from benchmarks.periodic import CASES, STARTS, moves, new_predictor
 from hybridsep.base.errors import ParameterError, SignalError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.predict.averaging.features import Disturbance
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -56,25 +54,6 @@ def test_the_unit_of_a_disturbance_is_free(scale: float) -> None:
     x_d, x = into_the_buffer()
     found = run(predictor(lambda x, v: scale * spring(x, v)), x_d, x)
     np.testing.assert_allclose(found, run(predictor(spring), x_d, x), rtol=0.0, atol=1e-12)
-
-
-def test_sines_of_the_user_are_those_of_the_period() -> None:
-    amplitude, pitch = CASES[0]
-    turns = 2.0 * np.pi / pitch
-
-    def sine(x: Array, v: Array) -> Array:
-        return np.asarray(np.sin(turns * x))
-
-    def cosine(x: Array, v: Array) -> Array:
-        return np.asarray(np.cos(turns * x))
-
-    known = new_predictor(pitch)
-    own = HybridPredictor(known.model, new_predictor(0.0).settings, disturbances=(sine, cosine))
-    for seed, start in enumerate(STARTS, start=1):
-        x_d, x = moves(amplitude, pitch, start, seed)
-        own.restart(start)
-        known.restart(start)
-        np.testing.assert_array_equal(backtest(own, x_d, x).x_h, backtest(known, x_d, x).x_h)
 
 
 def test_what_a_constant_function_adds_is_nothing() -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from benchmarks.periodic import errors, moves, new_predictor
-from hybridsep.evaluate.backtest import backtest
-from hybridsep.predict.predictor import HybridPredictor
+from benchmarks.periodic import errors
 
 COGGING = 20e-6, 0.005
 """Amplitude and pitch, m; the noise is 1 µm."""
@@ -24,11 +21,3 @@ def test_what_repeats_is_predicted_to_the_noise_wherever_a_run_starts(second_sta
 def test_another_period_does_no_harm() -> None:
     for wrong, without in zip(errors(*COGGING, 0.83 * COGGING[1]), errors(*COGGING, 0.0), strict=True):
         assert wrong < 1.05 * without
-
-
-def test_a_saved_predictor_goes_on_the_same() -> None:
-    x_d, x = moves(*COGGING, 0.0, 1)
-    first = new_predictor(COGGING[1])
-    backtest(first, x_d[:700], x[:700])
-    second = HybridPredictor.from_bytes(first.to_bytes())
-    np.testing.assert_array_equal(second.predict(x_d[700:800]).x_h, first.predict(x_d[700:800]).x_h)

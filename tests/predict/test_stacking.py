@@ -122,17 +122,6 @@ def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-4)
 
 
-@given(scale=st.sampled_from([1e-9, 1e-3, 1e3]), seed=st.integers(0, 2**32 - 1))
-def test_positions_in_another_unit_have_the_same_weights(scale: float, seed: int) -> None:
-    one, other, rng = Stack.init(), Stack.init(), np.random.default_rng(seed)
-    for _ in range(5):
-        measured = rng.normal(size=NP)
-        predicted = measured + rng.normal(size=(5, NP)) * np.array([[1.0], [0.3], [0.5], [2.0], [0.7]])
-        one = one.update(predicted, measured, 0.0)
-        other = other.update(scale * predicted, scale * measured, 0.0)
-    np.testing.assert_allclose(other.weights, one.weights, atol=1e-9)
-
-
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
     stack = Stack.init()
     stack = replayed(stack, (3.0, 0.1, 3.0), 30)
