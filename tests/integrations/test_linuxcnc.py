@@ -32,70 +32,72 @@ AXES = tuple(str(SIMULATION / f"{axis}.toml") for axis in sampled_columns.AXES)
 USER = "nobody"
 
 
-class TestWithoutLinuxCnc:
-    def test_it_writes_the_component_and_a_folder_for_each_axis(self, hybridsep: Run, tmp_path: Path) -> None:
-        status, out, _ = hybridsep("hal", *AXES, "--out", str(tmp_path))
-        assert status == 0
-        assert "halcompile --install" in out
-        assert f"loadrt hsep axes={tmp_path}/x,{tmp_path}/y" in out.replace("\n", "")
-        assert (tmp_path / "hsep.c").is_file()
-        assert (tmp_path / "hsep_sources" / "all.c").is_file()
-        assert not list(tmp_path.rglob("*fmi2*"))
-        assert [path.name for path in (tmp_path / "x").iterdir()] == ["variables.bin"]
+def axis(folder: Path, *changes: tuple[str, str]) -> Path:
+    """Return the machine file of the X axis with parts of its text replaced."""
+    text = Path(AXES[0]).read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "axis.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
-    def test_an_axis_starts_with_what_was_learned(self, hybridsep: Run, tmp_path: Path) -> None:
-        machine = load_machine(AXES[0])
-        predictor = HybridPredictor(machine.model, machine.new_compensator().predictor.settings, start=0.0)
-        command = 1e-3 * np.sin(0.1 * np.arange(20))
-        predictor.predict(command)
-        predictor.update(0.99 * command)
-        predictor.save(tmp_path / "x.state")
-        given = ("--out", str(tmp_path), "--weights", str(tmp_path / "x.state"))
-        assert hybridsep("hal", AXES[0], *given)[0] == 0
-        assert (tmp_path / "x" / "weights.bin").read_bytes().startswith(b"HSEPWG")
-        status, out, _ = hybridsep("hal", AXES[0], "--out", str(tmp_path), "--force")
-        assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
-        assert not (tmp_path / "x" / "weights.bin").exists()
-        status, _, err = hybridsep("hal", *AXES, *given)
-        assert (status, "--weights belong to one axis" in err) == (2, True)
 
-    def test_a_compensator_needs_limits_a_predictor_does_not(self, hybridsep: Run, tmp_path: Path) -> None:
-        status, _, err = hybridsep("hal", "emps", "--out", str(tmp_path))
-        assert status == 2
-        assert "[drive_limits] in the machine file of emps; --predictor writes" in " ".join(err.split())
-        assert hybridsep("hal", "emps", "--predictor", "--out", str(tmp_path))[0] == 0
-        assert (tmp_path / "hsep_predictor.c").is_file()
+def test_a_component_and_a_folder_for_each_axis_are_written(hybridsep: Run, tmp_path: Path) -> None:
+    status, out, err = hybridsep("hal", *AXES, "--out", tmp_path)
+    assert status == 0
+    assert "halcompile --install" in out
+    assert f"loadrt hsep axes={tmp_path}/x,{tmp_path}/y" in out.replace("\n", "")
+    assert "estimates" not in err
+    assert (tmp_path / "hsep.c").is_file()
+    assert (tmp_path / "hsep_sources" / "all.c").is_file()
+    assert not list(tmp_path.rglob("*fmi2*"))
+    assert [path.name for path in (tmp_path / "x").iterdir()] == ["variables.bin"]
+    longest = axis(
+        tmp_path, ('name = "x"', f'name = "{"n" * 31}"'), ("[drive_limits]\n", "[drive_limits]\nestimated = true\n")
+    )
+    status, _, err = hybridsep("hal", longest, "--out", tmp_path, "--force")
+    assert (status, f"warning: [drive_limits] of {'n' * 31}: estimates" in err) == (0, True)
+    assert hybridsep("hal", "emps", "--predictor", "--out", tmp_path)[0] == 0
+    assert (tmp_path / "hsep_predictor.c").is_file()
 
-    def test_limits_that_are_estimates_are_said(self, hybridsep: Run, tmp_path: Path) -> None:
-        text = Path(AXES[0]).read_text(encoding="utf-8")
-        file = tmp_path / "x.toml"
-        file.write_text(text.replace("[drive_limits]\n", "[drive_limits]\nestimated = true\n"), encoding="utf-8")
-        for command in (("hal", str(file)), ("build", "SepCompensatorPy_x", "-m", str(file), "--flavour", "python")):
-            for given, said in ((file, True), (AXES[0], False)):
-                words = [str(given) if word == str(file) else word for word in command]
-                status, _, err = hybridsep(*words, "--out", str(tmp_path / "out"), "--force")
-                assert status == 0, err
-                assert ("warning: [drive_limits] of x: estimates" in err) == said, err
 
-    @pytest.mark.parametrize("name", ["my axes", "x,y", "a$b"])
-    def test_a_folder_that_loadrt_takes_apart_is_refused(self, hybridsep: Run, tmp_path: Path, name: str) -> None:
-        status, _, err = hybridsep("hal", AXES[0], "--out", str(tmp_path / name))
-        assert (status, "at which loadrt takes axes= apart" in " ".join(err.split())) == (2, True), err
-        assert not (tmp_path / name).exists()
+def test_an_axis_starts_with_what_was_learned(hybridsep: Run, tmp_path: Path) -> None:
+    machine = load_machine(AXES[0])
+    predictor = HybridPredictor(machine.model, machine.new_compensator().predictor.settings, start=0.0)
+    command = 1e-3 * np.sin(0.1 * np.arange(20))
+    predictor.predict(command)
+    predictor.update(0.99 * command)
+    predictor.save(tmp_path / "x.state")
+    given = ("--out", tmp_path, "--weights", tmp_path / "x.state")
+    assert hybridsep("hal", AXES[0], *given)[0] == 0
+    assert (tmp_path / "x" / "weights.bin").read_bytes().startswith(b"HSEPWG")
+    status, out, _ = hybridsep("hal", AXES[0], "--out", tmp_path, "--force")
+    assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
+    assert not (tmp_path / "x" / "weights.bin").exists()
+    status, _, err = hybridsep("hal", *AXES, *given)
+    assert (status, "--weights belong to one axis" in err) == (2, True)
 
-    def test_a_name_that_hal_has_no_room_for_is_refused(self, hybridsep: Run, tmp_path: Path) -> None:
-        file = tmp_path / "long.toml"
-        for letters, options in ((31, ()), (21, ("--predictor",))):
-            for more in (0, 1):
-                text = Path(AXES[0]).read_text(encoding="utf-8")
-                file.write_text(text.replace('name = "x"', f'name = "{"n" * (letters + more)}"'), encoding="utf-8")
-                status, _, err = hybridsep("hal", str(file), "--out", str(tmp_path / "out"), "--force", *options)
-                assert status == 2 * more, err
-                assert (f"at most {letters} letters" in " ".join(err.split())) == bool(more)
 
-    def test_two_axes_of_one_name_are_refused(self, hybridsep: Run, tmp_path: Path) -> None:
-        status, _, err = hybridsep("hal", AXES[0], AXES[0], "--out", str(tmp_path))
-        assert (status, "each axis must have a name of its own" in err) == (2, True)
+@pytest.mark.parametrize(
+    ("machines", "letters", "folder", "options", "said"),
+    [
+        (["emps"], 1, "out", [], "[drive_limits] in the machine file of emps; --predictor writes"),
+        ([], 1, "my axes", [], "at which loadrt takes axes= apart"),
+        ([], 1, "x,y", [], "at which loadrt takes axes= apart"),
+        ([], 1, "a$b", [], "at which loadrt takes axes= apart"),
+        ([], 32, "out", [], "at most 31 letters"),
+        ([], 22, "out", ["--predictor"], "at most 21 letters"),
+        ([AXES[0], AXES[0]], 1, "out", [], "each axis must have a name of its own"),
+    ],
+)
+def test_what_loads_in_no_linuxcnc_is_refused(
+    hybridsep: Run, tmp_path: Path, machines: list[str], letters: int, folder: str, options: list[str], said: str
+) -> None:
+    given: list[object] = [*machines] or [axis(tmp_path, ('name = "x"', f'name = "{"n" * letters}"'))]
+    status, _, err = hybridsep("hal", *given, "--out", tmp_path / folder, *options)
+    assert (status, said in " ".join(err.split())) == (2, True), err
+    assert not (tmp_path / folder).exists()
 
 
 def can_run() -> str:
@@ -194,41 +196,6 @@ def halrun(place: Path, *lines: str) -> subprocess.CompletedProcess[str]:
     shutil.chown(home, USER)
     command = ["runuser", "-u", USER, "--", "env", f"HOME={home}", "halrun", "-f", str(loaded)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
-
-
-@pytest.mark.nightly
-@IN_LINUXCNC
-@pytest.mark.parametrize("enable", [0, 1])
-@pytest.mark.parametrize("faster", [0.95, 1.5, 2.2, 4.0])
-def test_a_rapid_of_any_speed_does_not_step(installed: Path, faster: float, enable: int) -> None:
-    """A move of 120 mm, faster than the limit of 100 mm/s, of a drive that follows by a low-pass."""
-    contour.hybridsep("hal", "spring_mass_damper", "--out", str(installed / "hal"))
-    axis, samples = "hsep.spring_mass_damper", installed / "rapid.txt"
-    samples.touch()
-    shutil.chown(samples, USER)
-    done = halrun(
-        installed,
-        "loadrt threads name1=servo period1=1000000",
-        f"loadrt hsep axes={installed}/hal/spring_mass_damper",
-        *("loadrt limit3 count=1", "loadrt lowpass count=1", "loadrt sampler depth=4000 cfg=ffs"),
-        *(f"addf {name} servo" for name in ("limit3.0", axis, "lowpass.0", "sampler.0")),
-        f"net c limit3.0.out => {axis}.cmd",
-        f"net o {axis}.out => lowpass.0.in sampler.0.pin.0",
-        f"net f lowpass.0.out => {axis}.fb",
-        f"net d {axis}.delayed => sampler.0.pin.1",
-        f"net s {axis}.state => sampler.0.pin.2",
-        *("setp lowpass.0.gain 0.15", f"setp limit3.0.maxv {100.0 * faster}", "setp limit3.0.maxa 2000"),
-        *(f"setp {axis}.active 1", f"setp {axis}.enable {enable}"),
-        *("start", "setp limit3.0.in 120", f"loadusr -w halsampler -n 2500 {samples}"),
-    )
-    out, delayed, state = np.loadtxt(samples).T
-    assert len(out) == 2500, done.stderr
-    assert out[-1] == pytest.approx(120.0, abs=0.01)  # where limit3 stops
-    most = 2e-3 + 16e-3 + 4e-6  # mm a period²: the command's, the limit, six decimals
-    assert np.max(np.abs(np.diff(out, 2))) <= most
-    fast = np.abs(np.diff(delayed, prepend=delayed[0])) > 0.1 * (1 + 1e-4)
-    assert np.max(np.abs(out - delayed)[fast], initial=0.0) < 2e-6
-    assert np.any(state >= 2) == bool(enable)
 
 
 @pytest.mark.nightly

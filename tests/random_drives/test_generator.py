@@ -67,15 +67,6 @@ def test_a_linear_drive_is_its_modal_model(recipes: list[Recipe]) -> None:
         assert np.abs(position - x_d[0] - response).max() < 1e-9
 
 
-def test_friction_takes_energy_out_of_a_vibration() -> None:
-    model = ModalModel.spring_mass_damper(m=1.0, c=1.0, k=10000.0)
-    step = np.concatenate(([0.0], np.full(999, 1e-3)))
-    friction = Disturbances(coulomb=5e-5, static=1.3, presliding=2e-5)
-    free, damped = simulate([model] * 2, [Disturbances(), friction], [step, step])
-    assert np.ptp(damped[-100:]) < 0.2 * np.ptp(free[-100:])
-    assert abs(damped[-100:].mean() - 1e-3) <= 1.3 * friction.coulomb + 1e-9  # it sticks within the friction
-
-
 @pytest.mark.slow
 def test_sub_steps_are_short_enough(recipes: list[Recipe]) -> None:
     some = recipes

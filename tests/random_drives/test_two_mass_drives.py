@@ -75,18 +75,6 @@ def test_a_linear_drive_is_its_modal_model(t_i: float, at_load: bool) -> None:
     assert np.abs(TwoMassDrive(late, step=2e-5).run(x_d) - expected).max() < 1e-12
 
 
-def test_feedforward_is_that_of_the_model_to_first_order_in_the_sampling_interval() -> None:
-    loop = replace(LOOP, feedforward=0.8)
-    errors = []
-    for T_s in (1e-3, 5e-4, 2.5e-4):
-        x_d = np.asarray(0.01 * np.sin(20.0 * T_s * np.arange(round(1.5 / T_s))) ** 2, dtype=np.float64)
-        model = loop.model.discretise(T_s)
-        expected = model.forced_response(model.rest(), x_d)[0]
-        errors.append(rms(TwoMassDrive(axis(loop, T_s)).run(x_d) - expected))
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
-    assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)
-
-
 def test_sliding_friction_holds_the_axis_back_by_its_closed_form() -> None:
     """P/P: ``K_p (K_v e − v) = F_c + 2 b v`` where the velocity is constant, and both bodies move alike."""
     v = 0.05
@@ -100,14 +88,6 @@ def test_sliding_friction_holds_the_axis_back_by_its_closed_form() -> None:
     assert x_d[-1] - x_motor == pytest.approx((v + force / LOOP.k_p) / LOOP.k_v, rel=1e-4)
 
 
-@pytest.mark.parametrize(("share", "slides"), [(0.9, False), (1.1, True)])
-def test_an_axis_breaks_away_at_the_static_friction(share: float, slides: bool) -> None:
-    static = FRICTION.coulomb * FRICTION.stribeck
-    x_d = np.linspace(0.0, share * static / (LOOP.k_p * LOOP.k_v), 4000)
-    x = TwoMassDrive(axis(motor=FRICTION)).run(x_d)
-    assert bool(x[-1] > 3 * FRICTION.presliding * FRICTION.stribeck) is slides
-
-
 def test_backlash_is_the_play_of_the_load() -> None:
     steps = np.repeat([0.0, 0.01, 0.0], 1500)
     x_d = np.asarray(np.convolve(steps, np.full(300, 1 / 300))[: len(steps)], dtype=np.float64)
@@ -116,16 +96,6 @@ def test_backlash_is_the_play_of_the_load() -> None:
     tight, loose = (TwoMassDrive(axis(slow, play=play, bearing=bearing)).run(x_d) for play in (0.0, 2e-4))
     assert tight[2999] - loose[2999] == pytest.approx(1e-4, rel=0.05)
     assert tight[-1] - loose[-1] == pytest.approx(-1e-4, rel=0.05)
-
-
-def test_the_motor_has_no_more_force_than_its_limit() -> None:
-    drive = TwoMassDrive(axis(replace(LOOP, t_i=0.05), force_max=0.5))
-    largest = 0.0
-    for k in range(1500):
-        drive.step(0.02 * float(k > 10))
-        largest = max(largest, abs(float(drive.states()[5])))
-    assert largest == pytest.approx(0.5, rel=0.02)
-    assert drive.x == pytest.approx(0.02, abs=1e-3)  # it arrives, without windup
 
 
 @pytest.mark.slow
