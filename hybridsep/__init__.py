@@ -2,7 +2,7 @@
 
 A linear physics model of the drive predicts, a recursive ridge regression learns online what it misses, and the sum
 stays linear in the command (C.-H. Chou, M. Duan, C. E. Okwudire, CIRP Annals 2021). Start with
-:func:`load_machine`, :class:`HybridPredictor` and :func:`backtest`.
+:func:`fit`, :func:`load_machine`, :class:`HybridPredictor` and :func:`backtest`.
 
 The names below are loaded when they are first used; others are imported from their package.
 """
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .cosim.loop import cosimulate
     from .cosim.run import Run
     from .evaluate.backtest import backtest
+    from .fitting.fit import fit
     from .fmi.archive import build_fmu
     from .fmi.spec import fmu_names
     from .logs.log import Log, read_log
@@ -56,6 +57,7 @@ __all__ = [
     "backtest",
     "build_fmu",
     "cosimulate",
+    "fit",
     "fmu_names",
     "load_machine",
     "machine_names",
@@ -89,6 +91,7 @@ _MODULES = {
     "backtest": "evaluate.backtest",
     "build_fmu": "fmi.archive",
     "cosimulate": "cosim.loop",
+    "fit": "fitting.fit",
     "fmu_names": "fmi.spec",
     "load_machine": "machines.machine",
     "machine_names": "machines.machine",

@@ -68,7 +68,8 @@ def fit(
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     with progress_bar(as_json) as advance:
-        result = fit_logs(used, Np=Np, name=machine, progress=lambda words, done: advance(words, 0.87 * done), **known)
+        given: dict[str, Any] = {"Np": Np, "name": machine, **known}
+        result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
         built = result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in result.findings.items()}

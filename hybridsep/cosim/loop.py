@@ -22,6 +22,7 @@ from ..base.errors import FmuError, ParameterError
 from ..base.signals import as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
+from ..logs.log import Log
 from ..plants.plant import Encoder, Plant
 from ..predict.predictor import HybridPredictor
 from .adapters import Compensator, FmuController, FmuDrive, LibraryController, LibraryDrive, OwnController
@@ -42,7 +43,7 @@ Progress = Callable[[int, int], object]
 def cosimulate(
     controller: str | Path | HybridPredictor | SepCompensator | Compensator,
     plant: str | Path | Plant,
-    r: ArrayLike,
+    r: ArrayLike | Log,
     *,
     controller_values: Mapping[str, Any] | None = None,
     plant_values: Mapping[str, Any] | None = None,
@@ -62,8 +63,8 @@ def cosimulate(
         :class:`~hybridsep.cosim.adapters.Compensator`.
     plant : str, Path or Plant
         An FMU's archive, an object of the library, or one of your own; it is reset to rest at ``r(0)``.
-    r : (n,) array_like, m
-        Commanded positions at ``k·T_s``.
+    r : (n,) array_like, m, or Log
+        Commanded positions at ``k·T_s``, or a log that has them.
     controller_values, plant_values : mapping, optional
         Parameters of an FMU to set before the initialization, for example ``{"compensate": 1}`` and ``{"seed": 3}``.
     encoder : Encoder, optional
@@ -93,7 +94,7 @@ def cosimulate(
     SignalError
         If ``r`` is empty or not finite.
     """
-    command = as_samples(r, "r")
+    command = as_samples(r.x_d if isinstance(r, Log) else r, "r")
     as_samples(command[:1], "r", 1)
     ahead = _controller(controller, controller_values, t_init, start_time)
     drive = _drive(plant, plant_values, encoder, start_time)

@@ -20,6 +20,7 @@ from ..base.metrics import RunningErrors, html_table, last_residual, line_plot, 
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..cosim.run import PREDICTOR, Run
+from ..logs.log import Log
 from ..online.look_ahead import SepState
 from ..predict.predictor import HybridPredictor
 from .verdict import Tally, Verdict
@@ -207,8 +208,8 @@ OnBatch = Callable[[Batch], object]
 
 def backtest(
     predictor: HybridPredictor,
-    x_d: ArrayLike,
-    x_meas: ArrayLike,
+    x_d: ArrayLike | Log,
+    x_meas: ArrayLike = (),
     *,
     starts: Sequence[int] = (0,),
     on_batch: OnBatch | None = None,
@@ -222,7 +223,8 @@ def backtest(
     predictor : HybridPredictor
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
-        Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing.
+        Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
+        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments.
     starts : sequence of int
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     on_batch : callable, optional
@@ -237,6 +239,10 @@ def backtest(
     SignalError
         If the samples are empty, of different lengths or not finite; the predictor is unchanged then.
     """
+    if isinstance(x_d, Log):
+        if abs(x_d.T_s - predictor.T_s) > 0.01 * predictor.T_s:
+            raise SignalError(f"the log has T_s = {x_d.T_s:g} s, the predictor {predictor.T_s:g} s; they must agree")
+        x_meas, starts, x_d = x_d.x_meas, x_d.starts, x_d.x_d
     command = as_samples(x_d, "x_d")
     measured = _measured(predictor, x_meas, "x_meas", len(command))
     batches: list[Batch] = []

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError, IdentificationError, ParameterError, listed
 from ..base.files import plain, written_text, written_whole
-from ..base.metrics import html_table, line_plot, one_line
+from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, PredictorSettings
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
@@ -23,7 +23,7 @@ from ..identify.model import IdentifiedModel, machine_of
 from ..identify.operation import SAMPLES_MIN, TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
 from ..logs.checks import Finding, checked
-from ..logs.log import Log
+from ..logs.log import Log, Table, read_log
 from ..machines.machine import Machine
 from ..machines.text import machine_text
 from ..model.physics import ModalModel
@@ -69,7 +69,7 @@ Progress = Callable[[str, float], object]
 
 @dataclass(frozen=True, repr=False)
 class Fit:
-    """What was found of an axis; it prints as one line, and as a table in a notebook.
+    """What was found of an axis; it prints as one line, and as a table in a notebook. Positions are in m, or rad.
 
     Attributes
     ----------
@@ -104,15 +104,15 @@ class Fit:
     trained: bytes
 
     def __repr__(self) -> str:
-        return one_line("Fit", self._figures())
+        (scale, unit), best = self.judged.unit, self.judged.replay.best()
+        hybrid = self.judged.replay.scored()[-1]
+        errors = f"hybrid {scale * hybrid.rms:.3g} {unit} RMS, {best.name} {scale * best.rms:.3g} {unit}"
+        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, {errors})"
 
     def _repr_html_(self) -> str:
-        return html_table(self.advice, self._figures())
-
-    def _figures(self) -> dict[str, object]:
-        settings, (scale, unit) = self.machine.predictor_settings, self.judged.unit
-        errors = {f"{one.name} [{unit}]": scale * one.rms for one in self.judged.replay.scored()}
-        return {"axis": self.machine.name, **{name: getattr(settings, name) for name in ("Np", "p", "q")}, **errors}
+        scale, unit = self.judged.unit
+        errors = {f"{one.name}, RMS [{unit}]": scale * one.rms for one in self.judged.replay.scored()}
+        return html_table(f"{self.machine.name}, {self.identification.structure}: {self.advice}", errors)
 
     @property
     def advice(self) -> str:
@@ -125,9 +125,12 @@ class Fit:
         predictor.restart()
         return predictor
 
-    def compensator(self) -> SepCompensator:
-        """Return a compensator that begins with what was learned, within the machine's limits of the drive."""
-        return SepCompensator(self.predictor(), self.machine.compensator_settings)
+    def compensator(self, compensate: str = COMPENSATE) -> SepCompensator:
+        """Return a compensator that begins with what was learned, within the machine's limits of the drive.
+
+        ``compensate`` is the best model allowed: ``"off"``, ``"physics"`` or ``"hybrid"``.
+        """
+        return SepCompensator(self.predictor(), replace(self.machine.compensator_settings, compensate=compensate))
 
     def predict(self, x_d: ArrayLike) -> Prediction:
         """Return what is predicted of a motion from rest at its first command, with what was learned.
@@ -242,14 +245,18 @@ class Fit:
 
 @one_blas_thread
 def fit(
-    logs: Log | Sequence[Log],
+    x_d: Log | Sequence[Log] | ArrayLike | Mapping[str, ArrayLike] | Table,
+    x: ArrayLike | None = None,
     *,
+    T_s: float | None = None,
+    unit: str | None = None,
+    columns: Mapping[str, str] | None = None,
     Np: int | None = None,
     name: str = "axis",
     progress: Progress = lambda _message, _done: None,
     **known: float,
 ) -> Fit:
-    """Identify an axis from its logs, choose settings, and judge them on samples that were held out.
+    """Identify an axis from what was recorded of it, choose settings, and judge them on samples that were held out.
 
     The first half of each log is for training: the physics model is identified from it, and settings are chosen by
     causal replays of it. Then the whole is replayed, causally; its second half is the test. What the predictor has
@@ -257,8 +264,12 @@ def fit(
 
     Parameters
     ----------
-    logs : Log or sequence of Log
-        Of one axis, all sampled alike.
+    x_d, x : (n,) array_like
+        Commanded and measured positions; ``x`` is NaN where it is missing. Or alone: a table with these columns, or
+        with others that ``columns`` names; a :class:`~hybridsep.logs.log.Log`, or several of one axis.
+    T_s, unit, columns
+        Of arrays and of a table, as of :func:`~hybridsep.logs.log.read_log`: sampling interval, s, unit of the
+        positions, m if left out, and names. From here on positions are in m, of a rotary axis in rad.
     Np : int, optional
         Samples of the controller's look-ahead; 0.1 s of them if left out.
     name : str
@@ -280,7 +291,7 @@ def fit(
     SignalError
         If a log is too short to be split.
     """
-    logs = (logs,) if isinstance(logs, Log) else tuple(logs)
+    logs = _logs(x_d, x, {"T_s": T_s, "unit": unit, "columns": columns})
     T_s, shown = _common(logs), logs[0].shown
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
@@ -335,6 +346,16 @@ def fit(
     )
     progress("fitted", 1.0)
     return Fit(logs, findings, machine, found, choice, judged, windows, plant, tracking, predictor.to_bytes())
+
+
+def _logs(x_d: Any, x: ArrayLike | None, reading: Mapping[str, Any]) -> tuple[Log, ...]:
+    """Return the logs that :func:`fit` is given, or the log of its arrays."""
+    logs = (x_d,) if isinstance(x_d, Log) else tuple(x_d) if isinstance(x_d, list | tuple) else ()
+    if not logs or not all(isinstance(one, Log) for one in logs):
+        return (read_log(x_d if x is None else {"x_d": x_d, "x": x}, **reading),)
+    if given := [name for name, value in {"x": x, **reading}.items() if value is not None]:
+        raise ParameterError(f"{listed(given, str)} must be left out where a Log is given, which has said them")
+    return logs
 
 
 def _common(logs: Sequence[Log]) -> float:

@@ -1,4 +1,4 @@
-"""Files of named arrays: NumPy's ``.npz``, MATLAB's ``.mat`` up to version 7, and Parquet.
+"""Named arrays: in memory, or in files, NumPy's ``.npz``, MATLAB's ``.mat`` up to version 7, and Parquet.
 
 What a file declares is compared with its size before NumPy, SciPy or pyarrow allocates anything.
 """
@@ -21,7 +21,7 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import N_COLUMNS, ArraysSource, check_column, check_declared
 
-__all__ = ["MatSource", "NpzSource", "ParquetSource"]
+__all__ = ["MatSource", "NpzSource", "ParquetSource", "TableSource"]
 
 _NPY_HEADER_MAX = 10_000
 """Largest header of an array, in bytes, that NumPy reads."""
@@ -59,6 +59,33 @@ def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
 def _qualified(kind: type) -> str:
     """Return an exception's name, with its module where it is called error, as zlib's and struct's are."""
     return f"{kind.__module__}.{kind.__name__}" if kind.__name__ == "error" else kind.__name__
+
+
+class TableSource(ArraysSource):
+    """Columns in memory: a mapping of arrays, or a table with ``columns``, as pandas and polars have it."""
+
+    format = "columns in memory"
+    endings = ()
+
+    def __init__(self, table: Any) -> None:
+        super().__init__(Path("arrays"))
+        names = getattr(table, "columns", table)
+        self._arrays = {str(name): np.asarray(table[name]) for name in names}
+        self.names = list(self._arrays)
+        self.stamps = frozenset(name for name, values in self._arrays.items() if values.dtype.kind in "Mm")
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return False: it is no file."""
+        return False
+
+    def column(self, name: str) -> Array:
+        """Return a column's values, of times the seconds since the first one."""
+        values = self._arrays[name]
+        if name in self.stamps:
+            values = (values - values[:1]) / np.timedelta64(1, "s")
+        check_column(self.path, name, values.shape, values.dtype)
+        return values.astype(np.float64).ravel()
 
 
 class NpzSource(ArraysSource):

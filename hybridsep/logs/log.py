@@ -1,4 +1,4 @@
-"""Recorded logs: :class:`Log`, and :func:`read_log`, which reads one from a file of any format."""
+"""Recorded logs: :class:`Log`, and :func:`read_log`, which reads one from a file of any format, or from arrays."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.errors import LogError, brief
 from ..base.settings import check
 from ..base.signals import Array
+from .arrays import TableSource
 from .columns import COUNT, Column, choose_columns, on_one_clock
 from .formats import open_source
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
@@ -19,7 +22,7 @@ from .source import Block, Source
 from .times import given_times, recorded_times
 from .units import POSITION_UNITS, UNIT_OPTIONS, DisplayUnits, position_unit, shown_of, stated_unit
 
-__all__ = ["Log", "check_reading", "read_log"]
+__all__ = ["Log", "Table", "check_reading", "read_log"]
 
 TRAVEL_MAX = 100.0
 """Largest plausible travel of a linear axis, m; a larger one indicates a log in a smaller unit."""
@@ -32,6 +35,15 @@ _SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm"}
 
 _OWN_NAMES = ("x_d", "x", "x_meas")
 """Names of columns of positions that leave no doubt."""
+
+
+class Table(Protocol):
+    """Table of named columns, as pandas' and polars' DataFrame."""
+
+    columns: Any
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """Return a column, of which NumPy makes an array."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +108,7 @@ class Log:
 
 
 def read_log(
-    path: str | Path,
+    recording: str | Path | Mapping[str, ArrayLike] | Table,
     *,
     columns: Mapping[str, str] | None = None,
     unit: str | None = None,
@@ -105,7 +117,7 @@ def read_log(
     delay: int = 0,
     resample: bool = False,
 ) -> Log:
-    """Read a log as it was recorded: in the order of the file, every sample.
+    """Read a log as it was recorded: in the order of the file, every sample. Its units are said here, and nowhere else.
 
     Measured positions that are missing are NaN. Gaps, and times that go back, begin another segment. What keeps the
     file's meaning is done, and said in :attr:`Log.remarks`: the wraps of a counter and the whole turns of a rotary axis
@@ -113,8 +125,9 @@ def read_log(
 
     Parameters
     ----------
-    path : str or Path
-        In a format of :mod:`hybridsep.logs.formats`; what a file is, its content tells.
+    recording : str, Path, mapping or table
+        A file in a format of :mod:`hybridsep.logs.formats`; what it is, its content tells. Or columns in memory:
+        ``{"x_d": x_d, "x": x}``, or a table such as pandas' DataFrame.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
@@ -140,9 +153,9 @@ def read_log(
     LogError
         If the file, its columns or its times cannot be used.
     """
-    path = Path(path)
     given = check_reading(unit, T_s)
-    source = open_source(path)
+    source = _opened(recording)
+    path = source.path
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
     source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
     source, chosen = on_one_clock(source, chosen, resample=resample)
@@ -176,6 +189,15 @@ def read_log(
         T_recorded=times.T_s,
         columns=(chosen["x_d"].name, chosen["x"].name),
     )
+
+
+def _opened(recording: Any) -> Source:
+    """Return the columns of a file, or of what is in memory."""
+    if isinstance(recording, str | Path):
+        return open_source(Path(recording))
+    if isinstance(recording, Mapping) or hasattr(recording, "columns"):
+        return TableSource(recording)
+    raise LogError(f"a log is a file, a mapping of columns or a table, got {type(recording).__name__}; x beside x_d?")
 
 
 def _read(source: Source, columns: Mapping[str, Column]) -> dict[str, Array]:

@@ -1,0 +1,89 @@
+"""``hybridsep.fit`` of arrays, a table and logs; what it returns."""
+
+from __future__ import annotations
+
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import write_rows
+from staircase_data import commanded, measured
+
+import hybridsep
+from hybridsep.base.errors import LogError, ParameterError, SignalError
+from hybridsep.fitting.fit import Fit
+
+N, NP = 1200, 40
+PART = np.r_[:600, 999:1599]  # moves in each half, between them at rest
+X_D, X = commanded()[PART], measured(0)[PART]
+
+
+class Frame:
+    """Table as pandas has it."""
+
+    def __init__(self, **columns: Any) -> None:
+        self._columns = columns
+        self.columns = list(columns)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._columns[name]
+
+
+@pytest.fixture(scope="module")
+def axis() -> Fit:
+    return hybridsep.fit(1e3 * X_D, 1e3 * X, T_s=1e-3, unit="mm", Np=NP)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("quick_fit")
+def test_arrays_a_table_and_a_file_are_one_log(axis: Fit, tmp_path: Path) -> None:
+    table = Frame(
+        time=np.datetime64("2026-03-05T10:00") + np.arange(N).astype("m8[ms]"), goal=1e3 * X_D, present=1e3 * X
+    )
+    of_table = hybridsep.read_log(table, columns={"x_d": "goal", "x": "present"}, unit="mm")
+    [of_arrays] = axis.logs
+    of_file = hybridsep.read_log(write_rows(tmp_path / "axis.csv", 1e3 * X_D, 1e3 * X), unit="mm")
+    for log in (of_table, of_arrays, of_file):
+        assert (log.T_s, log.unit, log.shown) == (1e-3, "m", of_file.shown)
+        np.testing.assert_allclose((log.x_d, log.x_meas), (X_D, X), rtol=0, atol=1e-12)
+    again = hybridsep.fit([of_table], Np=NP).judged.replay.rms()
+    assert again == pytest.approx(axis.judged.replay.rms(), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_what_is_returned_predicts_compensates_and_shows_itself(axis: Fit, tmp_path: Path) -> None:
+    rms_pb, _, rms_h = axis.judged.replay.rms()
+    assert repr(axis) == f"Fit(axis: Np = {NP}, hybrid {1e6 * rms_h:.3g} µm RMS, {axis.judged.replay.best().name} " + (
+        f"{1e6 * axis.judged.replay.best().rms:.3g} µm)"
+    )
+    shown = unescape(axis._repr_html_())
+    assert axis.advice in shown
+    assert f"<td>physics model, RMS [µm]</td><td>{1e6 * rms_pb:.4g}</td>" in shown
+    assert [line.get_label() for line in axis.plot().axes[0].get_lines()] == ["physics model", "hold", "hybrid"]
+    window = axis.predict(X_D[:NP])
+    np.testing.assert_array_equal(window.x_h, axis.predictor().predict(X_D[:NP]).x_h)
+    [log] = axis.logs
+    again = hybridsep.backtest(axis.predictor(), log)
+    assert again.overall == hybridsep.backtest(axis.predictor(), log.x_d, log.x_meas).overall
+    plant = hybridsep.load_machine("spring_mass_damper").new_plant()
+    off, hybrid = (hybridsep.cosimulate(axis.compensator(how), plant, log).tracking_rms for how in ("off", "hybrid"))
+    assert hybrid < 0.2 * off
+    axis.report(tmp_path / "report.html")
+    assert axis.advice in unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+
+
+def test_what_cannot_be_is_refused(axis: Fit) -> None:
+    [log] = axis.logs
+    with pytest.raises(LogError, match=r"a log is a file, a mapping of columns or a table, got ndarray; x beside x_d"):
+        hybridsep.fit(X_D, T_s=1e-3)
+    with pytest.raises(LogError, match=r"arrays: column 'x' .* T_s \(--T_s\)|columns? 't'"):
+        hybridsep.fit(X_D, X)
+    with pytest.raises(ParameterError, match="T_s, unit must be left out where a Log is given"):
+        hybridsep.fit(log, T_s=1e-3, unit="mm")
+    with pytest.raises(LogError, match="all columns must have the same number of samples"):
+        hybridsep.fit(X_D, X[1:], T_s=1e-3)
+    slow = hybridsep.read_log({"x_d": X_D, "x": X}, T_s=2e-3)
+    with pytest.raises(SignalError, match=r"the log has T_s = 0\.002 s, the predictor 0\.001 s; they must agree"):
+        hybridsep.backtest(axis.predictor(), slow)
