@@ -160,16 +160,15 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0;
- * following_error_max, m, from the next sample on, 0: none.
- * Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at x_d. With
- * compensate off the command follows that remainder. Where it is larger than change_max, it is the bound. Return
- * whether they were taken: not, with nothing changed, where one is out of its range. */
+ * following_error_max, m, which counts from the next sample on, 0: none. Every plan goes on from the remainder of the
+ * last plan, which keeps the drive's limits and ends at x_d. With compensate off the command follows that remainder.
+ * Where it is larger than change_max, it is the bound. Return whether they were taken: not, with nothing changed, where
+ * one is out of its range. */
 HSEP_API int hsep_compensator_change(
     hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max);
 
-/* End a trip where the level of the reset rises. It trips where x_meas is farther from the command as it came than
- * following_error_max for three samples in a row: from the next window on the change fades, as with compensate off; what
- * was learned stays. */
+/* End a trip where the level of the reset rises; what was learned stays. It trips where x_meas is farther from x_d than
+ * following_error_max for three samples in a row: from the next window on the change fades, as with compensate off. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */

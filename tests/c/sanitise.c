@@ -77,7 +77,8 @@ int main(int n_arguments, char *arguments[])
 
     /* What must be refused changes nothing. */
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        if (hsep_table_row(&hsep_table, i)->causality == HSEP_INPUT) {
+        const hsep_variable *row = hsep_table_row(&hsep_table, i);
+        if (row->causality == HSEP_INPUT && row->kind == HSEP_REAL) {
             const double before = values[i];
             values[i] = strcmp(hsep_table_name(&hsep_table, i, variable), "x_meas") == 0 ? HUGE_VAL
                                                                                          : NAN; /* NaN may be missing */

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compensator_cases import DRIVE_LIMITS, beyond, closed, compensator, turned
+from compensator_cases import DRIVE_LIMITS, MODEL, beyond, closed, compensator, move, turned
 from staircase_data import commanded
 
 from hybridsep.base.errors import ParameterError, SignalError, StateError
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS
+from hybridsep.predict.predictor import HybridPredictor
 
 
 @pytest.mark.slow
@@ -100,6 +102,23 @@ def test_only_what_is_tunable_changes_in_a_run() -> None:
     sep.change(compensate="physics", change_max=None)
     assert sep.compensate is SepState.PHYSICS
     assert SepCompensator.from_bytes(sep.to_bytes()).settings == sep.settings
+
+
+def test_windows_are_monitored_as_samples_are() -> None:
+    """Sample by sample, on every implementation: tests/suite/test_monitor.py."""
+    predictor = HybridPredictor(MODEL, PredictorSettings(Np=50, p=10, measurement_delay=2))
+    sep = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS, following_error_max=1e-6))
+    x_d = move(400)
+    late = np.concatenate((np.zeros(2), x_d))
+    for k in (0, 50, 100):
+        assert sep.plan(x_d[k : k + 200]).state != SepState.OFF
+        assert not sep.monitor.is_tripped
+        sep.update(late[k : k + 50] + 2e-6 * np.isin(np.arange(k, k + 50), (98, 99, 100)))
+    assert sep.monitor.is_tripped
+    assert sep.plan(x_d[150:350]).state == SepState.OFF
+    sep.monitor.reset()
+    assert sep.plan(x_d[150:350]).state != SepState.OFF
+    assert not SepCompensator.from_bytes(sep.to_bytes()).monitor.is_tripped
 
 
 def test_bad_samples_change_nothing() -> None:
