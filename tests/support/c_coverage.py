@@ -2,7 +2,7 @@
 
 The C core's test libraries and programs and the native FMUs' libraries of this machine are compiled with counters, by a
 wrapper of gcc 11 or newer that gives each compilation a folder of its own below FOLDER; afterwards gcov's counts are
-added up over all of them, line by line and branch by branch. Processes that are killed write no counts.
+added up over all of them, line by line. Processes that are killed write no counts.
 """
 
 from __future__ import annotations
@@ -53,53 +53,26 @@ def count_in(folder: Path) -> None:
 
 
 def table(folder: Path) -> str:
-    """Return lines and branches reached, by file, as text."""
+    """Return how many lines there are and which were not reached, by file, as text."""
     lines: dict[str, dict[int, int]] = {}
-    branches: dict[str, dict[tuple[int, int], int]] = {}
     ours = {path.name for path in C_SOURCES.rglob("*.[ch]")}
     for report in _reports(folder):
         for file in report["files"]:
             name = Path(file["file"]).name
-            if name not in ours:
-                continue
-            counted, taken = lines.setdefault(name, {}), branches.setdefault(name, {})
-            for line in file["lines"]:
-                number = line["line_number"]
-                counted[number] = counted.get(number, 0) + line["count"]
-                for i, branch in enumerate(line["branches"]):
-                    taken[number, i] = taken.get((number, i), 0) + branch["count"]
-    (folder / "missed.json").write_text(
-        json.dumps(
-            {
-                name: [
-                    [n for n, count in sorted(lines[name].items()) if not count],
-                    [place for place, count in sorted(branches[name].items()) if not count],
-                ]
-                for name in sorted(lines)
-            }
-        )
-    )
-    rows = [f"{'C file':36}{'lines':>8}{'missed':>8}{'branches':>10}{'missed':>8}"]
-    total = [0, 0, 0, 0]
-    for name in sorted(lines):
-        figures = [
-            len(lines[name]),
-            sum(not count for count in lines[name].values()),
-            len(branches[name]),
-            sum(not count for count in branches[name].values()),
-        ]
-        total = [a + b for a, b in zip(total, figures, strict=True)]
-        rows.append("{:36}{:8}{:8}{:10}{:8}".format(name, *figures))
-    rows.append("{:36}{:8}{:8}{:10}{:8}".format("all", *total))
-    if total[0]:
-        rows.append(f"lines {100 - 100 * total[1] / total[0]:.2f} %, branches {100 - 100 * total[3] / total[2]:.2f} %")
-    return "\n".join(rows)
+            if name in ours:
+                counted = lines.setdefault(name, {})
+                for line in file["lines"]:
+                    counted[line["line_number"]] = counted.get(line["line_number"], 0) + line["count"]
+    missed = {name: [n for n, count in sorted(counted.items()) if not count] for name, counted in sorted(lines.items())}
+    rows = [f"{name:36}{len(lines[name]):8}  {', '.join(map(str, numbers))}" for name, numbers in missed.items()]
+    total, reached = (sum(map(len, of.values())) for of in (lines, missed))
+    return "\n".join([*rows, f"{total} lines, {100 - 100 * reached / max(total, 1):.2f} % reached"])
 
 
 def _reports(folder: Path) -> Iterator[dict[str, Any]]:
     for counts in folder.glob("*/*.gcda"):
         done = subprocess.run(
-            ["gcov", "--json-format", "--stdout", "--branch-probabilities", counts],
+            ["gcov", "--json-format", "--stdout", counts],
             cwd=counts.parent,
             capture_output=True,
             check=False,
