@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from compensator_cases import DRIVE_LIMITS, MODEL, beyond, closed, compensator, move, turned
-from staircase_data import commanded
 
-from hybridsep.base.errors import ParameterError, SignalError, StateError
+from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
-from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
@@ -59,33 +57,6 @@ def test_trouble_never_makes_it_worse_than_physics(trouble: str) -> None:
     assert np.isfinite(hybrid.x_dm).all()
     assert beyond(hybrid.x_dm, limits) <= 1.0 + 1e-9
     assert np.max(np.abs(hybrid.x_dm - hybrid.x_d)) <= 1e-3
-
-
-@pytest.mark.parametrize(("planned", "no_reversal"), [(False, True), (True, False)])
-def test_a_saved_state_goes_on_bit_for_bit(planned: bool, no_reversal: bool) -> None:
-    r = np.concatenate((commanded()[900:2600], np.zeros(200)))
-    rng = np.random.default_rng(0)
-    sep = compensator(Np=50, p=20, q=3, t_init=0.1, no_reversal=no_reversal)
-
-    def window(one: SepCompensator, k: int, noise: Array) -> Array:
-        plan = one.plan(r[k : k + 200])
-        one.update(plan.x_pb + 1e-5 * np.sin(r[k : k + 50] * 300) + noise)
-        return plan.x_dm
-
-    for k in range(0, 600, 50):
-        window(sep, k, 5e-6 * rng.normal(size=50))
-    if planned:
-        sep.plan(r[600:800])
-    other = SepCompensator.from_bytes(sep.to_bytes())
-    assert other.to_bytes() == sep.to_bytes()
-    assert other.settings == sep.settings
-    assert sep.settings.no_reversal is no_reversal
-    for k in range(600, 1200, 50):
-        noise = 5e-6 * rng.normal(size=50)
-        np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))
-    assert other.to_bytes() == sep.to_bytes()
-    with pytest.raises(StateError, match="kind 'compensator' was expected, got one of kind 'predictor'"):
-        SepCompensator.from_bytes(sep.predictor.to_bytes())
 
 
 def test_only_what_is_tunable_changes_in_a_run() -> None:

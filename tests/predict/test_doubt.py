@@ -13,7 +13,8 @@ from random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, MODEL_RESIDUAL
+from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, MODEL_RESIDUAL, Regression
+from hybridsep.predict.averaging.model import AveragedModel
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-6  # m
@@ -54,25 +55,21 @@ def test_what_has_not_changed_keeps_what_was_learned() -> None:
     assert averaged_model(warm).evidence[MODEL_RESIDUAL].n_rows == pytest.approx(carried + len(x_d))
 
 
+def assert_doubts(model: AveragedModel, leading: Regression) -> None:
+    """Assert that the expert that doubts begins with the evidence of the one that led."""
+    stack, fresh, led = model.learned.stack, FRESH_START.place, leading.place
+    assert model.doubts
+    assert stack.gram[fresh, fresh] == stack.gram[led, led] > 0.0
+    assert stack.cross[fresh] == stack.cross[led]
+    assert model.learned.errors_of(FRESH_START).noise_variance == model.learned.errors_of(leading).noise_variance > 0.0
+
+
 def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert_it_doubts() -> None:
     x_d = cycles(2 * PERIOD)
     model = averaged_model(learned(x_d, friction(x_d)))
-    assert model.doubts
-    evidence = model.evidence[MODEL_RESIDUAL]
-    assert evidence.all(CONSTANTS.warm_prior_weight).n_rows == pytest.approx(
-        CONSTANTS.warm_prior_weight * evidence.n_rows
-    )
-    assert (
-        model.learned.stack.gram[FRESH_START.place, FRESH_START.place]
-        == model.learned.stack.gram[ARX_RESIDUAL.place, ARX_RESIDUAL.place]
-        > 0.0
-    )
-    assert model.learned.stack.cross[FRESH_START.place] == model.learned.stack.cross[ARX_RESIDUAL.place]
-    assert (
-        model.learned.errors_of(FRESH_START).noise_variance
-        == model.learned.errors_of(ARX_RESIDUAL).noise_variance
-        > 0.0
-    )
+    evidence, weight = model.evidence[MODEL_RESIDUAL], CONSTANTS.warm_prior_weight
+    assert evidence.all(weight).n_rows == pytest.approx(weight * evidence.n_rows)
+    assert_doubts(model, ARX_RESIDUAL)
 
 
 @pytest.mark.slow
@@ -87,14 +84,7 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     warm.restart()
     model = averaged_model(warm)
     assert model.leading == ARX_COMMAND
-    assert (
-        model.learned.stack.gram[FRESH_START.place, FRESH_START.place]
-        == model.learned.stack.gram[ARX_COMMAND.place, ARX_COMMAND.place]
-        > 0.0
-    )
-    assert (
-        model.learned.errors_of(FRESH_START).noise_variance == model.learned.errors_of(ARX_COMMAND).noise_variance > 0.0
-    )
+    assert_doubts(model, ARX_COMMAND)
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
     assert not averaged_model(warm).doubts
