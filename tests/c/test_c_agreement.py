@@ -21,10 +21,7 @@ LOOPS = [
 AT_NIGHT = [
     *((seed, "spring_mass_damper", {"change_max": 1e-4}) for seed in (213, 225, 231, 233)),
     *((seed, "als25010_x", {"change_max": 1e-4}) for seed in (261, 264)),
-    *((seed, "spring_mass_damper", {}) for seed in (241, 250, 256)),
-    (267, "als25010_x", {}),
     *((seed, "als25010_y", {"averaging": 1}) for seed in (4, 7)),
-    (9, "als25010_x", {"averaging": 1}),
 ]
 
 

@@ -10,7 +10,6 @@ import sys
 from itertools import product
 from pathlib import Path
 
-import numpy as np
 import pytest
 import staircase_data as staircase
 from c_compiler import C_SOURCES, compiler, include_flags
@@ -20,12 +19,9 @@ from library_models import trained_state
 from places import ROOT
 from spoiled_weights import spoiled
 
-from hybridsep import backtest
-from hybridsep.base.settings import PARAMETERS, PredictorSettings
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.fmi.weights import weights_file
-from hybridsep.logs.formats import write_example
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 CONSUMER = ROOT / "tests" / "c" / "consumer"
@@ -59,21 +55,6 @@ def test_pkg_config_tells_where_it_is(tmp_path: Path) -> None:
     cflags, libs = (fields[name].replace("${prefix}", prefix).split() for name in ("Cflags", "Libs"))
     subprocess.run([*compiler(), *cflags, CONSUMER / "main.c", *libs, "-o", tmp_path / "main"], check=True)
     assert program(tmp_path / "main") == "9 1\n"
-
-
-@pytest.mark.slow
-def test_a_log_is_replayed(tmp_path: Path) -> None:
-    """The example prints what the library's replay finds, of the log that hybridsep writes."""
-    log = tmp_path / "log.csv"
-    write_example(log)
-    lines = log.read_text(encoding="utf-8").splitlines()[:6002]  # 6 s of it
-    log.write_text("\n".join(lines), encoding="utf-8")
-    said = program(installed() / "build" / "replay", log, 100, 25.0, 0.05)
-    _, x_d, x = 1e-3 * np.array([list(map(float, line.split(","))) for line in lines[2:]]).T
-    model = ModalModel([Mode(25.0, 0.05, (50.0 * math.pi) ** 2, 0.0)])
-    found = backtest(HybridPredictor(model, PredictorSettings(Np=100)), x_d, x).summary()
-    printed = [float(number) for number in re.findall(r"\d+\.\d+", said)]
-    assert printed == pytest.approx([found[name] for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")], abs=2e-3)
 
 
 @pytest.mark.slow

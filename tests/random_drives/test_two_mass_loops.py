@@ -30,13 +30,6 @@ def x_d(recipe: Recipe) -> Array:
 
 
 @pytest.mark.slow
-def test_off_is_the_drive_alone(recipe: Recipe, x_d: Array) -> None:
-    loop = closed_loop(recipe, recipe.axis, "off")
-    assert np.array_equal(loop.x_dm, x_d)
-    assert largest(loop.x - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)) < 1e-12
-
-
-@pytest.mark.slow
 def test_the_physics_models_plans_do_not_depend_on_the_measurement(recipe: Recipe, x_d: Array) -> None:
     planned = closed_loop(recipe, recipe.axis, "physics")
     assert largest(planned.x_dm - x_d) > 1e-4

@@ -37,25 +37,19 @@ def test_the_commit_of_a_checkout(tmp_path: Path) -> None:
     assert commit(tmp_path / "inside") == ""
 
 
-def test_the_commit_of_a_wheel_is_its_file(tmp_path: Path) -> None:
+def test_without_git_the_commit_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a wheel; git refuses the folder, or is not there."""
+    (tmp_path / ".git").mkdir()
+    assert commit(tmp_path) == ""
+    monkeypatch.setenv("PATH", str(tmp_path))
     assert commit(tmp_path) == ""
     (tmp_path / COMMIT_FILE).parent.mkdir(parents=True)
     (tmp_path / COMMIT_FILE).write_text("0123456789ab\n")
+    (tmp_path / ".git").rmdir()
     assert commit(tmp_path) == "0123456789ab"
-
-
-def test_without_git_there_is_no_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / ".git").mkdir()
-    assert commit(tmp_path) == ""  # git refuses the folder
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert commit(tmp_path) == ""
-
-
-def test_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.base.version.commit", lambda: "0123456789ab")
-    assert version_text() == f"{__version__} (0123456789ab)"
-    monkeypatch.setattr("hybridsep.base.version.commit", lambda: "")
-    assert version_text() == __version__
+    for found, text in (("0123456789ab", f"{__version__} (0123456789ab)"), ("", __version__)):
+        monkeypatch.setattr("hybridsep.base.version.commit", lambda found=found: found)
+        assert version_text() == text
 
 
 def test_every_file_that_states_the_version_states_the_same() -> None:

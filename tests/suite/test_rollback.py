@@ -140,21 +140,6 @@ def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
     assert steps(stream, 110, 200) == expected
 
 
-@on_adapters((PREDICTOR,))
-def test_a_reset_ends_averaging(new_stream: StreamMaker) -> None:
-    stream, fresh = new_stream(), new_stream()
-    initialise(stream, averaging=True)
-    with_averaging = steps(stream, 0, 150)
-    stream.reset()
-    for each in (stream, fresh):
-        initialise(each)
-    expected = steps(fresh, 0, 150)
-    assert steps(stream, 0, 150) == expected != with_averaging
-    stream.reset()
-    initialise(stream, averaging=True)
-    assert steps(stream, 0, 150) == with_averaging
-
-
 @pytest.mark.slow
 def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> None:
     """Of library and native FMUs; the others save the same."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
 from driving import SHORT, T_S, set_inputs, steps
 from stream import (
@@ -60,25 +58,3 @@ def test_instances_side_by_side_do_what_each_does_alone(new_stream: StreamMaker)
             row.append(stream.outputs())
     assert rows == expected
     assert len({str(row) for row in rows}) == len(kinds)
-
-
-@pytest.mark.slow
-@on_all(LOOK_AHEADS)
-def test_threads_with_an_instance_each(new_stream: StreamMaker) -> None:
-    values = SHORT[new_stream.model]
-    alone = new_stream()
-    alone.initialise(values)
-    expected = steps(alone, 0, N_SAMPLES)
-    results = {}
-
-    def run(i: int) -> None:
-        stream = new_stream()
-        stream.initialise(values)
-        results[i] = steps(stream, 0, N_SAMPLES)
-
-    threads = [threading.Thread(target=run, args=(i,)) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert results == dict.fromkeys(range(4), expected)

@@ -26,20 +26,6 @@ ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 
 
 @on_adapters(ALL, needs="stop time")
-def test_a_step_begins_before_the_stop_time(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    stream.initialise({}, stop=0.0305)
-    t = 0.0
-    while t < 0.0304:
-        stream.step(t, 4e-3)  # the last one ends beyond the stop time
-        t += 4e-3
-    with pytest.raises(
-        RefusedStreamError, match=r"a step must begin before the stop time 0.0305 s, got one from 0.032"
-    ):
-        stream.step(t, 4e-3)
-
-
-@on_adapters(ALL, needs="stop time")
 def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({}, stop=0.1)
@@ -48,7 +34,7 @@ def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> No
         stream.step(t, T_S)
         t += T_S
     assert t != 0.1
-    with pytest.raises(RefusedStreamError, match="before the stop time"):
+    with pytest.raises(RefusedStreamError, match=r"a step must begin before the stop time 0.1 s, got one from 0.1"):
         stream.step(t, T_S)
 
 
@@ -127,12 +113,6 @@ def test_no_output_follows_from_a_start_value_that_is_no_position(
         new_stream().outputs_before({command: start})
 
 
-@on_adapters(LOOK_AHEADS, needs="outputs before")
-def test_a_missing_first_measurement_hides_no_output(new_stream: StreamMaker) -> None:
-    shown = new_stream().outputs_before({**AT_REST[new_stream.model], "x_meas": math.nan})
-    assert shown == at_rest(new_stream.model, sep_state=1.0)
-
-
 @on_adapters((COMPENSATOR,))
 @pytest.mark.parametrize(("compensate", "state"), [(0, 0), (1, 1), (2, 1)])
 def test_the_model_that_plans_first(new_stream: StreamMaker, compensate: int, state: int) -> None:
@@ -147,7 +127,10 @@ def test_a_reset_forgets_everything(new_stream: StreamMaker) -> None:
     stream, fresh = new_stream(), new_stream()
     initialise(fresh)
     expected = steps(fresh, 0, 300)
-    for values in ({"x_d_ahead": 0.1, "q": 1}, {"x_d_ahead": -0.2, "lambda": 1e-9}):
+    for values in (
+        {"x_d_ahead": 0.1, "q": 1, "averaging": True},
+        {"x_d_ahead": -0.2, "lambda": 1e-9, "averaging": False},
+    ):
         other = {"x_d": 0.1, "seed": 5} if "FeedDrive" in new_stream.model else values
         initialise(stream, **other)
         steps(stream, 0, 130)

@@ -282,17 +282,3 @@ def test_plants_move_the_same_in_any_steps(new_stream: StreamMaker, step: str) -
     n = min(map(len, runs))
     np.testing.assert_allclose(runs[0][:n], runs[1][:n], rtol=0, atol=1e-9)
     assert np.ptp(runs[0]) > 1e-3
-
-
-@on_all((PREDICTOR,))
-def test_many_windows_in_one_step(new_stream: StreamMaker) -> None:
-    # One step of 2 s is 100 windows, each solved in turn.
-    long, single = new_stream(), new_stream()
-    for each in (long, single):
-        initialise(each)
-        steps(each, 0, 200)
-        set_inputs(each, 0.2)
-    long.step(0.2, 2.0)
-    for k in range(2000):
-        single.step(0.2 + k * T_S, T_S)
-    assert long.outputs() == single.outputs()

@@ -175,11 +175,3 @@ def test_what_was_learned_with_averaging_is_all_there_again(new_stream: StreamMa
     np.testing.assert_allclose(runs[2], runs[1], rtol=0, atol=tolerance)
     rms_h = OUTPUTS[PREDICTOR].index("rms_h")
     assert runs[1][-1, rms_h] != runs[0][-1, rms_h]
-
-
-@on_adapters(LOOK_AHEADS)
-def test_what_was_learned_with_averaging_is_for_no_other_model(new_stream: StreamMaker) -> None:
-    stream = new_stream.planted(learned_with_averaging())
-    said = "averaging must be 1, with which this FMU was trained (weights.bin), got 0"
-    with pytest.raises(RefusedStreamError, match=re.escape(said)):
-        stream.initialise({"p": 20, "averaging": False})

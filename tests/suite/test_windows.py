@@ -125,14 +125,6 @@ def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> Non
     np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
 
 
-@pytest.mark.slow
-@on_all((PREDICTOR,))
-def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
-    shown, moved = (shown_by(new_stream, 1700, {}, start) for start in (0.0, 0.1))
-    for name in ("x_d", "x_pb", "x_h"):
-        np.testing.assert_allclose(moved[name] - 0.1, shown[name], rtol=0, atol=1e-10)
-
-
 @on_all(LOOK_AHEADS)
 def test_the_warm_up_counts_from_the_end_of_the_fill(new_stream: StreamMaker) -> None:
     # A plan with averaging acts 24 samples after its window begins.
