@@ -170,7 +170,7 @@ def _print_tracking(
     console.print(
         f"command to the drive: at most {1e3 * peaks[0]:.1f} mm/s, {peaks[1]:.2f} m/s², {peaks[2]:.0f} m/s³\n"
         f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
-        f"not compensated {summary['share_off']:.1%} of the samples"
+        f"not compensated {summary['share_off']:.1%}, tripped {summary['share_tripped']:.1%} of the samples"
     )
     if limits is not None:
         console.print(binding_words(limits))
