@@ -1,6 +1,6 @@
 """FMU build script: ``python build_fmu.py [--machine X.toml] [--flavour python] [--fmi 3] [--out dist] [FMU …]``.
 
-A thin front of ``hybridsep build``; without arguments all FMUs go to ``dist/``.
+A thin front of ``hybridsep build``; without arguments the FMUs of the paper's staircase go to ``dist/``.
 """
 
 from __future__ import annotations

@@ -40,7 +40,6 @@ __all__ = [
     "print_json",
     "print_run",
     "print_scores",
-    "print_without_first",
     "print_written",
     "progress_bar",
     "warn_of_estimates",
@@ -127,13 +126,6 @@ def print_scores(
                 table.add_row(label_text, *shown_sizes, *ratios)
     console.print(table)
     console.print(str(verdict))
-
-
-def print_without_first(rms: Mapping[str, float], shown: DisplayUnits) -> None:
-    """Print RMS errors, m or rad, without the first window of a log in motion, by their names in summaries."""
-    factor, name = shown.error(rms["pb"])
-    figures = ", ".join(f"{peer} {shown_figure(factor * rms[key])}" for key, peer in PREDICTIONS.items() if key in rms)
-    console.print(f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.")
 
 
 def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:

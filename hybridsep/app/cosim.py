@@ -133,21 +133,7 @@ def _check_pair(
     flavour: str,
     entries: Sequence[str],
 ) -> None:
-    """Check a co-simulation's two FMUs: those that are given, and that the others can be built.
-
-    Parameters
-    ----------
-    axis : Machine
-    model : {"HybridPredictor", "SepCompensator"}
-        The look-ahead.
-    predictor, plant : Path, optional
-        Archives; built if left out.
-    weights : Path, optional
-        For a look-ahead that is built.
-    flavour : {"native", "python"}
-    entries : sequence of str
-        Other values of the machine's entries, which count where an FMU is built.
-    """
+    """Check the FMUs of a look-ahead ``model`` and a plant: those that are given, and that the others can be built."""
     from ..cosim.adapters import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
     from ..fmi.compile import check_available

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..base.errors import ParameterError
+from ..base.files import DEFAULT_MACHINE
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .options import ForceOption, TargetOption, UnitOption, WeightsOption
+from .options import ForceOption, MachineOption, TargetOption, UnitOption, WeightsOption
 
 if TYPE_CHECKING:
-    from ..fmi.compile import Library
     from ..machines.machine import Machine
-
-    Job = tuple[Machine, str, str]
-    """An FMU to build: its machine, name and model."""
 
 __all__ = ["build", "hal", "header"]
 
@@ -28,12 +25,9 @@ CONTROLLERS = ("twincat",)
 
 def build(
     fmus: Annotated[
-        list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machines' if left out.")
+        list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machine's if left out.")
     ] = None,
-    machine: Annotated[
-        list[str] | None,
-        typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
-    ] = None,
+    machine: MachineOption = DEFAULT_MACHINE,
     flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
     fmi: Annotated[
         str,
@@ -48,13 +42,9 @@ def build(
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
     unit: UnitOption = None,
-    windows: Annotated[
-        bool,
-        typer.Option(
-            "--windows/--no-windows",
-            help="Whether a HybridPredictor shows its whole window, 4·Np scalars or four arrays.",
-        ),
-    ] = True,
+    no_windows: Annotated[
+        bool, typer.Option("--no-windows", help="Without a HybridPredictor's window, 4·Np scalars or four arrays.")
+    ] = False,
     embed_weights: Annotated[
         bool,
         typer.Option(
@@ -73,46 +63,49 @@ def build(
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
 ) -> None:
-    """Build FMUs from machine files.
+    """Build FMUs from a machine file.
 
     The same machine gives the same bytes.
     """
     from ..fmi.archive import build_fmu
-    from ..fmi.compile import library_paths, missing
+    from ..fmi.compile import default_targets, expanded, library_paths, missing
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
-    from ..machines.machine import machine_path
+    from ..fmi.spec import table_of
+    from ..machines.machine import load_machine, machine_path
     from .console import check_outputs, print_built, progress_bar, warn_of_estimates
 
-    if embed_weights and flavour != "native":
-        raise ParameterError(f"--embed-weights is for native FMUs; with --flavour {flavour} leave it out")
+    native = {
+        "--embed-weights": embed_weights,
+        f"--for {controller}": controller is not None,
+        "--target": bool(target),
+    }
+    if wrong := [option for option, given in native.items() if given and flavour != "native"]:
+        raise ParameterError(f"{wrong[0]} is for native FMUs; with --flavour {flavour} leave it out")
     if controller is not None and controller not in CONTROLLERS:
         raise ParameterError(f"--for must be {' or '.join(CONTROLLERS)}, got {controller}")
-    if controller is not None and flavour != "native":
-        raise ParameterError(f"--for {controller} is for native FMUs; with --flavour {flavour} leave it out")
-    jobs = _jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
-    if controller is not None:
-        jobs = _without_files(jobs, f"--for {controller}", named=bool(fmus))
+    axis = load_machine(machine)
+    models = _models(axis, fmus or [], flavour, target or [], fmi)
+    if controller is not None:  # whose sources open no files
+        if fmus and "ReferenceTrajectory" in models.values():
+            raise ParameterError(f"--for {controller} is for FMUs that open no files; ReferenceTrajectory plays files")
+        models = {name: model for name, model in models.items() if model != "ReferenceTrajectory"}
         embed_weights = embed_weights or weights is not None
-    extras = _extras_of(jobs, weights, trajectory, unit, windows=windows, embed_weights=embed_weights)
-    inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
-    check_outputs(
-        [
-            *(("--out", out / f"{name}.fmu", ()) for _, name, _ in jobs),
-            *([("--out", out / CONFIGURATION_FILE, ())] if controller else []),
-        ],
-        {**inputs, "saved predictor": weights, "trajectory": trajectory},
-        force=force,
-    )
-    warn_of_estimates({axis.name: axis for axis, _, model in jobs if model == "SepCompensator"}.values())
+    extras = _extras_of(axis, models, weights, trajectory, unit, no_windows=no_windows, embed_weights=embed_weights)
+    names = [*(f"{name}.fmu" for name in models), *([CONFIGURATION_FILE] if controller else [])]
+    inputs = {"machine file": machine_path(machine), "saved predictor": weights, "trajectory": trajectory}
+    check_outputs([("--out", out / name, ()) for name in names], inputs, force=force)
+    if "SepCompensator" in models.values():
+        warn_of_estimates([axis])
     paths = []
     with progress_bar(False) as advance:
         if flavour == "native":
-            needed = _libraries_of(jobs, target or [])
+            kinds = dict.fromkeys(table_of(axis, model, name).kind for name, model in models.items())
+            needed = [(kind, one) for one in expanded(target or default_targets()) for kind in kinds]
             made = iter(range(1, (n := len(missing(needed))) + 1))
             advance(f"compile {n} libraries", 0.0)
             library_paths(needed, lambda one: advance(f"compiled {one[0]} for {one[1]}", next(made) / n))
-        for i, (axis, name, model) in enumerate(jobs):
-            advance(name, i / len(jobs))
+        for i, (name, model) in enumerate(models.items()):
+            advance(name, i / len(models))
             given = {"targets": target or None, "fmi": fmi, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
         if controller is not None:
@@ -121,102 +114,65 @@ def build(
     print_built(paths)
 
 
-def _jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str) -> list[Job]:
-    """Return the FMUs to build, all of the machines' if none is named."""
+def _models(axis: Machine, fmus: Sequence[str], flavour: str, targets: Sequence[str], fmi: str) -> dict[str, str]:
+    """Return the FMUs to build, all of the machine's if none is named: name → model."""
     from ..fmi.compile import check_available
     from ..fmi.spec import fmu_names
-    from ..machines.machine import load_machine, machine_names
 
     check_version(flavour, fmi)
-    jobs = [
-        (axis, name, model)
-        for axis in map(load_machine, machines or machine_names())
-        for name, model in fmu_names(axis, flavour, fmi).items()
-    ]
-    if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
-        without = dict.fromkeys(axis.name for axis, _, _ in jobs if axis.drive_limits is None)
+    models = fmu_names(axis, flavour, fmi)
+    if unknown := sorted(set(fmus) - set(models)):
         hint = ""
-        if without and any(name.startswith("SepCompensator") for name in unknown):
-            hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
+        if axis.drive_limits is None and any(name.startswith("SepCompensator") for name in unknown):
+            hint = f"; {axis.name} has no [drive_limits], which a compensator needs"
         if fmi == FMI_VERSIONS[0] and any("Fmi3" in name for name in unknown):
             hint += "; FMUs of FMI 3.0 need --fmi 3"
-        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}{hint}")
-    if targets and flavour != "native":
-        raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
+        raise ParameterError(f"no FMU {', '.join(unknown)} of {axis.name}; there are {', '.join(models)}{hint}")
     if flavour == "native":
         check_available(targets or ("host",))
-    return [job for job in jobs if not fmus or job[1] in fmus]
-
-
-def _libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
-    """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
-    from ..fmi.compile import default_targets, expanded
-    from ..fmi.spec import table_of
-
-    kinds = dict.fromkeys(table_of(axis, model, name).kind for axis, name, model in jobs)
-    return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
+    return {name: model for name, model in models.items() if not fmus or name in fmus}
 
 
 def _extras_of(
-    jobs: Sequence[Job],
+    axis: Machine,
+    models: Mapping[str, str],
     weights: Path | None,
     trajectory: Path | None,
     unit: str | None,
     *,
-    windows: bool = True,
-    embed_weights: bool = False,
+    no_windows: bool,
+    embed_weights: bool,
 ) -> dict[str, dict[str, Any]]:
     """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
 
-    Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them;
-    ``windows=False`` for all that have windows.
+    Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them.
     """
     from ..fmi.weights import load_trained
     from ..logs.log import check_reading
     from ..plants.trajectory import read_trajectory
 
+    def one_of(option: str, *users: str) -> str:
+        found = {name: model for name, model in models.items() if model in users}
+        if len(found) != 1:
+            built = ", ".join(found) or "none"
+            raise ParameterError(f"{option} is for one {' or '.join(users)}, this would build {built}; name one")
+        return next(iter(found.values()))
+
     extras: dict[str, dict[str, Any]] = {}
     check_reading(unit, None)
     if weights is not None:
-        axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
+        model = one_of("--weights", "HybridPredictor", "SepCompensator")
         load_trained(weights, axis, model)
-        extras[model] = {"weights": weights, **({"embed_weights": True} if embed_weights else {})}
+        extras[model] = {"weights": weights, "embed_weights": embed_weights}
     elif embed_weights:
         raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
     if trajectory is not None:
-        axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
+        model = one_of("--trajectory", "ReferenceTrajectory")
         extras[model] = {"samples": read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]}
-    if not windows:
-        if not any(model == "HybridPredictor" for _, _, model in jobs):
-            names = ", ".join(name for _, name, _ in jobs)
-            raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
-        extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
+    if no_windows:
+        model = one_of("--no-windows", "HybridPredictor")
+        extras[model] = {**extras.get(model, {}), "windows": False}
     return extras
-
-
-def _without_files(jobs: Sequence[Job], option: str, *, named: bool) -> list[Job]:
-    """Return the FMUs whose sources open no file; ReferenceTrajectory plays files.
-
-    Raises
-    ------
-    ParameterError
-        If there is none, or a ReferenceTrajectory was asked for by name.
-    """
-    kept = [job for job in jobs if job[2] != "ReferenceTrajectory"]
-    if not kept or (named and len(kept) < len(jobs)):
-        raise ParameterError(f"{option} is for FMUs that open no files; ReferenceTrajectory plays files, leave it out")
-    return kept
-
-
-def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
-    """Return machine and model of the one FMU of these models to which an option applies."""
-    found = [job for job in jobs if job[2] in models]
-    if len({(axis.name, model) for axis, _, model in found}) != 1:
-        names = ", ".join(name for _, name, _ in found) or "none"
-        raise ParameterError(
-            f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
-        )
-    return found[0][0], found[0][2]
 
 
 def hal(

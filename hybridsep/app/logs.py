@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..base.errors import LogError
-from ..base.files import written_text
 from .options import (
     ForceOption,
     JsonOption,
@@ -40,7 +38,6 @@ def backtest(
     *,
     reading: ReadingOptions,
     report: Annotated[Path | None, typer.Option(help="HTML file about the replay, which needs no network.")] = None,
-    out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="PNG, PDF or SVG with the errors of the predictions over time.")
     ] = None,
@@ -71,7 +68,6 @@ def backtest(
         check_outputs,
         console,
         print_scores,
-        print_without_first,
         print_written,
         progress_bar,
     )
@@ -86,7 +82,6 @@ def backtest(
     predictor = warm_predictor(axis, weights)
     outputs = [
         ("--report", report, (".html",)),
-        ("--out", out, ()),
         ("--figure", figure, FIGURES),
         *(("--save", path, (".state", *RUNS)) for path in saved),
     ]
@@ -104,19 +99,12 @@ def backtest(
         (predictor if path.suffix.lower() == ".state" else replayed.run).save(path)
     if figure is not None:
         prediction_figure(replayed.run, title, figure, shown)
-    if out is not None:
-        with written_text(out) as file:
-            csv.writer(file).writerows([("t", "rms_pb", "rms_hold", "rms_h"), *replayed.batches])
     if report is not None:
         page = begun_report(title, [read], judged, "Errors of the replay", words)
         write_findings(page, [read], {log.name: findings})
         page.write(report)
-    in_motion = any(finding.name == "start in motion" for finding in findings)
-    rest = replayed.without_first_window() if in_motion else {}
     if as_json:
-        more: dict[str, Any] = {"findings": findings_table(findings), "advice": recommendation(judged)}
-        if rest:
-            more["without_first_window"] = {f"rms_{name}_u{axis.unit}": 1e6 * value for name, value in rest.items()}
+        more = {"findings": findings_table(findings), "advice": recommendation(judged)}
         print_scores(replayed.summary(), replayed.verdict, True, title, unit=axis.unit, more=more)
         return
     if line := partly_used(read):
@@ -124,9 +112,7 @@ def backtest(
     print_scores(replayed.summary(), replayed.verdict, False, title, unit=axis.unit, shown=shown)
     for line in dict.fromkeys((words, recommendation(judged))):
         console.print(line)
-    if rest:
-        print_without_first(rest, shown)
-    print_written(report, out, figure, *saved)
+    print_written(report, figure, *saved)
 
 
 def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:

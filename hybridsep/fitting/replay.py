@@ -13,7 +13,7 @@ from ..base.errors import SignalError
 from ..base.metrics import largest, rms, rms_ratio
 from ..base.signals import Array, Indices
 from ..cosim.run import Run
-from ..evaluate.backtest import Backtest, Batch, backtest, replayed_run
+from ..evaluate.backtest import Backtest, backtest, replayed_run
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..logs.checks import resolution
@@ -405,8 +405,6 @@ class LogReplay:
     Attributes
     ----------
     scores : Backtest
-    batches : list of (t, rms_pb, rms_hold, rms_h), s and m
-        Of each window.
     judged : Replay
         With ARX models fitted again before each window to all samples so far.
     run : Run
@@ -414,21 +412,14 @@ class LogReplay:
     """
 
     scores: Backtest
-    batches: list[tuple[float, ...]]
     judged: Replay
     run: Run
 
-    @cached_property
+    @property
     def verdict(self) -> Verdict:
         """Verdict with all that was compared."""
         own, found = self.scores.verdict, self.judged.verdict()
         return replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples)
-
-    @cached_property
-    def _of_peers(self) -> dict[str, Scored]:
-        """Errors of the ARX models by their names in :meth:`summary`, such as ``arx20``."""
-        scored = self.judged.scored()[2:-1]
-        return {peer.name.lower(): one for peer, one in zip(self.judged.peers, scored, strict=True)}
 
     def summary(self) -> dict[str, float | int | str]:
         """Return the figures of the replay and of the ARX models by name.
@@ -440,35 +431,20 @@ class LogReplay:
         active = self.scores.active
         for suffix, counted in (("", np.ones(len(active), np.bool_)), ("_after_warm_up", active)):
             for quantity, figure in (("rms", _rms), ("max", largest)):
-                for name, one in self._of_peers.items():
+                for peer, one in zip(self.judged.peers, self.judged.scored()[2:-1], strict=True):
                     known = one.errors[counted & ~np.isnan(one.errors)]
                     value = 1e6 * figure(known) if known.size else math.nan
-                    found[f"{quantity}_{name}_um{suffix}"] = "diverged" if one.diverged else value
+                    found[f"{quantity}_{peer.name.lower()}_um{suffix}"] = "diverged" if one.diverged else value
         return found
-
-    def without_first_window(self) -> dict[str, float]:
-        """Return the RMS errors from the second window on by name, m; empty where there is one window."""
-        if self.scores.n_batches < 2:
-            return {}
-        first = min(self.judged.Np, len(self.judged.recordings[0].x))
-        errors = dict(zip(("pb", "hold", "h"), self.judged.errors(), strict=True))
-        errors |= {name: one.errors for name, one in self._of_peers.items() if not one.diverged}
-        found = {name: _rms(one[first:]) for name, one in errors.items()}
-        return {name: value for name, value in found.items() if not math.isnan(value)}
 
 
 def replay_log(predictor: HybridPredictor, log: Log, progress: Callable[[str, float], object]) -> LogReplay:
     """Replay a log with a predictor, which learns it on the way; SignalError if a prediction diverges."""
-    rows: list[tuple[float, ...]] = []
-
-    def on_batch(batch: Batch) -> None:
-        rows.append((round(batch.k * log.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
-        progress("replay", 0.8 * batch.k / len(log.t))
-
-    found = backtest(predictor, log.x_d, log.x_meas, starts=log.starts, on_batch=on_batch)
+    n = len(log.t)
+    found = backtest(predictor, log, on_batch=lambda batch: progress("replay", 0.8 * batch.k / n))
     delay = predictor.settings.n_late
     recordings = tuple(Recording(one.x_d, one.x_meas, 0) for one in log.segments())
     judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, delay)
     judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
-    return LogReplay(found, rows, judged, run)
+    return LogReplay(found, judged, run)

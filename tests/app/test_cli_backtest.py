@@ -103,8 +103,8 @@ def test_arx_models_stand_beside_hold(hybridsep: Run, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=1000)
-    files = {name: tmp_path / name for name in ("batches.csv", "errors.png", "my.state", "run.npz")}
-    named = zip(("--out", "--figure", "--save", "--save"), files.values(), strict=True)
+    files = {name: tmp_path / name for name in ("page.html", "errors.png", "my.state", "run.npz")}
+    named = zip(("--report", "--figure", "--save", "--save"), files.values(), strict=True)
     options = [part for pair in named for part in pair]
     status, out, _ = hybridsep("backtest", log, *MACHINE, *options)
     assert status == 0

@@ -53,7 +53,6 @@ def test_what_is_read_is_not_overwritten(
     for i, (file, what, suffix, command) in enumerate(
         (
             (log, "log", ".csv", ("backtest", log, "-m", machine, "--force")),
-            (machine, "machine file", ".csv", ("backtest", log, "-m", machine)),
             (machine, "machine file", ".toml", ("tune", log, "-m", machine)),
             (trajectory, "trajectory", ".csv", ("cosim", "--trajectory", trajectory)),
         )
@@ -61,8 +60,9 @@ def test_what_is_read_is_not_overwritten(
         before, out = file.read_bytes(), file if link is None else tmp_path / f"other{i}{suffix}"
         if link is not None:
             link(file, out)
-        said = refusal(hybridsep, *command, "--out", out)
-        assert f"--out {out} is the same file as the {what} {file}; choose another" in said
+        option = "--save" if command[0] == "backtest" else "--out"
+        said = refusal(hybridsep, *command, option, out)
+        assert f"{option} {out} is the same file as the {what} {file}; choose another" in said
         assert file.read_bytes() == before
     outputs = ("--out", tmp_path / "run.npz", "--figure", tmp_path / "run.png")
     (tmp_path / "run.png").symlink_to(tmp_path / "run.npz")
@@ -84,7 +84,7 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("backtest", "{log}", "-m", MACHINE, "--out", "{there}"),
+        ("backtest", "{log}", "-m", MACHINE, "--save", "{there}"),
         ("cosim", "--trajectory", "{log}", "--out", "{there}"),
         ("cosim", "--trajectory", "{log}", "--figure", "{there}"),
         ("build", "FeedDrive", "--out", "{folder}"),
@@ -161,12 +161,12 @@ REFUSED = [
     ("backtest {log} {m} --x pos", "column 'pos' (x) is missing, the file has 't', 'x_d', 'x'; name it: --x NAME"),
     ("backtest {log} {m} --unit furlong", UNITS),
     ("backtest nothing.csv {m}", "nothing.csv"),
-    ("backtest {log} {m} --out {folder}", "--out must be a file, got the folder"),
+    ("backtest {log} {m} --report {folder}", "--report must end in .html"),
     ("backtest {log} {m} --figure a.jpg", "--figure must end in .png or .pdf or .svg, got 'a.jpg'"),
     ("backtest {log} {m} --save a.bin", "--save must end in .state or .csv or .npz"),
     ("backtest {log} {m} --report page.pdf", "--report must end in"),
     ("build SepCompensatorPy -m emps --flavour python", "; emps has no [drive_limits], which a"),
-    ("build Robot --flavour python", "no FMU Robot; there are HybridPredictorPy_als25010_x"),
+    ("build Robot --flavour python", "no FMU Robot of spring_mass_damper; there are HybridPredictorPy"),
     ("build --flavour cobol", "flavour must be one of"),
     ("build --fmi 4", "the version of FMI must be one of 2, 3, got '4'"),
     ("build --fmi 3 --flavour python", "FMUs of the Python flavour are of FMI 2 alone"),
@@ -230,7 +230,7 @@ def test_arguments_are_checked_before_any_work(
     folder, before = tmp_path / "here", log.read_bytes()
     folder.mkdir()
     monkeypatch.chdir(folder)
-    for place in ("fmi.archive.build_fmu", "evaluate.backtest.backtest", "cosim.loop.cosimulate"):
+    for place in ("fmi.archive.build_fmu", "fitting.replay.backtest", "cosim.loop.cosimulate"):
         monkeypatch.setattr(f"hybridsep.{place}", work)
     names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy"), "m": f"-m {MACHINE}"}
     said = refusal(hybridsep, *command.format(**names).split())
@@ -249,11 +249,11 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
 
 
 def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, log: Path) -> None:
-    out = tmp_path / "batches.csv"
-    assert hybridsep("backtest", log, "-m", MACHINE, "--out", out)[0] == 0
+    out = tmp_path / "run.csv"
+    assert hybridsep("backtest", log, "-m", MACHINE, "--save", out)[0] == 0
     before = out.read_bytes()
     with log.open("a") as file:
         file.write("1.0,0.0,broken\n")
-    again = ("backtest", log, "-m", MACHINE, "--out", out, "--force")
+    again = ("backtest", log, "-m", MACHINE, "--save", out, "--force")
     assert "column 'x' must be a number, got 'broken'" in refusal(hybridsep, *again)
     assert out.read_bytes() == before

@@ -21,7 +21,7 @@ def without_measurement(tmp_path: Path) -> Path:
     "command",
     [
         ("fit", "--out", "deep/new"),
-        ("backtest", *MACHINE, "--out", "new/batches.csv", "--report", "new/page.html"),
+        ("backtest", *MACHINE, "--save", "new/run.csv", "--report", "new/page.html"),
         ("tune", *MACHINE, "--try", "p=10", "--out", "new/tuned.toml"),
     ],
     ids=lambda command: command[0],

@@ -248,7 +248,7 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     [
         (
             ("--weights", "TRAINED"),
-            "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor_als25010_x, ",
+            "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor, SepCompensator",
         ),
         (
             ("FeedDrive", "--weights", "TRAINED"),
@@ -259,7 +259,7 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
         (
             ("SepCompensator", "--no-windows"),
-            "--no-windows is for a HybridPredictor, this would build SepCompensator; ",
+            "--no-windows is for one HybridPredictor, this would build none; name one",
         ),
         (("--flavour", "python", "--target", "host"), "--target is for native FMUs; with --flavour python leave it"),
     ],
