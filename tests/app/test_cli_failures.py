@@ -18,16 +18,6 @@ MACHINE = "spring_mass_damper"
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")
 MAIN = [sys.executable, "-c", "import sys; from hybridsep.__main__ import main; sys.exit(main())"]
 DIGITS = "9" * 5000
-MACHINE_FILE = """
-name = "axis"
-title = "An axis"
-sources = ["a test"]
-T_s = 0.001
-[[physics.mode]]
-f_n = 25.0
-zeta = 0.05
-alpha = 24674.0
-"""
 
 
 def refusal(run: Run, *arguments: object) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -62,27 +61,6 @@ def test_results_do_not_depend_on_the_number_of_threads() -> None:
         one = results()
     with threadpool_limits(2, user_api="blas"):
         assert results() == one
-
-
-@pytest.mark.slow
-def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callable[[str], Path]) -> None:
-    machine = paper_machine("spring_mass_damper")
-    x_d = staircase()[:300]
-    seen: list[set[int]] = []
-
-    def look(*_: object) -> None:
-        seen.append(blas_threads())
-
-    def look_and_pass(k: int, x_meas: float) -> float:
-        seen.append(blas_threads())
-        return x_meas
-
-    backtest(machine.new_predictor(), x_d, x_d, on_batch=look)
-    cosimulate(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
-    cosimulate(python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"), x_d[:3], progress=look)
-    assert len(seen) > 100
-    assert set.union(*seen) == {1}
-    assert blas_threads() == {2}
 
 
 def test_windows_of_a_users_own_loop_use_one_thread(two_threads: None) -> None:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urldefrag
 
 import pytest
 from places import ROOT
@@ -76,19 +75,6 @@ def test_no_page_loads_anything_from_elsewhere(site: Path, pages: dict[str, Page
         assert not re.search(r"(fetch|open|import)\(\s*['\"`][^)]*https?://", path.read_text(encoding="utf-8")), path
 
 
-def test_two_clicks_from_the_first_page(pages: dict[str, Page]) -> None:
-    first = inside("index", pages["index"])
-    second = {place for name in first & set(pages) for place in inside(name, pages[name])}
-    questions = ("start/what", "reference/messages", "howto/simulink", "start/first-fmu", "evidence/figures")
-    assert {*questions, "evidence/experiments"} <= first | second
-
-
 def test_the_reference_has_every_public_name(pages: dict[str, Page]) -> None:
     anchors = {anchor.rpartition(".")[2] for anchor in pages["reference/api"].anchors}
     assert set(hybridsep.__all__) - {"HybridSepError", "__version__"} <= anchors
-
-
-def inside(name: str, page: Page) -> set[str]:
-    """Return the pages of the site that a page leads to, without ending."""
-    targets = {unquote(urldefrag(link).url) for link in page.links if not re.match(r"\w+:|//", link)}
-    return {os.path.normpath(Path(name).parent / target).removesuffix(".html") for target in targets}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,11 +14,10 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Batch, backtest, replayed_run
-from hybridsep.logs.log import Log, read_log
+from hybridsep.logs.log import read_log
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
-
-EMPS_COLUMNS = {"t": "t", "x_d": "qg", "x": "qm"}
 
 
 def predictor(Np: int = 20, p: int = 5, q: int = 2, t_init: float = 0.05) -> HybridPredictor:
@@ -35,30 +35,15 @@ def log(n: int = 1010) -> tuple[Array, Array]:
     return x_d, x
 
 
-def emps_predictor() -> HybridPredictor:
-    """Return the published model of the recorded axis: position and velocity loop around a mass with friction."""
-    kp, kv, gtau, M, Fv = 160.18, 243.45, 35.15065188, 95.1089, 203.5034
-    omega = math.sqrt(gtau * kv * kp / M)
-    mode = Mode(f_n=omega / (2 * np.pi), zeta=(Fv + gtau * kv) / M / (2 * omega), alpha=omega**2)
-    return HybridPredictor(
-        ModalModel([mode]),
-        PredictorSettings(averaging=False, Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242),
-    )
-
-
-@pytest.fixture(scope="module")
-def emps() -> Log:
-    if not EMPS.is_file():
-        pytest.skip("the recorded axis is not here: ../shared/data/emps/DATA_EMPS.mat, beside the repository")
-    return read_log(EMPS, columns=EMPS_COLUMNS)
-
-
 def rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def test_recorded_axis(emps: Log) -> None:
-    summary = backtest(emps_predictor(), emps.x_d, emps.x_meas).summary()
+@pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/data/emps beside the repository")
+def test_recorded_axis() -> None:
+    log, machine = read_log(EMPS, columns={"t": "t", "x_d": "qg", "x": "qm"}), load_machine("emps")
+    paper = replace(machine.predictor_settings, averaging=False, t_init=1.242)
+    summary = backtest(machine.new_predictor(paper), log.x_d, log.x_meas).summary()
     assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
     assert summary["rms_hold_um"] == pytest.approx(5.93, abs=0.05)
     assert summary["rms_h_um"] <= 5.55

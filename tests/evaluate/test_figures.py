@@ -53,10 +53,11 @@ def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
     several = {"off": run, "physics": run, "hybrid_cold": run, "hybrid_warm": run}
     with figures_drawn() as drawn:
         tracking_figure(several, "Staircase, compensated", tmp_path / "a.png")
+        tracking_figure({"hybrid": run}, "Staircase, compensated", tmp_path / "a.png")
         spiral_figure(run, run, tmp_path / "a.png")
         errors = {key: np.abs(run.error) for key in several}
         contour_figure(dict.fromkeys(several, (run, run)), errors, "a", tmp_path / "a.png")
-    assert len(drawn) == 3
+    assert len(drawn) == 4
     for figure in drawn:
         assert cut_off(figure) == []
         assert hiding_legends(figure) == 0

@@ -19,7 +19,7 @@ from scipy.signal import chirp
 from hybridsep import load_machine, simulate, spiral
 from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
-from hybridsep.logs.checks import check, checked, following, runs_against
+from hybridsep.logs.checks import check, checked
 from hybridsep.logs.log import Log, read_log
 
 GOOD_CASES = CASES.parent / "good"
@@ -140,14 +140,6 @@ def test_a_shift_is_offered_where_the_measured_column_is_the_noisier_one() -> No
     noise = 1e-5 * np.ptp(log.x_d) * np.random.default_rng(0).normal(size=len(log.t))
     (finding,) = check(replace(log, x_meas=log.x_meas + noise))
     assert [option for option, _ in finding.options] == ["--x_d x --x x_d", "--delay -8"]
-
-
-def test_the_sign_of_a_mixture() -> None:
-    log = swept()
-    assert following(log.x_d, log.x_meas).left < 1e-5
-    assert following(log.x_d, log.x_meas).gain == pytest.approx(1.0, abs=0.02)
-    assert not runs_against(log.x_d, log.x_meas)
-    assert runs_against(log.x_d, -log.x_meas)
 
 
 # What is noted

@@ -115,21 +115,6 @@ def test_midnights_in_blocks_of_any_size(
     np.testing.assert_array_equal(t, (np.array(times) - start) / 1e9)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", [8000, 3000])
-def test_intervals_at_the_end_of_a_day(tmp_path: Path, rate: int) -> None:
-    """Microseconds at the drives' rates, a day after the first sample."""
-    spelling = Spelling("%Y-%m-%d ", "%H:%M:%S", "", 6, ".", ";")
-    k = np.arange(25_000)
-    ns = 1_772_706_030 * SECOND + np.round(k * (1e6 / rate)).astype(np.int64) * 1000
-    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(ns.tolist())))
-    assert log.T_s == 1 / rate
-    np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(ns))
-    late = np.concatenate((ns[:1], ns[1:] + 86_400 * SECOND))
-    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(late.tolist())))
-    np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(late))
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from hybridsep import ModalModel, Mode, load_machine, simulate
+from hybridsep import ModalModel, Mode, simulate
 from hybridsep.base.settings import PARAMETERS
-from hybridsep.plants import stage_drive
 from hybridsep.plants.stage_drive import StageDrive, velocity_under_friction
 from hybridsep.plants.trajectory import spiral, staircase
 
@@ -63,21 +62,6 @@ def test_the_motion_is_integrated_to_a_nanometre() -> None:
     x = simulate(StageDrive(ModalModel(modes), f, T_s=TS, friction_on="motion"), x_d, TS)
     assert np.max(np.abs(x - simulate(StageDrive(ModalModel(modes), f, T_s=TS), x_d, TS))) > 1e-6
     assert np.max(np.abs(x - truth)) < 1e-9
-
-
-@pytest.mark.nightly
-def test_the_error_on_the_x_axis_hardly_depends_on_the_internal_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Where β < 0 the friction's change of sign is a jump, so that a motion is resolved to micrometres only.
-    machine, x_d = load_machine("als25010_x"), spiral()[0][:700]
-    plant = machine.new_plant(friction_on="motion")
-    discrete = machine.model.discretise(TS)
-    x_pb, _ = discrete.forced_response(discrete.rest(), x_d - x_d[0])
-    errors = [simulate(plant, x_d, TS) - x_d[0] - x_pb]
-    monkeypatch.setattr(stage_drive, "internal_steps", lambda h, rate: 80)
-    errors.append(simulate(plant, x_d, TS) - x_d[0] - x_pb)
-    coarse, fine = (math.sqrt(np.mean(error**2)) for error in errors)
-    assert coarse == pytest.approx(fine, rel=0.01)
-    assert fine > 4e-5
 
 
 @pytest.mark.slow

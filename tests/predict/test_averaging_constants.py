@@ -70,14 +70,12 @@ def literals_of_core(text: str) -> Iterator[float]:
             yield from (float(found) for found in re.findall(r"(?<![\w.])\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", line))
 
 
-@pytest.mark.parametrize("path", [path for path in LIBRARY if path.name != "constants.py"], ids=lambda path: path.name)
-def test_no_number_of_the_library_is_without_a_name_and_a_reason(path: Path) -> None:
-    assert set(literals_of_library(path.read_text(encoding="utf-8"))) <= PLAIN
-
-
-@pytest.mark.parametrize("path", [path for path in CORE if "constants" not in path.name], ids=lambda path: path.name)
-def test_no_number_of_the_core_is_without_a_name(path: Path) -> None:
-    assert set(literals_of_core(path.read_text(encoding="utf-8"))) <= PLAIN
+@pytest.mark.parametrize(
+    "path", [path for path in (*LIBRARY, *CORE) if "constants" not in path.name], ids=lambda path: path.name
+)
+def test_no_number_is_without_a_name_and_a_reason(path: Path) -> None:
+    literals = literals_of_library if path.suffix == ".py" else literals_of_core
+    assert set(literals(path.read_text(encoding="utf-8"))) <= PLAIN
 
 
 def members(header: str, struct: str) -> list[str]:
@@ -94,27 +92,14 @@ def names(record: type[Any]) -> list[str]:
     return [one.name for one in fields(record)]
 
 
-@pytest.mark.parametrize(
-    ("header", "struct", "record"),
-    [
-        ("hsep_stacking.h", "hsep_stack", Stack),
-        ("hsep_experts.h", "hsep_expert_errors", ExpertErrors),
-        ("hsep_experts.h", "hsep_residual_scale", ResidualScale),
-    ],
-)
-def test_what_is_learned_has_the_same_names_in_the_same_order(header: str, struct: str, record: type[Any]) -> None:
-    assert members(header, struct) == names(record)
-
-
-def test_all_that_is_learned_has_the_same_order() -> None:
-    """The largest magnitudes of the features, whose number the settings decide, are behind the struct."""
-    *struct, largest = names(Learned)
+def test_what_is_learned_has_the_same_names_in_the_same_order() -> None:
+    assert members("hsep_stacking.h", "hsep_stack") == names(Stack)
+    assert members("hsep_experts.h", "hsep_expert_errors") == names(ExpertErrors)
+    assert members("hsep_experts.h", "hsep_residual_scale") == names(ResidualScale)
+    assert members("hsep_gate.h", "hsep_gate")[:3] == names(InnovationGate)
+    *struct, largest = names(Learned)  # the last, whose number the settings decide, is behind the struct
     assert members("hsep_averaged_model.h", "hsep_learned") == struct
     assert largest == members("hsep_averaged_model.h", "hsep_averaged")[-2]
-
-
-def test_what_is_known_of_the_reach_has_the_same_names() -> None:
-    assert members("hsep_gate.h", "hsep_gate")[:3] == names(InnovationGate)
 
 
 @pytest.mark.parametrize("package", ["predict", "predict/averaging"])

@@ -160,41 +160,33 @@ def check_plant(plant: Drive, noise_std: float, samples: Any, h: float) -> None:
         assert all(map(math.isfinite, outputs)), outputs
 
 
-@pytest.mark.slow
-@OF_BOTH
-@bounded
-@given(values_of(*FEED_DRIVE), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
-def test_the_feed_drive(in_c: bool, values: dict[str, float], samples: Any, h: float) -> None:
-    def run() -> None:
-        if in_c:
-            check_c_model(CModel("feed_drive", values), samples[:10], h)
-            return
-        plant = FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
-        check_plant(plant, values["noise_std"], samples[:10], min(h, 1e-3))
-
-    refused(values, run)
+# Machine files and the command line ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @OF_BOTH
-@pytest.mark.parametrize("friction_on", ["command", "motion"])
+@pytest.mark.parametrize("kind", ["feed drive", "command", "motion"])
 @bounded
-@given(values_of(*STAGE), modes_of(2), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
-def test_the_stage(
-    in_c: bool, friction_on: str, values: dict[str, float], modes: dict[str, float], samples: Any, h: float
-) -> None:
+@given(st.data(), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
+def test_the_plants(in_c: bool, kind: str, data: st.DataObject, samples: Any, h: float) -> None:
+    """The drive, and the stage with friction on the commanded and on the actual velocity."""
+    feed = kind == "feed drive"
+    values, modes = data.draw(values_of(*(FEED_DRIVE if feed else STAGE))), {} if feed else data.draw(modes_of(2))
+
     def run() -> None:
         if in_c:
-            parameters = {**values, **modes, "friction_on": int(friction_on == "motion")}
-            check_c_model(CModel("stage_drive", parameters), samples[:10], h)
+            friction_on = {} if feed else {"friction_on": int(kind == "motion")}
+            model = CModel("feed_drive" if feed else "stage_drive", {**values, **modes, **friction_on})
+            check_c_model(model, samples[:10], h)
             return
-        plant = StageDrive(model_from(modes), values["f"], values["kappa"], values["T_s"], friction_on)
+        plant: Drive = (
+            FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+            if feed
+            else StageDrive(model_from(modes), values["f"], values["kappa"], values["T_s"], kind)
+        )
         check_plant(plant, values["noise_std"], samples[:4], min(h, 1e-3))
 
     refused({**values, **modes}, run)
-
-
-# Machine files and the command line ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

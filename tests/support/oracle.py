@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, tf2ss
@@ -110,15 +109,6 @@ def ridge_extended(rows: Array, target: Array, lam: float) -> LongArray:
     for j in range(n - 1, -1, -1):
         w[j] = (work[j, n] - np.sum(work[j, j + 1 : n] * w[j + 1 :])) / work[j, j]
     return w
-
-
-def ridge_exact(rows: Array, target: Array, lam: float, digits: int = 60) -> Array:
-    """Eq. (6), by its normal equations in ``digits`` decimal digits; for small problems; ``(m, n), (m,) → (n,)``."""
-    with mpmath.workdps(digits):
-        phi = mpmath.matrix(rows.tolist())
-        normal = phi.T * phi + mpmath.mpf(lam) * mpmath.eye(rows.shape[1])
-        w = mpmath.lu_solve(normal, phi.T * mpmath.matrix(target.tolist()))
-        return np.array([float(value) for value in w])
 
 
 @dataclass
