@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run, write_log
+from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import load_machine
@@ -20,7 +20,8 @@ from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 def axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what the examples name: a log, moves, machine files, a trained predictor."""
     folder = tmp_path_factory.mktemp("examples")
-    write_log(folder / "my_axis.csv", n=2000, header="t,x_d,x_meas")
+    part = np.r_[:400, 999:1399]  # a move in each half
+    write_rows(folder / "my_axis.csv", commanded()[part], measured(0)[part])
     machine = load_machine("spring_mass_damper").changed("predictor", {"Np": 50, "p": 20, "q": 1})
     for name in ("my_axis", "x", "y"):
         (folder / name).mkdir()

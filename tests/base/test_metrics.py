@@ -60,16 +60,6 @@ def test_blocks_of_errors_are_one_error() -> None:
     assert running.peaks == [largest(error) for error in errors]
 
 
-def test_hold_keeps_the_last_residual_over_the_next_batch() -> None:
-    x_pb, residual = np.arange(8.0), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
-    active = np.arange(8) >= 4
-    # Batches of 3: the second one holds residual 2, the third residual 5; samples 0 to 3 are the warm-up
-    expected = x_pb + np.array([0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 6.0, 6.0])
-    np.testing.assert_array_equal(hold(x_pb, x_pb + residual, active, 3), expected)
-    everywhere = np.ones(8, dtype=np.bool_)
-    np.testing.assert_array_equal(hold(x_pb, x_pb + residual, everywhere, 3)[:4] - x_pb[:4], [0.0, 0.0, 0.0, 3.0])
-
-
 def test_hold_skips_what_is_missing_and_what_has_not_arrived() -> None:
     x_pb, x = np.arange(10.0), np.arange(10.0) + np.array([1.0, 2.0, 3.0, np.nan, 5.0, 6.0, np.nan, np.nan, 9.0, 10.0])
     active = np.ones(10, dtype=np.bool_)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bounded_oracle import clarabel_minimum
-from compensator_cases import DRIVE_LIMITS, MODEL, TS, beyond, compensator, move, plant
+from compensator_cases import MODEL, TS, compensator, move, plant
 from scipy.linalg import toeplitz
 from staircase_data import commanded
 
@@ -135,23 +135,6 @@ def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.Monk
     cosimulate(compensator(limits=PAPER_LIMITS), plant(), commanded()[:2500], encoder=Encoder(5e-6, 0))
     assert len(bounded) >= 15
     assert np.max(np.abs(bounded)) <= 1e-5
-
-
-def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
-    sep = compensator()
-    ahead = np.concatenate((commanded()[950:], np.zeros(200)))
-    plans = []
-    for k in range(0, 500, 100):
-        sep.change(compensate="physics" if k < 200 else "off")
-        plans.append(sep.plan(ahead[k : k + 200]))
-        sep.update(plans[-1].x_pb)
-    states = [plan.state for plan in plans]
-    assert states == [SepState.PHYSICS] * 2 + [SepState.OFF] * 3
-    x_dm = np.concatenate([plan.x_dm for plan in plans])
-    changes = x_dm - ahead[:500]
-    assert np.max(np.abs(changes[200:296])) > 1e-6
-    assert not changes[297:].any()  # back on the command
-    assert beyond(x_dm, DRIVE_LIMITS) <= 1.0
 
 
 def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from arx_oracle import arx_by_definition, free_run_by_definition
-from places import RECORDINGS
 from scipy.signal import lfilter
 
 from hybridsep.base.signals import Array
@@ -13,7 +12,6 @@ from hybridsep.evaluate.peers import (
     FROZEN,
     LAG_HOLD,
     REFITTED,
-    ArxRun,
     FirstOrderLag,
     MinimumNorm,
     Peer,
@@ -23,11 +21,6 @@ from hybridsep.evaluate.peers import (
 )
 
 NP = 25
-
-
-def columns(name: str) -> tuple[Array, Array]:
-    _, x_d, x = np.loadtxt(RECORDINGS / f"{name}.csv", delimiter=",", skiprows=1, unpack=True)
-    return x_d, x
 
 
 def axis(n: int = 600, seed: int = 0) -> tuple[Array, Array]:
@@ -41,22 +34,6 @@ def axis(n: int = 600, seed: int = 0) -> tuple[Array, Array]:
 def peer(found: tuple[Peer, ...], name: str, way: str) -> Peer:
     [one] = [peer for peer in found if (peer.name, peer.way) == (name, way)]
     return one
-
-
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
-@pytest.mark.parametrize("name", ["cnc_a_axis2", "xl330_sin_sin_kp200"])
-@pytest.mark.parametrize("n", [20, 40])
-def test_coefficients_of_rows_in_blocks_are_those_of_lstsq(name: str, n: int) -> None:
-    x_d, x = columns(name)
-    least_squares, run = MinimumNorm(2 * n + 2), ArxRun(x_d, x, n)
-    for k in range(0, len(x), 100):
-        least_squares.add(run.rows(k, k + 100))
-    rows = run.rows(0, len(x))
-    direct, found = arx_by_definition(x_d, x, n, len(x)), least_squares.solution()
-    # Of nearly dependent columns coefficients are not, but what they predict is, determined to rounding
-    misfits = [np.linalg.norm(rows[:, -1] - rows[:, :-1] @ w) for w in (found, direct)]
-    assert misfits[0] == pytest.approx(misfits[1], rel=1e-9)
-    np.testing.assert_allclose(rows[:, :-1] @ found, rows[:, :-1] @ direct, rtol=0, atol=1e-7 * np.ptp(rows[:, -1]))
 
 
 def test_of_dependent_columns_the_solution_is_of_minimum_norm() -> None:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from averaged_cases import FRICTION, averaged, cycles, friction, physics
 
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
 from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.plants.trajectory import staircase
@@ -139,23 +136,6 @@ def test_missing_measurements_are_not_judged() -> None:
     found = tally.verdict(n_rejected=NP + 3)
     assert found.ratio_pb == pytest.approx(0.4)
     assert found.n_samples == 2 * NP
-
-
-def test_of_replays() -> None:
-    x_d = cycles(6000)
-    x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(1).normal(0.0, 1e-6, len(x_d))
-    good = backtest(averaged(), x_d, x).verdict
-    assert good.worse == ((), ())
-    assert max(good.ratio_pb, good.ratio_hold) < 0.6
-    x[3000:3010] = np.nan
-    told = backtest(averaged(), x_d, x).verdict
-    assert told.n_rejected >= 10
-    # At rest there is nothing but noise; with a small penalty the first weights of the paper's model are nonsense.
-    noise = np.random.default_rng(2).normal(0.0, 1e-6, 3000)
-    paper = HybridPredictor(averaged().model, PredictorSettings(averaging=False, t_init=0.0, Np=20, p=19, lam=1e-30))
-    bad = backtest(paper, np.zeros(3000), noise).verdict
-    assert bad.ratio_pb > 1.02
-    assert bad.causes[0].startswith(("too little motion", "the prediction is unstable", "only the first"))
 
 
 def test_of_a_run() -> None:

@@ -187,14 +187,3 @@ def test_the_plants(in_c: bool, kind: str, data: st.DataObject, samples: Any, h:
         check_plant(plant, values["noise_std"], samples[:4], min(h, 1e-3))
 
     refused({**values, **modes}, run)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", c_core.TABLES)
-def test_every_parameter_of_an_fmu_has_both_bounds(name: str) -> None:
-    for variable in c_core.TABLES[name].variables:
-        if variable.causality == "parameter":
-            assert variable.minimum is not None
-            assert variable.maximum is not None
-        if variable.name == "T_s":
-            assert (variable.minimum, variable.maximum) == (1e-5, 1.0)

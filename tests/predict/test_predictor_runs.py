@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from predictor_cases import MODEL, replay, small_signals, trained
 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 PAPER = PredictorSettings(averaging=False)
@@ -59,38 +55,6 @@ def test_start_is_the_first_command_unless_given() -> None:
     assert elsewhere.x_pb[0] == pytest.approx(0.2, abs=1e-15)
     # Half a period of 40 ms later it has overshot by exp(−ζ ω t), ζ ω = c / 2m.
     assert elsewhere.x_pb[20] == pytest.approx(0.3 + 0.1 * math.exp(-staircase.C / 2 * 0.020), abs=1e-3)
-
-
-@pytest.mark.parametrize("measured", [True, False])
-@pytest.mark.parametrize("way", ["bytes", "file", "copy", "deepcopy", "pickle"])
-def test_saved_in_mid_run_continues_bit_for_bit(way: str, measured: bool, tmp_path: Path) -> None:
-    x_d, x = small_signals(120)
-    model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 2)
-    original = HybridPredictor(
-        model,
-        PredictorSettings(averaging=False, Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"),
-        start=0.001,
-    )
-    replay(original, x_d[:63], x[:63])
-    if not measured:
-        original.predict(x_d[63:73])
-    original.save(tmp_path / "predictor.hsep")
-    ways: dict[str, Callable[[], HybridPredictor]] = {
-        "bytes": lambda: HybridPredictor.from_bytes(original.to_bytes()),
-        "file": lambda: HybridPredictor.load(tmp_path / "predictor.hsep"),
-        "copy": lambda: copy.copy(original),
-        "deepcopy": lambda: copy.deepcopy(original),
-        "pickle": lambda: pickle.loads(pickle.dumps(original)),
-    }
-    twin = ways[way]()
-    assert twin.to_bytes() == original.to_bytes()
-    if not measured:
-        original.update(x[63:73])
-        twin.update(x[63:73])
-    here, there = replay(original, x_d[73:], x[73:]), replay(twin, x_d[73:], x[73:])
-    for mine, yours in zip(here, there, strict=True):
-        np.testing.assert_array_equal(mine, yours)
-    assert twin.to_bytes() == original.to_bytes()
 
 
 def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:

@@ -11,10 +11,10 @@ from averaged_cases import FRICTION, averaged, cycles, friction, physics
 from hybridsep.base.metrics import coverage
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import PREDICTION_MAX, Array
-from hybridsep.base.state import numbers_of, unsound, with_numbers
+from hybridsep.base.state import numbers_of, unsound
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.uncertainty import N_COMPONENTS, PredictedError, Uncertainty, first_variance
+from hybridsep.predict.uncertainty import PredictedError, Uncertainty, first_variance
 
 N = 100
 LEVELS = (0.5, 0.9, 0.95)
@@ -134,24 +134,6 @@ def test_a_diverging_prediction_has_a_finite_deviation() -> None:
         uncertainty = uncertainty.learn(predicted, np.ones(N), ALL, N)
         assert unsound(uncertainty) is None
     assert window(uncertainty, variance=PREDICTION_MAX).std.max() <= PREDICTION_MAX
-
-
-def test_saved_numbers_are_checked() -> None:
-    learned = after_noise(1e-6, 5)
-    other = with_numbers(Uncertainty.init(1.0), numbers_of(learned))
-    np.testing.assert_array_equal(window(other).std, window(learned).std)
-    assert unsound(learned) is None
-    for place, value in ((0, -1.0), (1, np.inf), (N_COMPONENTS - 1, 0.0), (N_COMPONENTS, -1e-3)):
-        assert unsound(changed(learned, place, value)) is not None
-    for place, value in ((-3, 100.0), (-2, 0.01), (-1, np.nan), (-1, -1e-9)):
-        assert unsound(changed(learned, place, value)) is not None
-
-
-def changed(learned: Uncertainty, place: int, value: float) -> Uncertainty:
-    """Return what is learned with one of its numbers changed."""
-    numbers = numbers_of(learned)
-    numbers[place] = value
-    return with_numbers(learned, numbers)
 
 
 def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:
