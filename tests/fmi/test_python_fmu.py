@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from built_once import BuiltFmus
 from driving import T_S, steps
-from fmu_stream import FmuStream
+from streams import FmuStream
 
 from hybridsep import FmuInstance, build_fmu, load_machine
 from hybridsep.base.errors import FmuError

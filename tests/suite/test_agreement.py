@@ -65,6 +65,16 @@ def test_the_staircase_is_predicted_as_by_the_library(
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
 
 
+@on_all((PREDICTOR,), needs="agreement")
+def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream: StreamMaker) -> None:
+    loop = assert_agreement(new_stream, 2550, {"averaging": True, "t_init": -1.0}, 1e-12)
+    assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
+    assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
+
+
+AVERAGING: dict[str, Value] = {"averaging": True}
+
+
 @pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize(
@@ -78,42 +88,23 @@ def test_the_staircase_is_predicted_as_by_the_library(
         {"p": 10, "dead_time": 150, "t_init": 1e6},
         {"T_s": 2e-3, "p": 20, "t_init": -1.0},
         {"mode[1].zeta": 0.3, "mode[2].f_n": 70.0},
+        AVERAGING,
+        AVERAGING | {"Np": 7, "p": 7, "q": 6, "t_init": -1.0},
+        AVERAGING | {"Np": 1, "p": 1, "q": 0},
+        AVERAGING | {"Np": 30, "p": 1, "q": 0, "t_init": 0.2505},
+        AVERAGING | {"p": 10, "input_hold": 1, "dead_time": 3},
+        AVERAGING | {"p": 10, "dead_time": 150},
+        AVERAGING | {"p": 20, "effect": 1e-4, "noise_std": 1e-6, "forgetting": 0.2},
+        AVERAGING | {"p": 20, "q": 2, "lambda": 1e-30, "forgetting": 1e-3, "T_s": 2e-3},
+        AVERAGING | {"p": 20, "period": 3e-3},
     ],
     ids=named,
 )
 def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 900, values, 1e-11)
-
-
-@on_all((PREDICTOR,), needs="agreement")
-def test_the_staircase_is_predicted_with_averaging_as_by_the_library(new_stream: StreamMaker) -> None:
-    loop = assert_agreement(new_stream, 2550, {"averaging": True, "t_init": -1.0}, 1e-12)
-    assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
-    assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
-
-
-@pytest.mark.slow
-@on_all((STAGE_PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize(
-    "values",
-    [
-        {},
-        {"Np": 7, "p": 7, "q": 6, "t_init": -1.0},
-        {"Np": 1, "p": 1, "q": 0},
-        {"Np": 30, "p": 1, "q": 0, "t_init": 0.2505},
-        {"p": 10, "input_hold": 1, "dead_time": 3},
-        {"p": 10, "dead_time": 150},
-        {"p": 20, "effect": 1e-4, "noise_std": 1e-6, "forgetting": 0.2},
-        {"p": 20, "q": 2, "lambda": 1e-30, "forgetting": 1e-3, "T_s": 2e-3},
-        {"p": 20, "period": 3e-3},
-    ],
-    ids=named,
-)
-def test_every_parameter_predicts_with_averaging_as_in_the_library(
-    new_stream: StreamMaker, values: dict[str, Value]
-) -> None:
-    n = 150 if values.get("Np") == 1 else 650
-    assert_agreement(new_stream, n, {"averaging": True, **values}, 1e-12, path="spiral")
+    if values.get("averaging"):
+        assert_agreement(new_stream, 150 if values.get("Np") == 1 else 650, values, 1e-12, path="spiral")
+    else:
+        assert_agreement(new_stream, 900, values, 1e-11)
 
 
 def faulty(k: int, x_meas: float, last: float) -> float:
@@ -153,40 +144,10 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker)
 
 
 @pytest.mark.slow
-@on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize(
-    "values",
-    [
-        BEST | TIGHT,
-        PAPER | TIGHT,  # nearly every plan is bounded
-        PAPER | {"change_max": 2e-4, "t_init": -1.0},
-        PAPER | {"no_reversal": 0, "t_init": 0.1},
-        PAPER | {"compensate": 0},
-        PAPER | {"compensate": 1, "spacing": 5},
-        PAPER | {"spacing": 1, "preview": 130, "p": 7, "q": 0},
-        PAPER | {"Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "t_init": 0.05},
-        PAPER | {"Np": 1, "p": 1, "q": 0, "spacing": 1, "preview": 60, "t_init": 0.05},
-        PAPER | {"input_hold": 1, "dead_time": 3, "p": 10},
-        PAPER | {"jerk_weight": 300.0, "lambda": 1e-6},
-    ],
-    ids=named,
-)
-def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 200 if values.get("Np") == 1 else 800, values, 1e-9)
-
-
-@pytest.mark.slow
 @on_all((STAGE_COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize(
-    "values",
-    [
-        BEST | TIGHT,
-        TIGHT,
-    ],
-    ids=named,
-)
-def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    assert_agreement(new_stream, 800, values, 1e-9)
+def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
+    for values in (BEST | TIGHT, TIGHT):
+        assert_agreement(new_stream, 800, values, 1e-9)
 
 
 @pytest.mark.slow
@@ -203,6 +164,17 @@ def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_strea
 @pytest.mark.parametrize(
     "values",
     [
+        BEST | TIGHT,
+        PAPER | TIGHT,  # nearly every plan is bounded
+        PAPER | {"change_max": 2e-4, "t_init": -1.0},
+        PAPER | {"no_reversal": 0, "t_init": 0.1},
+        PAPER | {"compensate": 0},
+        PAPER | {"compensate": 1, "spacing": 5},
+        PAPER | {"spacing": 1, "preview": 130, "p": 7, "q": 0},
+        PAPER | {"Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "t_init": 0.05},
+        PAPER | {"Np": 1, "p": 1, "q": 0, "spacing": 1, "preview": 60, "t_init": 0.05},
+        PAPER | {"input_hold": 1, "dead_time": 3, "p": 10},
+        PAPER | {"jerk_weight": 300.0, "lambda": 1e-6},
         TIGHT,
         {"compensate": 1, "spacing": 5},
         {"Np": 100, "p": 20, "t_init": 0.25},
@@ -212,32 +184,19 @@ def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_strea
         {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0},  # nothing of a plan is decided before
         {"Np": 2, "p": 1, "q": 0, "spacing": 1, "preview": 40},
         {"p": 10, "period": 3e-3},
-    ],
-    ids=named,
-)
-def test_every_parameter_compensates_with_averaging_as_in_the_library(
-    new_stream: StreamMaker, values: dict[str, Value]
-) -> None:
-    assert_agreement(new_stream, 150 if values.get("Np") == 2 else 650, values, 1e-9)
-
-
-@pytest.mark.slow
-@on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize(
-    "values",
-    [
         {"measurement_delay": 5, "p": 10, "input_hold": 1, "dead_time": 3, "t_init": 0.25},
         {"measurement_delay": 70, "p": 10, "q": 40, "period": 3e-3},  # later than a window
         {"measurement_delay": 250, "p": 10},  # and than a plan
-        {"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77, "measurement_delay": 12},
-        {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0, "measurement_delay": 3},
+        {"measurement_delay": 12, "Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77},
+        {"measurement_delay": 3, "Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0},
     ],
     ids=named,
 )
-def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
-    delay = int(values["measurement_delay"])
-    start = 0.1 if "spacing" in values else 0.0
-    assert_agreement(new_stream, 650, values, 1e-9, start=start, delay=delay)
+def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    delay = int(values.get("measurement_delay", 0))
+    n = 200 if values.get("Np") in (1, 2) else 800 if "averaging" in values else 650
+    start = 0.1 if delay and "spacing" in values else 0.0
+    assert_agreement(new_stream, n, values, 1e-9, start=start, delay=delay)
 
 
 def at_rest_first(k: int, x_meas: float, last: float) -> float:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from built_once import BuiltFmus
-from c_core import write_trajectory
-from core_stream import CoreStream
-from fmu_stream import FmuStream
+from c_core import TABLES, CModel, RefusedError, write_trajectory
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
 from stream import (
@@ -23,20 +22,172 @@ from stream import (
     IMPLEMENTATIONS,
     LIBRARY,
     NATIVE,
+    OUTPUTS,
     PYTHON,
     STAGE,
     STAGE_COMPENSATOR,
     STAGE_PREDICTOR,
     TRAJECTORY,
+    Array,
+    RefusedStreamError,
     Stream,
+    Value,
+    kind_of,
     machine_of,
+    table_of_model,
 )
 
+from hybridsep.base.errors import FmuError
+from hybridsep.base.state import pack, unpack
+from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.weights import WEIGHTS_FILE
 from hybridsep.plants.trajectory import staircase
 
 STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
 """Models of the stage's X drive, which differ from the default machine's in modes and settings."""
+
+
+class CoreStream:
+    """The C core through ctypes, as an adapter holds it: the block of its state beside the values.
+
+    Parameters
+    ----------
+    model : str
+    resources : Path
+        Folder of the files that the model reads.
+    warm : bool
+        Whether the folder has learned weights, so that no warm-up is needed.
+    """
+
+    def __init__(self, model: str, resources: Path, *, warm: bool = False) -> None:
+        TABLES.setdefault(model, table_of_model(model))
+        self.model = model
+        self._kind = f"core {model}"
+        self._start = {"t_init": 0.0} if warm else {}
+        self._resources = resources
+        self.reset()
+        self._outputs = OUTPUTS[kind_of(model)]
+        self._warnings: list[str] = []
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        self._take(values)
+        self._refusing(self._core.initialise, start)
+
+    def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
+        self._take(values)
+        self._refusing(self._core.start_values)
+        return self.outputs()
+
+    def set(self, name: str, value: Value) -> None:
+        self._core[name] = float(value)
+
+    def set_slope(self, name: str, slope: float) -> None:
+        self._core.values[self._core.slope_place[name]] = slope
+
+    def step(self, t: float, h: float) -> None:
+        self._refusing(self._core.step, t, h)
+        if self._core.warning:
+            self._warnings.append(self._core.warning)
+
+    def outputs(self) -> list[float]:
+        return [self._core[name] for name in self._outputs]
+
+    def window(self, name: str) -> Array:
+        return self._core.window(name)
+
+    def save(self) -> bytes:
+        return pack(self._kind, {}, {"state": self._core.state.view(np.float64), "values": self._core.values})
+
+    def restore(self, blob: bytes) -> None:
+        _, arrays, _ = unpack(self._kind, blob)
+        before = self._core.values
+        self._core.values = arrays["values"].copy()
+        try:
+            self._refusing(self._core.check_state, arrays["state"].tobytes())
+        except RefusedStreamError:
+            self._core.values = before
+            raise
+        self._core.state = arrays["state"].copy()
+
+    def reset(self) -> None:
+        self._core = CModel(self.model, self._start, self._resources)
+
+    def warnings(self) -> list[str]:
+        return self._warnings
+
+    def close(self) -> None:
+        pass
+
+    def _take(self, values: Mapping[str, Value]) -> None:
+        for name, value in values.items():
+            self._core[name] = float(value)
+
+    @staticmethod
+    def _refusing(function: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            function(*arguments)
+        except RefusedError as error:
+            raise RefusedStreamError(str(error)) from error
+
+
+class FmuStream:
+    """An FMU through fmpy."""
+
+    def __init__(self, archive: Path, model: str) -> None:
+        self.model = model
+        self._outputs = OUTPUTS[kind_of(model)]
+        self._fmu = FmuInstance(archive)
+        # Of each type in one call: one by one they would take as long as the steps between
+        self._read = self._fmu.reader(self._outputs)
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        self._refusing(self._fmu.begin, values, start_time=start, stop_time=stop)
+        self._refusing(self._fmu.finish)
+
+    def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
+        self._refusing(self._fmu.begin, values)
+        shown: list[float] = []
+        self._refusing(lambda: shown.extend(self.outputs()))
+        return shown
+
+    def set(self, name: str, value: Value) -> None:
+        self._refusing(self._fmu.set, name, value)
+
+    def set_slope(self, name: str, slope: float) -> None:
+        reference = self._fmu.variables[name].valueReference
+        self._refusing(self._fmu._call, self._fmu.slave.setRealInputDerivatives, [reference], [1], [slope])
+
+    def step(self, t: float, h: float) -> None:
+        self._refusing(self._fmu.step, t, h)
+
+    def outputs(self) -> list[float]:
+        return [float(value) for value in self._read()]
+
+    def window(self, name: str) -> Array:
+        names = [variable for variable in self._fmu.variables if variable.partition("[")[0] == name]
+        return np.array(self._fmu.reader(names)())
+
+    def save(self) -> bytes:
+        return self._fmu.save()
+
+    def restore(self, blob: bytes) -> None:
+        self._refusing(self._fmu.restore, blob)
+
+    def reset(self) -> None:
+        self._fmu.reset()
+
+    def warnings(self) -> list[str]:
+        return [message for status, message in self._fmu.log if status == 1]
+
+    def close(self) -> None:
+        self._fmu.close()
+
+    @staticmethod
+    def _refusing(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
+        try:
+            function(*arguments, **keywords)
+        except FmuError as error:
+            raise RefusedStreamError(str(error)) from error
 
 
 class StreamMaker:
