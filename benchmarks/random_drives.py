@@ -12,6 +12,7 @@ alone, to the hold (the physics model plus the last measured residual, in every 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -23,10 +24,12 @@ from pathlib import Path
 import numpy as np
 from random_drives import generator as modal
 from random_drives.drive import Drive
-from random_drives.faults import FAULTS, JITTER
-from random_drives.replay import PREDICTORS, FaultyReplay, Replay, library_replay, replay, replay_faults
+from random_drives.faults import FAULTS, JITTER, OFFSET_STEP
+from random_drives.replay import PREDICTORS, Replay, Replayed, library_replay, physics_alone, replay
 from two_mass import generator as two_mass
 
+from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 
 __all__ = ["GENERATORS", "Generator", "print_faults", "print_replays", "read_positions", "write_positions"]
@@ -73,6 +76,65 @@ def read_positions(path: Path, generator: str, seed: int, n: int) -> list[Array]
         if made_by != (generator, seed) or len(data["lengths"]) < n:
             return None
         return np.split(data["x"], np.cumsum(data["lengths"])[:-1])[:n]
+
+
+@dataclass(frozen=True)
+class FaultyReplay:
+    """Result of one drive with a faulty sensor, after the fault.
+
+    Attributes
+    ----------
+    index : int
+    fault : str
+    ratio : float
+        RMS against the sound measurement relative to the physics model's (with jitter: to the run without); infinite
+        where the replay ended with an error.
+    change : float
+        Largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement.
+    refused : bool
+        Whether the replay ended with an error.
+    own_noise : float
+        With jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter
+        that costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted.
+    true_ratio : float
+        With jitter: both predictions judged by the samples without it, in the same ratio.
+    """
+
+    index: int
+    fault: str
+    ratio: float
+    change: float
+    refused: bool
+    own_noise: float = math.nan
+    true_ratio: float = math.nan
+
+
+def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:
+    """Return the results of a predictor on a drive with each of the faults, which follow from ``seed``."""
+    x_pb = physics_alone(drive)
+    settings, T_s, replays = drive.settings, drive.settings.T_s, []
+    for number, (name, fault) in enumerate(FAULTS.items()):
+        measured, last = fault(drive.x_meas, T_s, np.random.default_rng((seed, drive.index, number)))
+        # What a prediction should agree with, and from which sample on
+        sound, first = drive.x_meas, last + 1 + settings.p + 2 * settings.Np
+        if name == OFFSET_STEP:
+            sound, first = measured, last + round(1.0 / T_s)
+        if name == JITTER:
+            sound, first = measured, 0
+        try:
+            x_h = run(predictor, drive.model, settings, drive.x_d, measured)
+            peer, own_noise, true_ratio = sound - x_pb, math.nan, math.nan
+            if name == JITTER:
+                without = run(predictor, drive.model, settings, drive.x_d, drive.x_meas)
+                peer = drive.x_meas - without
+                own_noise, true_ratio = rms(measured - without) / rms(peer), rms(drive.x_meas - x_h) / rms(peer)
+        except SignalError:
+            replays.append(FaultyReplay(drive.index, name, math.inf, math.inf, refused=True))
+            continue
+        ratio = rms((sound - x_h)[first:]) / rms(peer[first:])
+        change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
+        replays.append(FaultyReplay(drive.index, name, ratio, change, False, own_noise, true_ratio))
+    return replays
 
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 0.995, 1.0)

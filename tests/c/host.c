@@ -15,51 +15,34 @@
 
 #ifdef _WIN32
 #include <windows.h>
+#define OPEN(path) LoadLibraryA(path)
+#define FIND(library, name) GetProcAddress(library, name)
 #else
 #include <dlfcn.h>
+#define OPEN(path) dlopen(path, RTLD_NOW | RTLD_LOCAL)
+#define FIND(library, name) dlsym(library, name)
 #endif
 
-#define MAX_REFERENCES 16
+#define MAX_REFERENCES 32
 
-static void fail(const char *what, const char *which)
+static void expect(int held, const char *what, const char *which)
 {
-    fprintf(stderr, "host: %s %s\n", what, which);
-    exit(1);
-}
-
-static void *open_library(const char *path)
-{
-#ifdef _WIN32
-    void *library = LoadLibraryA(path);
-#else
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-#endif
-    if (library == NULL) {
-        fail("cannot load", path);
-    }
-    return library;
-}
-
-/* Put a function's address where a pointer to it is; object and function pointers are of one size here. */
-static void find(void *library, const char *name, void *pointer)
-{
-#ifdef _WIN32
-    const FARPROC address = GetProcAddress(library, name);
-#else
-    const void *address = dlsym(library, name);
-#endif
-    if (address == NULL) {
-        fail("cannot find", name);
-    }
-    memcpy(pointer, &address, sizeof address);
-}
-
-static void check(fmi2Status status, const char *call)
-{
-    if (status != fmi2OK) {
-        fail("not OK:", call);
+    if (!held) {
+        fprintf(stderr, "host: %s %s\n", what, which);
+        exit(1);
     }
 }
+
+/* A function of the library under its name; object and function pointers are of one size here. */
+#define FUNCTION(name) \
+    name##TYPE *call_##name; \
+    { \
+        const void *address = (const void *)FIND(library, #name); \
+        expect(address != NULL, "cannot find", #name); \
+        memcpy(&call_##name, &address, sizeof address); \
+    }
+
+#define CHECK(name, ...) expect(call_##name(__VA_ARGS__) == fmi2OK, "not OK:", #name)
 
 static void print_message(
     fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
@@ -76,59 +59,43 @@ static void print_message(
 
 int main(int argc, char *argv[])
 {
-    if (argc < 8 || argc - 7 > MAX_REFERENCES) {
-        fail("expected", "LIBRARY GUID RESOURCES STEP N_INPUTS REFERENCE... SIGNALS");
-    }
+    expect(
+        argc > 7 && argc - 7 <= MAX_REFERENCES, "expected",
+        "LIBRARY GUID RESOURCES STEP N_INPUTS REFERENCE... SIGNALS");
     const double h = atof(argv[4]);
-    const size_t n_inputs = strtoul(argv[5], NULL, 10), n_references = (size_t)argc - 7;
-    if (n_inputs > n_references) {
-        fail("too few references for", argv[5]);
-    }
+    const size_t n_inputs = strtoul(argv[5], NULL, 10), n = (size_t)argc - 7;
     fmi2ValueReference references[MAX_REFERENCES];
-    for (size_t i = 0; i < n_references; i++) {
+    for (size_t i = 0; i < n; i++) {
         references[i] = (fmi2ValueReference)strtoul(argv[6 + i], NULL, 10);
     }
-    fmi2InstantiateTYPE *instantiate;
-    fmi2EnterInitializationModeTYPE *enter;
-    fmi2ExitInitializationModeTYPE *leave;
-    fmi2SetRealTYPE *set_real;
-    fmi2GetRealTYPE *get_real;
-    fmi2DoStepTYPE *do_step;
-    fmi2TerminateTYPE *terminate;
-    fmi2FreeInstanceTYPE *free_instance;
-    void *library = open_library(argv[1]);
-    find(library, "fmi2Instantiate", &instantiate);
-    find(library, "fmi2EnterInitializationMode", &enter);
-    find(library, "fmi2ExitInitializationMode", &leave);
-    find(library, "fmi2SetReal", &set_real);
-    find(library, "fmi2GetReal", &get_real);
-    find(library, "fmi2DoStep", &do_step);
-    find(library, "fmi2Terminate", &terminate);
-    find(library, "fmi2FreeInstance", &free_instance);
+    void *library = (void *)OPEN(argv[1]);
+    expect(library != NULL, "cannot load", argv[1]);
+    FUNCTION(fmi2Instantiate)
+    FUNCTION(fmi2EnterInitializationMode)
+    FUNCTION(fmi2ExitInitializationMode)
+    FUNCTION(fmi2SetReal)
+    FUNCTION(fmi2GetReal)
+    FUNCTION(fmi2DoStep)
 
     const fmi2CallbackFunctions callbacks = {print_message, calloc, free, NULL, NULL};
-    fmi2Component fmu = instantiate("host", fmi2CoSimulation, argv[2], argv[3], &callbacks, fmi2False, fmi2True);
+    fmi2Component fmu =
+        call_fmi2Instantiate("host", fmi2CoSimulation, argv[2], argv[3], &callbacks, fmi2False, fmi2True);
     FILE *signals = fopen(argv[argc - 1], "rb");
-    if (fmu == NULL || signals == NULL) {
-        fail("cannot begin with", fmu == NULL ? argv[1] : argv[argc - 1]);
-    }
+    expect(fmu != NULL && signals != NULL && n_inputs <= n, "cannot begin with", argv[1]);
     const size_t width = n_inputs > 0 ? n_inputs : 1;
     double row[MAX_REFERENCES], outputs[MAX_REFERENCES];
     for (unsigned long k = 0; fread(row, sizeof row[0], width, signals) == width; k++) {
         if (k == 0) {
-            check(enter(fmu), "fmi2EnterInitializationMode");
-            check(set_real(fmu, references, n_inputs, row), "fmi2SetReal");
-            check(leave(fmu), "fmi2ExitInitializationMode");
+            CHECK(fmi2EnterInitializationMode, fmu);
+            CHECK(fmi2SetReal, fmu, references, n_inputs, row);
+            CHECK(fmi2ExitInitializationMode, fmu);
         }
-        check(set_real(fmu, references, n_inputs, row), "fmi2SetReal");
-        check(do_step(fmu, (double)k * h, h, fmi2True), "fmi2DoStep");
-        check(get_real(fmu, references + n_inputs, n_references - n_inputs, outputs), "fmi2GetReal");
-        for (size_t i = 0; i < n_references - n_inputs; i++) {
-            printf("%a%c", outputs[i], i + 1 < n_references - n_inputs ? ' ' : '\n');
+        CHECK(fmi2SetReal, fmu, references, n_inputs, row);
+        CHECK(fmi2DoStep, fmu, (double)k * h, h, fmi2True);
+        CHECK(fmi2GetReal, fmu, references + n_inputs, n - n_inputs, outputs);
+        for (size_t i = 0; i < n - n_inputs; i++) {
+            printf("%a%c", outputs[i], i + 1 < n - n_inputs ? ' ' : '\n');
         }
     }
-    fclose(signals);
-    check(terminate(fmu), "fmi2Terminate");
-    free_instance(fmu);
     return 0;
 }

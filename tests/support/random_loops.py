@@ -120,17 +120,16 @@ def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     return x_dm, states
 
 
-def run_c(loop: Loop, perturbation: float = 0.0) -> tuple[Array, NDArray[np.int64]]:
-    """Return the same with the C core's; ``perturbation``: largest relative change of its two inputs, random."""
+def run_c(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
+    """Return the same with the C core's."""
     plant, encoder = loop.drive()
     start = float(loop.r[0])
     model = CModel(loop.model, {**loop.values, "x_d_ahead": start, "x_meas": start}).initialise()
-    factors = 1.0 + perturbation * np.random.default_rng(0).uniform(-1, 1, (len(loop.r), 2))
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):
         x_meas = encoder.measure(plant.x)
         x_dm[k], states[k] = model["x_dm"], model["sep_state"]
         plant.step(model["x_dm"], TS)
-        model["x_d_ahead"], model["x_meas"] = float(r * factors[k, 0]), float(x_meas * factors[k, 1])
+        model["x_d_ahead"], model["x_meas"] = float(r), x_meas
         model.step(k * TS, TS)
     return x_dm, states

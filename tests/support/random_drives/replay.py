@@ -1,4 +1,4 @@
-"""Replay of a predictor over a random drive, with a sound or a faulty sensor."""
+"""Replay of a predictor over a random drive."""
 
 from __future__ import annotations
 
@@ -18,19 +18,17 @@ from hybridsep.evaluate.peers import Piece, predict_peers
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from random_drives.drive import Drive
-from random_drives.faults import FAULTS, JITTER, OFFSET_STEP
 
 __all__ = [
     "DIVERGED",
     "PREDICTORS",
-    "FaultyReplay",
     "Replay",
     "Replayed",
     "core_outputs",
     "core_replay",
     "library_replay",
+    "physics_alone",
     "replay",
-    "replay_faults",
 ]
 
 DIVERGED = 1.0
@@ -101,40 +99,9 @@ class Replay:
         return not self.largest <= DIVERGED
 
 
-@dataclass(frozen=True)
-class FaultyReplay:
-    """Result of one drive with a faulty sensor, after the fault.
-
-    Attributes
-    ----------
-    index : int
-    fault : str
-    ratio : float
-        RMS against the sound measurement relative to the physics model's (with jitter: to the run without); infinite
-        where the replay ended with an error.
-    change : float
-        Largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement.
-    refused : bool
-        Whether the replay ended with an error.
-    own_noise : float
-        With jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter
-        that costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted.
-    true_ratio : float
-        With jitter: both predictions judged by the samples without it, in the same ratio.
-    """
-
-    index: int
-    fault: str
-    ratio: float
-    change: float
-    refused: bool
-    own_noise: float = math.nan
-    true_ratio: float = math.nan
-
-
 def replay(drive: Drive, predictor: str, run: Replayed = library_replay, *, peers: bool = False) -> Replay:
     """Return the result of a predictor on a drive, with ``peers`` beside the ARX models refitted before each window."""
-    x_pb, Np = _physics(drive), drive.settings.Np
+    x_pb, Np = physics_alone(drive), drive.settings.Np
     x_hold = _hold(x_pb, drive.x_meas, Np)
     arx = predict_peers([Piece(drive.x_d, drive.x_meas, 0, 0)], Np) if peers else ()
     try:
@@ -147,35 +114,7 @@ def replay(drive: Drive, predictor: str, run: Replayed = library_replay, *, peer
     return Replay(drive.index, drive.kind, drive.text, rms_pb, rms_hold, rms_h, largest, rms_arx)
 
 
-def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:
-    """Return the results of a predictor on a drive with each of the faults, which follow from ``seed``."""
-    x_pb = _physics(drive)
-    settings, T_s, replays = drive.settings, drive.settings.T_s, []
-    for number, (name, fault) in enumerate(FAULTS.items()):
-        measured, last = fault(drive.x_meas, T_s, np.random.default_rng((seed, drive.index, number)))
-        # What a prediction should agree with, and from which sample on
-        sound, first = drive.x_meas, last + 1 + settings.p + 2 * settings.Np
-        if name == OFFSET_STEP:
-            sound, first = measured, last + round(1.0 / T_s)
-        if name == JITTER:
-            sound, first = measured, 0
-        try:
-            x_h = run(predictor, drive.model, settings, drive.x_d, measured)
-            peer, own_noise, true_ratio = sound - x_pb, math.nan, math.nan
-            if name == JITTER:
-                without = run(predictor, drive.model, settings, drive.x_d, drive.x_meas)
-                peer = drive.x_meas - without
-                own_noise, true_ratio = rms(measured - without) / rms(peer), rms(drive.x_meas - x_h) / rms(peer)
-        except SignalError:
-            replays.append(FaultyReplay(drive.index, name, math.inf, math.inf, refused=True))
-            continue
-        ratio = rms((sound - x_h)[first:]) / rms(peer[first:])
-        change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
-        replays.append(FaultyReplay(drive.index, name, ratio, change, False, own_noise, true_ratio))
-    return replays
-
-
-def _physics(drive: Drive) -> Array:
+def physics_alone(drive: Drive) -> Array:
     """Return ``x_pb`` from rest, ``(n,)``, m."""
     discrete = drive.model.discretise(drive.settings.T_s)
     start = drive.x_d[0]
