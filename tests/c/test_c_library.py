@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import re
 import shutil
@@ -180,6 +181,20 @@ def test_saved_blocks_are_judged() -> None:
     assert not predictor.is_valid(saved[:8] + b"\xff" * 8 + saved[16:], 25)
     predictor.parameters["Np"] = 11
     assert not predictor.is_valid(saved, 25)
+
+
+def test_a_limit_of_the_following_error_is_checked_and_a_trip_ends_with_a_rising_reset() -> None:
+    """What becomes of a trip: tests/suite/test_monitor.py."""
+    given = library("compensator", following_error_max=1e-3)
+    assert given.begin(0.0) == 0
+    for allowed, taken in ((-1e-3, 0), (math.nan, 0), (math.inf, 0), (2e-3, 1)):
+        numbers = ctypes.c_double(1e-3), ctypes.c_double(allowed)
+        assert given.core.hsep_compensator_change(given.block, 2, *numbers) == taken
+    alarms = []
+    for level in (0, 0, 0, 0, 1, 1, 0, 1):
+        given.core.hsep_compensator_reset(given.block, level)
+        alarms.append(given.sample(0.0, 2.5e-3).alarm)
+    assert alarms == [0, 0, 1, 1, 0, 0, 1, 0]
 
 
 def test_fast_math_is_refused(tmp_path: Path) -> None:
