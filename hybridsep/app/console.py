@@ -23,9 +23,8 @@ from ..base.metrics import shown_figure
 
 if TYPE_CHECKING:
     from ..cosim.run import Run
-    from ..evaluate.verdict import Verdict
+    from ..fitting.advice import Judged
     from ..logs.columns import Channel
-    from ..logs.units import DisplayUnits
     from ..machines.machine import Machine
 
 __all__ = [
@@ -38,8 +37,8 @@ __all__ = [
     "print_built",
     "print_channels",
     "print_json",
+    "print_judged",
     "print_run",
-    "print_scores",
     "print_written",
     "progress_bar",
     "warn_of_estimates",
@@ -62,70 +61,16 @@ console = _WholeLines(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 
-PREDICTIONS = {"pb": "physics", "hold": "hold", "arx20": "ARX20", "arx40": "ARX40", "h": "hybrid"}
-"""Names in summaries, and what they are called; ARX models are of replays of logs only."""
-
-
-def print_scores(
-    summary: Mapping[str, Any],
-    verdict: Verdict,
-    as_json: bool,
-    title: str,
-    *,
-    unit: str = "m",
-    shown: DisplayUnits | None = None,
-    more: Mapping[str, Any] | None = None,
-) -> None:
-    """Print prediction errors, of a run or of a backtest, and what they mean.
-
-    Parameters
-    ----------
-    summary : mapping
-        Scores, in millionths of the axis's unit.
-    verdict : Verdict
-    as_json : bool
-        Print them as JSON, with ``more``; the names of a rotary axis's end in ``_urad``.
-    title : str
-    unit : {"m", "rad"}
-        Unit of the axis's positions.
-    shown : DisplayUnits, optional
-        Units of the table; ``unit``'s if left out.
-    more : mapping, optional
-    """
-    if as_json:
-        print_json(
-            {
-                **{name.replace("_um", f"_u{unit}"): value for name, value in summary.items()},
-                "verdict": str(verdict),
-                **(more or {}),
-            }
-        )
-        return
-    from ..logs.units import shown_in
-
-    factor, name = (shown or shown_in(unit)).error(1e-6 * float(summary["rms_pb_um"]))
-    keys = [key for key in PREDICTIONS if f"rms_{key}_um" in summary]
-    table = Table(
-        title=f"{title}: prediction error in {name} against the measured position",
-        box=box.SIMPLE,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    for column in ("", *(PREDICTIONS[key] for key in keys), "reduction", "× hold"):
+def print_judged(judged: Judged, title: str, verdict: str) -> None:
+    """Print the errors of a replay, and what they mean."""
+    head, rows = judged.figures()
+    table = Table(head[0], title=title, box=box.SIMPLE, pad_edge=False)
+    for column in head[1:]:
         table.add_column(column, justify="right", no_wrap=True)
-    warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
-    parts = (("", ""), ("_after_warm_up", " after warm-up"))
-    for suffix, label in parts if warmed_up else parts[:1]:
-        for quantity in ("rms", "max"):
-            if f"{quantity}_pb_um{suffix}" in summary:
-                figures = [summary[f"{quantity}_{key}_um{suffix}"] for key in keys]
-                compared = [summary[f"{key}{suffix}"] for key in ("reduction_percent", "ratio_to_hold")]
-                ratios = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
-                label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                shown_sizes = [one if isinstance(one, str) else shown_figure(1e-6 * factor * one) for one in figures]
-                table.add_row(label_text, *shown_sizes, *ratios)
+    for row in rows:
+        table.add_row(*row)
     console.print(table)
-    console.print(str(verdict))
+    console.print(verdict)
 
 
 def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:
@@ -133,10 +78,20 @@ def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] |
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
 
-    if run.kind == PREDICTOR:
-        print_scores(run.summary(), verdict_of(run), as_json, title)
-    else:
-        _print_tracking(run.summary(), as_json, title, limits)
+    summary = run.summary()
+    if run.kind != PREDICTOR:
+        _print_tracking(summary, as_json, title, limits)
+        return
+    if as_json:
+        print_json({**summary, "verdict": str(verdict_of(run))})
+        return
+    table = Table(title=f"{title}: RMS prediction error in µm against the measured position", box=box.SIMPLE)
+    names = {"physics": "rms_pb_um", "hold": "rms_hold_um", "hybrid": "rms_h_um", "× hold": "ratio_to_hold"}
+    for column in names:
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_row(*(shown_figure(summary[name]) for name in names.values()))
+    console.print(table)
+    console.print(str(verdict_of(run)))
 
 
 def _print_tracking(

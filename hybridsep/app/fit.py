@@ -98,12 +98,9 @@ def _again(logs: Sequence[Path], given: Mapping[str, Any]) -> str:
 def _print_fit(found: Fit) -> None:
     """Print what was read and what the checks found, what was identified and how it was judged."""
     import numpy as np
-    from rich import box
-    from rich.table import Table
 
-    from ..base.metrics import shown_figure
     from ..fitting.advice import extent
-    from .console import console
+    from .console import console, print_judged
 
     judged, model, settings = found.judged, found.identification, found.machine.predictor_settings
     factor, position = judged.shown.position
@@ -114,18 +111,12 @@ def _print_fit(found: Fit) -> None:
     for name, of_log in found.findings.items():
         for finding in of_log:
             console.print(f"{name}: {finding}")
-    scale, error = judged.unit
-    table = Table("prediction by", title=f"Error on held-out samples [{error}]", box=box.SIMPLE, pad_edge=False)
-    table.add_column("RMS", justify="right")
-    for one in judged.replay.scored():
-        table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))
     console.print(f"{model.structure}, dead time {model.model.dead_time} samples")
     for line in model.findings:
         console.print(f"  {line}")
     window = f"{1e3 * settings.Np * settings.T_s:.4g} ms"
     console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}")
-    console.print(table)
-    console.print(str(judged.replay.verdict()))
+    print_judged(judged, "Error on held-out samples", str(judged.replay.verdict()))
     for line in found.tracking.lines(judged.shown) if found.tracking else ():
         console.print(line)
 

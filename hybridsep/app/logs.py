@@ -55,6 +55,7 @@ def backtest(
 
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
+    from ..evaluate.backtest import replayed_run
     from ..fitting.advice import Judged, partly_used, recommendation, whole_log_words
     from ..fitting.replay import knew, replay_log
     from ..fmi.weights import warm_predictor
@@ -67,7 +68,8 @@ def backtest(
         RUNS,
         check_outputs,
         console,
-        print_scores,
+        print_json,
+        print_judged,
         print_written,
         progress_bar,
     )
@@ -91,25 +93,30 @@ def backtest(
     shown = shown_of(read.file_unit, axis.unit)
     title = f"{axis.title}, {log.name}"
     with progress_bar(as_json) as advance:
-        replayed = replay_log(predictor, read, advance)
+        scores, replayed = replay_log(predictor, read, advance)
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     words = whole_log_words(warm=weights is not None, known=known)
-    judged = Judged(replayed.judged, read.T_s, shown, "the whole log", known=known)
+    judged = Judged(replayed, read.T_s, shown, "the whole log", known=known)
+    settings = predictor.settings
+    run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)
     for path in saved:
-        (predictor if path.suffix.lower() == ".state" else replayed.run).save(path)
+        (predictor if path.suffix.lower() == ".state" else run).save(path)
     if figure is not None:
-        prediction_figure(replayed.run, title, figure, shown)
+        prediction_figure(run, title, figure, shown)
     if report is not None:
         page = begun_report(title, [read], judged, "Errors of the replay", words)
         write_findings(page, [read], {log.name: findings})
         page.write(report)
+    own, found = scores.verdict, replayed.verdict()
+    verdict = str(replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples))
     if as_json:
+        figures = {name.replace("_um", f"_u{axis.unit}"): value for name, value in scores.summary().items()}
         more = {"findings": findings_table(findings), "advice": recommendation(judged)}
-        print_scores(replayed.summary(), replayed.verdict, True, title, unit=axis.unit, more=more)
+        print_json({**figures, "judged": replayed.judgement(), "verdict": verdict, **more})
         return
     if line := partly_used(read):
         console.print(line)
-    print_scores(replayed.summary(), replayed.verdict, False, title, unit=axis.unit, shown=shown)
+    print_judged(judged, f"{title}: prediction error against the measured position", verdict)
     for line in dict.fromkeys((words, recommendation(judged))):
         console.print(line)
     print_written(report, figure, *saved)

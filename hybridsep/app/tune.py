@@ -58,7 +58,7 @@ def tune(
     The look-ahead is the controller's.
     """
     from ..fitting.advice import partly_used
-    from ..fitting.tuning import candidates, default_values, n_unjudged
+    from ..fitting.tuning import candidates, default_values, unsettled
     from ..fitting.tuning import tune as tune_on
     from ..logs.checks import findings_table
     from ..logs.units import shown_of
@@ -77,7 +77,8 @@ def tune(
         axis.changed("predictor", {"p": max(one.p for one in given), "q": max(one.q for one in given)})
     names = [path.name if [one.name for one in logs].count(path.name) == 1 else str(path) for path in logs]
     read = {name: read_checked(path, reading, axis) for name, path in zip(names, logs, strict=True)}
-    pieces = {name: [(one.x_d, one.x_meas) for one in log.segments()] for name, (log, _) in read.items()}
+    Np = settings.Np
+    pieces = {name: [unsettled(one.x_d, one.x_meas, Np) for one in log.segments()] for name, (log, _) in read.items()}
     with progress_bar(as_json) as advance:
         tuning = tune_on(
             *(axis.model, pieces, given),
@@ -88,7 +89,7 @@ def tune(
     if as_json:
         print_json({**tuning.results(), "findings": {name: findings_table(found) for name, (_, found) in read.items()}})
     else:
-        if in_motion := [name for name, one in pieces.items() if any(n_unjudged(x_d, settings.Np) for x_d, _ in one)]:
+        if in_motion := [name for name, log in pieces.items() if any(one.n_settling for one in log)]:
             show([f"{', '.join(in_motion)}: begins in motion, and is ranked without its first window"], ())
         for line in (partly_used(log) for log, _ in read.values()):
             console.print(line) if line else None

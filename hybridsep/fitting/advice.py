@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.metrics import rms_ratio
 from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
@@ -28,10 +29,6 @@ _STANDSTILL = 1e-3
 _KNOWN = (
     "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log of the axis."
 )
-
-_LEARNS = 0.8
-"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of the test samples, below
-which a longer log is said to help."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +67,21 @@ class Judged:
     def unit(self) -> tuple[float, str]:
         """Factor and name of the unit in which errors are shown."""
         return self.shown.error(self.replay.rms()[0])
+
+    def figures(self) -> tuple[list[str], list[list[str]]]:
+        """Return head and rows of a table of the errors over the test samples."""
+        scale, unit = self.unit
+        scored = self.replay.scored()
+        rows = []
+        for one in scored:
+            size = np.abs(one.errors[~np.isnan(one.errors)])
+            if one.diverged or not size.size:
+                rows.append([one.name, "diverged" if one.diverged else "–", "", "", ""])
+                continue
+            sizes = (f"{scale * figure:.4g}" for figure in (one.rms, np.quantile(size, 0.95), size.max()))
+            ratio = rms_ratio(one.rms, scored[0].rms, self.replay.least)
+            rows.append([one.name, *sizes, "–" if math.isnan(ratio) else f"{ratio:.3f}"])
+        return ["prediction by", f"RMS [{unit}]", "95 % below", "largest", "× physics"], rows
 
 
 def whole_log_words(*, warm: bool, known: bool) -> str:
@@ -162,24 +174,9 @@ def _what_would_help(judged: Judged) -> str:
                 f"{hybrid / others[best]:.2f} × the error of {peer} (--Np {n})"
             )
             break
-    early, late = _ratios(judged)
-    if late < _LEARNS * early:
-        hints.append(
-            f"a longer log: its error falls from {early:.2f} to {late:.2f} × the error of the best from half to half"
-        )
     if judged.period:
         hints.append(judged.period)
     return f" What may help: {'; '.join(hints)}." if hints else ""
-
-
-def _ratios(judged: Judged) -> tuple[float, float]:
-    """Return the hybrid's error relative to the best of the others over each half of the test samples."""
-    best, hybrid = judged.replay.best().errors, judged.replay.scored()[-1].errors
-    known = ~np.isnan(best) & ~np.isnan(hybrid)
-    halves = [np.array_split(one[known] ** 2, 2) for one in (hybrid, best)]
-    means = [[float(np.mean(half)) if half.size else math.nan for half in one] for one in halves]
-    early, late = (math.sqrt(one / other) if other > 0.0 else math.nan for one, other in zip(*means, strict=True))
-    return early, late
 
 
 def peers_in_words(judged: Judged) -> str:

@@ -10,10 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.metrics import largest, rms, rms_ratio
+from ..base.metrics import rms, rms_ratio
 from ..base.signals import Array, Indices
-from ..cosim.run import Run
-from ..evaluate.backtest import Backtest, backtest, replayed_run
+from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..logs.checks import resolution
@@ -23,7 +22,6 @@ from ..predict.predictor import HybridPredictor
 __all__ = [
     "PREDICTIONS",
     "Judgement",
-    "LogReplay",
     "Recording",
     "Replay",
     "Scored",
@@ -398,53 +396,18 @@ def knew(saved: HybridPredictor, replayed: HybridPredictor) -> bool:
     return alike and np.array_equal(one.physics, other.physics)
 
 
-@dataclass(frozen=True)
-class LogReplay:
-    """A log that was replayed, beside ARX models, as ``hybridsep backtest`` scores and saves it.
+def replay_log(
+    predictor: HybridPredictor, log: Log, progress: Callable[[str, float], object]
+) -> tuple[Backtest, Replay]:
+    """Replay a log with a predictor, which learns it, beside ARX models that are fitted to all samples so far.
 
-    Attributes
-    ----------
-    scores : Backtest
-    judged : Replay
-        With ARX models fitted again before each window to all samples so far.
-    run : Run
-        Predictions sample by sample.
+    Raises
+    ------
+    SignalError
+        If a prediction diverges.
     """
-
-    scores: Backtest
-    judged: Replay
-    run: Run
-
-    @property
-    def verdict(self) -> Verdict:
-        """Verdict with all that was compared."""
-        own, found = self.scores.verdict, self.judged.verdict()
-        return replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples)
-
-    def summary(self) -> dict[str, float | int | str]:
-        """Return the figures of the replay and of the ARX models by name.
-
-        ``rms_arx20_um``, ``max_arx20_um``, … are as :meth:`~hybridsep.evaluate.backtest.Scores.summary` has the others,
-        and ``"diverged"`` of one that did.
-        """
-        found: dict[str, float | int | str] = dict(self.scores.summary())
-        active = self.scores.active
-        for suffix, counted in (("", np.ones(len(active), np.bool_)), ("_after_warm_up", active)):
-            for quantity, figure in (("rms", _rms), ("max", largest)):
-                for peer, one in zip(self.judged.peers, self.judged.scored()[2:-1], strict=True):
-                    known = one.errors[counted & ~np.isnan(one.errors)]
-                    value = 1e6 * figure(known) if known.size else math.nan
-                    found[f"{quantity}_{peer.name.lower()}_um{suffix}"] = "diverged" if one.diverged else value
-        return found
-
-
-def replay_log(predictor: HybridPredictor, log: Log, progress: Callable[[str, float], object]) -> LogReplay:
-    """Replay a log with a predictor, which learns it on the way; SignalError if a prediction diverges."""
     n = len(log.t)
     found = backtest(predictor, log, on_batch=lambda batch: progress("replay", 0.8 * batch.k / n))
-    delay = predictor.settings.n_late
     recordings = tuple(Recording(one.x_d, one.x_meas, 0) for one in log.segments())
-    judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, delay)
-    judged = judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))
-    run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np, measurement_delay=delay)
-    return LogReplay(found, judged, run)
+    judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, predictor.settings.n_late)
+    return found, judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))

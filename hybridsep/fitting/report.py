@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.signal import welch
 
-from ..base.metrics import coverage, rms_ratio
+from ..base.metrics import coverage
 from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..identify.model import IdentifiedModel, deviation_words, shown_estimates
@@ -131,20 +131,7 @@ def write_tracking(report: Report, lines: Sequence[str]) -> None:
 
 def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:
     report.heading(title)
-    scale, unit = judged.unit
-    scored = judged.replay.scored()
-    rows = []
-    for one in scored:
-        size = np.abs(one.errors[~np.isnan(one.errors)])
-        if one.diverged or not size.size:
-            rows.append([one.name, "diverged" if one.diverged else "–", "", "", ""])
-            continue
-        figures = (one.rms, np.quantile(size, 0.95), size.max())
-        ratio = rms_ratio(one.rms, scored[0].rms, judged.replay.least)
-        rows.append(
-            [one.name, *(f"{scale * figure:.4g}" for figure in figures), "–" if math.isnan(ratio) else f"{ratio:.3f}"]
-        )
-    report.table(["prediction by", f"RMS [{unit}]", "95 % below", "largest", "× physics"], rows)
+    report.table(*judged.figures())
     report.paragraph(
         f"{how} Each window was predicted before any of its samples was known, as in the machine. "
         f"{peers_in_words(judged)}",

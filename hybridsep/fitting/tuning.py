@@ -17,7 +17,7 @@ import numpy as np
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
-from ..base.signals import Array, as_measured, as_samples
+from ..base.signals import Array
 from ..logs.checks import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
@@ -26,35 +26,28 @@ from .replay import Recording, replay
 
 __all__ = [
     "TUNED",
-    "Piece",
     "Tuning",
     "candidates",
     "default_values",
     "joint_ratio",
-    "n_unjudged",
-    "replayed_losses",
+    "losses",
     "tune",
+    "unsettled",
 ]
 
-Piece = tuple[Array, Array]
-"""Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
-
-Logs = Mapping[str, Sequence[Piece]]
-"""Logs by name, each in pieces without a gap."""
+Logs = Mapping[str, Sequence[Recording]]
+"""Logs by name, each in pieces without a gap, as of :func:`unsettled`."""
 
 Values = Mapping[str, Sequence[Any]]
 """Values to try, by the fields of settings."""
 
 Progress = Callable[[float], object]
 
-_Task = tuple[str, Sequence[Piece], PredictorSettings]
-"""Name and pieces of a log, and a candidate."""
+_Task = tuple[Sequence[Recording], PredictorSettings]
+"""A log and a candidate."""
 
 TUNED = {name: PredictorSettings.parameters()[name] for name in PredictorSettings.TUNED}
 """Parameters that can be tuned, by their fields."""
-
-_CANDIDATES_MAX = 100_000
-"""Candidates beyond which a list is a slip of the pen."""
 
 _LAMBDA_FACTORS = (1.0, 1e2, 1e4)
 """Values without averaging, relative to the machine's own."""
@@ -178,20 +171,15 @@ def tune(
     model : ModalModel
         ``G_pb``.
     logs : mapping
-        Pieces ``(x_d, x)`` by the log's name; on each log every candidate begins untrained.
+        On each log every candidate begins untrained.
     candidates : sequence of PredictorSettings
         The machine's own first; each takes a replay a log.
     jobs : int
         Processes; the result is the same for any number.
     progress : callable, optional
         Called with the fraction done.
-
-    Raises
-    ------
-    SignalError
-        If a log's samples cannot be used; the message names the log.
     """
-    tasks = [(name, pieces, one) for name, pieces in logs.items() for one in candidates]
+    tasks = [(recordings, one) for recordings in logs.values() for one in candidates]
     by_log = np.reshape(_losses(model, tasks, jobs, progress), (len(logs), -1, 3))
     # A replay that diverges leaves no baselines; all replays of a log have the same.
     sound = np.argmax(~np.isnan(by_log[:, :, 0]), axis=1)
@@ -204,76 +192,39 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
     n, n_jobs = len(tasks), min(jobs, len(tasks))
     if n_jobs == 1:
         return [
-            _task_losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
+            losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
             for i, task in enumerate(tasks)
         ]
     ignore = (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is this process's
     pool = ProcessPoolExecutor(n_jobs, get_context("spawn"), initializer=signal.signal, initargs=ignore)
     found = []
     try:
-        for losses in pool.map(partial(_task_losses, model), tasks):
-            found.append(losses)
+        for one in pool.map(partial(losses, model), tasks):
+            found.append(one)
             progress(len(found) / n)
     finally:
         pool.shutdown(cancel_futures=True)
     return found
 
 
-def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Array:
-    name, pieces, candidate = task
-    try:
-        return replayed_losses(model, pieces, candidate, progress)
-    except SignalError as error:
-        raise SignalError(f"{name}: {error}") from error
-
-
-def n_unjudged(x_d: Array, Np: int) -> int:
-    """Return how many leading samples of a piece are not scored: the first window, if the piece begins in motion.
+def unsettled(x_d: Array, x: Array, Np: int) -> Recording:
+    """Return a piece of a log whose first window does not judge where it begins in motion.
 
     No model knows the state of the axis there, so its error says nothing of a candidate, but would dominate the RMS.
     """
-    return Np if len(x_d) > Np and starts_in_motion(x_d) else 0
+    return Recording(x_d, x, 0, Np if len(x_d) > Np and starts_in_motion(x_d) else 0)
 
 
-def replayed_losses(
-    model: ModalModel,
-    pieces: Sequence[Piece],
-    candidate: PredictorSettings,
-    progress: Progress = lambda _done: None,
-) -> Array:
+def losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Array:
     """Return the losses of a candidate by a replay of its own: RMS of physics model, hold and hybrid, ``(3,)``, m.
 
-    Without :func:`n_unjudged` samples. Where it diverges the last is infinite, and the others are NaN.
-
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    pieces : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
-        Each begins at rest; what was learned before is kept, and only the first has a warm-up. With averaging
-        measurements may be NaN, and are not scored there.
-    candidate : PredictorSettings
-    progress : callable, optional
-        Called with the fraction done.
-
-    Raises
-    ------
-    SignalError
-        If samples cannot be used.
+    Where it diverges the last is infinite, and the others are NaN.
     """
-    for x_d, x in pieces:
-        if len(x_d) != len(x) or not len(x_d):
-            raise SignalError(f"x_d and x must have as many samples, at least one, got {len(x_d)}, {len(x)}")
-        (as_measured if candidate.averaging else as_samples)(x, "x", len(as_samples(x_d, "x_d")))
+    recordings, candidate = task
     try:
-        recordings = [Recording(x_d, x, 0) for x_d, x in pieces]
-        found = replay(HybridPredictor(model, candidate), recordings, progress=progress)
-    except SignalError:  # the samples are sound: it diverges
+        return np.array(replay(HybridPredictor(model, candidate), recordings, progress=progress).rms())
+    except SignalError:  # samples that were read are sound: it diverges
         return np.array([math.nan, math.nan, math.inf])
-    firsts = np.cumsum([0, *(len(x) for _, x in pieces[:-1])])
-    left = [first + np.arange(n_unjudged(x_d, candidate.Np)) for first, (x_d, _) in zip(firsts, pieces, strict=True)]
-    errors = np.delete(found.errors(), np.concatenate(left), axis=1)
-    return np.asarray(np.sqrt(np.nanmean(errors**2, axis=1)))
 
 
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
@@ -308,7 +259,7 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
     Raises
     ------
     ParameterError
-        If a value does not fit the window or has no effect, or there are too many candidates.
+        If a value does not fit the window, or has no effect.
     """
     for name, given in values.items():
         if name in PredictorSettings.AVERAGING and not settings.averaging:
@@ -318,10 +269,6 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
                 replace(settings, **{name: value})
             except ParameterError as error:
                 raise ParameterError(f"{TUNED[name].name}: {error}") from error
-    n = math.prod(len(given) for given in values.values())
-    if n > _CANDIDATES_MAX:
-        names = " and ".join(TUNED[name].name for name in values)
-        raise ParameterError(f"{names} have {n} combinations, at most {_CANDIDATES_MAX} are allowed; take fewer")
     combined = [
         replace(settings, **dict(zip(values, combination, strict=True)))
         for combination in itertools.product(*values.values())

@@ -30,15 +30,12 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert (summary["n_samples"], summary["n_batches"]) == (6001, 61)
     status, out, _ = hybridsep("backtest", log, *paper)
     assert status == 0
-    assert f"{summary['rms_h_um']:.2f}" in out
-    assert f"{summary['ratio_to_hold']:.2f}" in out
-    assert "after warm-up" in out
+    assert f"{summary['rms_h_um']:.4g}" in out
     assert " ".join(summary["verdict"].split()) in " ".join(out.split())
     assert summary["verdict"].startswith("Better than the physics model: 0.4")
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="true", t_init=0))
     assert status == 0
     assert "RMS" in out
-    assert "after warm-up" not in out
 
 
 def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:

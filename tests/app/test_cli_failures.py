@@ -101,7 +101,7 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "200"}
     done = command("backtest", log, "-m", MACHINE, env=ascii_only)
     assert done.returncode == 0, done.stderr
-    assert b"prediction error in ?m against" in done.stdout
+    assert b"RMS [?m]" in done.stdout
 
 
 @pytest.mark.slow

@@ -173,7 +173,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert "Judged by 10 windows only." in out
     assert "So far the hybrid is " in out
     assert "judged by 10 windows only: record at least 1.7 s." in out
-    assert "held-out samples [µm]" in out
+    assert "RMS [µm]" in out
 
 
 @pytest.mark.slow

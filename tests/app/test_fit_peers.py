@@ -90,7 +90,7 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"
     assert f"axis.csv: {head}, travel 60 deg" in words
     assert "Np = 40 (80 ms)" in words
-    assert "held-out samples [mdeg]" in words
+    assert "RMS [mdeg]" in words
     written = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     page = unescape(written.replace(get_plotlyjs(), ""))
     assert head in page.partition("<h2>")[0]

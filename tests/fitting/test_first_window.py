@@ -14,7 +14,7 @@ from hybridsep import HybridPredictor, load_machine
 from hybridsep.base.metrics import rms
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fitting.choice import with_window
-from hybridsep.fitting.tuning import n_unjudged, replayed_losses
+from hybridsep.fitting.tuning import losses, unsettled
 
 NP = 50
 FIRST = 40
@@ -25,14 +25,13 @@ def test_losses_are_those_of_a_replay_without_its_first_window() -> None:
     machine = load_machine("spring_mass_damper")
     settings = replace(with_window(machine.predictor_settings, NP), averaging=False, measurement_delay=0)
     x_d, x = commanded()[FIRST:2000], measured(0)[FIRST:2000]
-    assert n_unjudged(x_d, NP) == NP
-    assert n_unjudged(commanded()[:2000], NP) == 0
-    assert n_unjudged(x_d[:NP], NP) == 0  # nothing would be left
+    assert unsettled(commanded()[:2000], measured(0)[:2000], NP).n_settling == 0
+    assert unsettled(x_d[:NP], x[:NP], NP).n_settling == 0  # nothing would be left
     found = backtest(HybridPredictor(machine.model, settings), x_d, x)
     expected = [rms((x - one)[NP:]) for one in (found.x_pb, found.x_hold, found.x_h)]
     assert rms(x - found.x_pb) > 1.2 * expected[0]
-    losses = replayed_losses(machine.model, [(x_d, x)], settings)
-    np.testing.assert_allclose(losses, expected, rtol=1e-6)
+    found_losses = losses(machine.model, ([unsettled(x_d, x, NP)], settings))
+    np.testing.assert_allclose(found_losses, expected, rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -44,11 +44,6 @@ def test_the_least_penalty_that_is_allowed_bounds_the_defaults() -> None:
         (PAPER, {"p": (5, 101)}, "p: p must be 1 … Np = 100, got 101; lower p or raise Np"),
         (PAPER, {"q": (100,)}, "q: q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
         (PAPER, {"effect": (1e-5,)}, "effect has an effect with averaging only: set averaging = true, too"),
-        (
-            replace(PAPER, Np=1000),
-            {"p": range(1, 1001), "lam": [10.0**-i for i in range(30)], "q": range(4)},
-            "p and lambda and q have 120000 combinations, at most 100000 are allowed; take fewer",
-        ),
     ],
 )
 def test_what_does_not_fit_is_refused(settings: PredictorSettings, values: dict[str, list[float]], words: str) -> None:

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from predictor_cases import MODEL, small_signals
 
-from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.fitting.tuning import Logs, Tuning, replayed_losses, tune
+from hybridsep.fitting.tuning import Logs, Tuning, losses, tune, unsettled
 
 PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, averaging=False, t_init=0.0)
 CANDIDATES = [PAPER, *(replace(PAPER, p=p, lam=lam) for p in (1, 20) for lam in (1e-10, 1e-6))]
-LOGS: Logs = {"one": [small_signals(300)], "two": [small_signals(130, seed=1), small_signals(90, seed=2)]}
+LOGS: Logs = {
+    name: [unsettled(*small_signals(n, seed=seed), PAPER.Np) for n, seed in pieces]
+    for name, pieces in {"one": [(300, 0)], "two": [(130, 1), (90, 2)]}.items()
+}
 
 
 def of(rms_h: list[list[float]], rms_hold: list[float]) -> Tuning:
@@ -28,7 +30,7 @@ def of(rms_h: list[list[float]], rms_hold: list[float]) -> Tuning:
 def test_each_log_is_replayed_untrained_and_ranked_by_the_geometric_mean() -> None:
     found = tune(MODEL, LOGS, CANDIDATES)
     for i, pieces in enumerate(LOGS.values()):
-        alone = [replayed_losses(MODEL, pieces, one) for one in CANDIDATES]
+        alone = [losses(MODEL, (pieces, one)) for one in CANDIDATES]
         assert found.rms_h[:, i].tolist() == [one[2] for one in alone]
         assert (found.rms_pb[i], found.rms_hold[i]) == tuple(alone[0][:2])
     np.testing.assert_allclose(found.ratio, np.sqrt(np.prod(found.rms_h / found.rms_hold, axis=1)), rtol=1e-12)
@@ -64,10 +66,3 @@ def test_the_result_is_the_same_for_any_number_of_processes() -> None:
     np.testing.assert_array_equal(one.rms_h, two.rms_h)
     np.testing.assert_array_equal(one.rms_pb, two.rms_pb)
     np.testing.assert_array_equal(one.rms_hold, two.rms_hold)
-
-
-def test_samples_that_cannot_be_used_name_their_log() -> None:
-    x_d, x = small_signals(60)
-    x[7] = np.nan
-    with pytest.raises(SignalError, match=r"^bad: x must be finite, got nan at sample 7$"):
-        tune(MODEL, {**LOGS, "bad": [(x_d, x)]}, CANDIDATES)
