@@ -180,6 +180,7 @@ REFUSED = [
     ("cosim --unit furlong", UNITS),
     ("cosim --out run.xlsx", "--out must end in .csv or .npz, got 'run.xlsx'"),
     ("cosim --out {log}/run.csv", "is a file, not a folder"),
+    ("cosim --out {folder}", "--out must be a file, got the folder"),
     ("cosim --figure run.pdf", "--figure must end in .png, got 'run.pdf'"),
     ("cosim --set predictor.Np=10", "p must be 1 … Np = 10, got 50"),
     ("cosim --compensate magic", "--compensate must be one of off, physics, hybrid, got 'magic'"),
@@ -227,7 +228,7 @@ def test_arguments_are_checked_before_any_work(
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work has begun")
 
-    folder, before = tmp_path / "here", log.read_bytes()
+    folder, before = tmp_path / "here.csv", log.read_bytes()
     folder.mkdir()
     monkeypatch.chdir(folder)
     for place in ("fmi.archive.build_fmu", "fitting.replay.backtest", "cosim.loop.cosimulate"):

@@ -17,7 +17,7 @@ from staircase_data import commanded, measured
 
 from hybridsep import read_log
 from hybridsep.base.signals import Array
-from hybridsep.fitting.advice import extent
+from hybridsep.fitting.advice import extent, partly_used
 from hybridsep.logs.units import shown_in, shown_of
 
 NP = 20
@@ -105,8 +105,9 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
 def test_missing_measurements_are_not_used_of_a_log(tmp_path: Path) -> None:
     x = measured(0)[:1600].copy()
     x[:400] = np.nan
-    used = extent([read_log(write_rows(tmp_path / "axis.csv", commanded()[:1600], x))])
-    assert used == "1200 of 1600 samples (75 %), 1.6 s at 1000 Hz"
+    log = read_log(write_rows(tmp_path / "axis.csv", commanded()[:1600], x))
+    assert partly_used(log) == f"axis.csv: used are {extent([log])}"
+    assert extent([log]) == "1200 of 1600 samples (75 %), 1.6 s at 1000 Hz"
 
 
 @pytest.mark.parametrize(
