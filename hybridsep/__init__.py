@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .logs.log import Log, read_log
     from .machines.machine import Machine, load_machine, machine_names, paper_machine
     from .model.physics import ModalModel, Mode
-    from .online.look_ahead import LookAhead
+    from .online.look_ahead import LookAhead, SepState
     from .plants.plant import Encoder, Plant, simulate
     from .plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
     from .predict.predictor import HybridPredictor

@@ -17,11 +17,8 @@ from mechanism import (
     squared_command,
 )
 from mechanism_cases import demonstrate
-from numpy.typing import NDArray
 
 from hybridsep.model.physics import ModalModel, Mode
-
-Array = NDArray[np.float64]
 
 M, C, K, TS = 1.0, 15.7, 24674.0, 1e-3
 N = 1500
