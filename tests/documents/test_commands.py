@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import Run, run_line
 from places import ROOT
-from quick_fits import without_other_windows
+from quick_fits import without_other_settings, without_other_windows
 
 from benchmarks.pictures import RECORD, judged_figures
 from hybridsep import staircase
@@ -62,6 +62,7 @@ def test_the_pages_run_from_first_to_last(
 ) -> None:
     without_other_windows(monkeypatch)
     if not whole:
+        without_other_settings(monkeypatch)
         monkeypatch.setattr("hybridsep.staircase", lambda: staircase()[:MOVES])
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
