@@ -25,7 +25,7 @@ from hybridsep.compensate import newton, planning, qp, splines
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict import uncertainty
-from hybridsep.predict.averaging import experts, features, model, stacking, start
+from hybridsep.predict.averaging import experts, features, model, recall, stacking, start
 from hybridsep.predict.averaging.constants import CONSTANTS
 
 ROOT = Path(__file__).resolve().parent
@@ -42,6 +42,7 @@ PREDICTIONS: Declared = {
     "stacking": [stacking],
     "experts": [experts],
     "features": [features],
+    "recall": [recall],
     "averaging": [model],
 }
 """Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""

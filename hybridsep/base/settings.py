@@ -172,13 +172,16 @@ class PredictorSettings(Settings):
     period : float
         With averaging: period of a disturbance that repeats with the position, m, as of cogging or a screw's pitch; 0:
         none.
+    recall : int
+        With averaging: samples of the commands and residuals that are remembered, so that a motion that repeats is
+        predicted by what was measured then; 0: none.
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
         A compensator's predictor needs averaging for it. −1: it comes a sample early, as under a sequential
         co-simulation master, and is held for one sample.
     """
 
-    AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period")
+    AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period", "recall")
     """Fields of the residual model with averaging."""
 
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
@@ -245,6 +248,12 @@ class PredictorSettings(Settings):
         display_unit="mm",
         nonzero=1e-9,
         learned=True,
+    )
+    recall: int = whole(
+        8192,
+        0,
+        1_000_000,
+        "samples that are remembered, to predict a repeated motion by what was measured then, with averaging; 0: none",
     )
     measurement_delay: int = whole(
         0, -1, 10_000, "whole samples by which the measured position is late; −1: early, under a sequential master"

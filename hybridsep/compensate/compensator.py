@@ -222,7 +222,7 @@ class SepCompensator:
         chosen = self._planning.choose(predictor, preview, most)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, scales=chosen.scales)
+        prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
         self._pending = PendingPlan(
             chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.ends_hybrid
         )

@@ -22,11 +22,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, ExpertPrediction, SolvedExpert
-from ..predict.averaging.features import N_FRICTION, N_LASTING, StaticFeatures, StaticState
+from ..predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve, solve_again
@@ -39,6 +40,9 @@ _OWN_REACH = 1e-3
 the friction's is the tangent."""
 
 
+_AT_STOP = 0.999999
+"""Share of its distance from which on a stop operator is at its stop: rounding may have moved it."""
+
 _APART = 4
 """Samples behind the window that share the variance of the first one's features."""
 
@@ -48,8 +52,12 @@ class DisturbanceSlopes(NamedTuple):
 
     Attributes
     ----------
-    friction : (n, 6) array, s/m
+    friction : (n, N_FRICTION) array, s/m
         Of each friction with the commanded velocity.
+    stops : (N_STOPS,) array, 1/m
+        Of each stop operator with the command, since it was at its stop.
+    at_stop : (n, N_STOPS) array of int
+        Last sample at which it was there, counted from 1; 0: before all of them.
     stiffness, damping : (n,) array, m and m/s
         Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
     of_position : (n, n_disturbances − 8) array, 1/m
@@ -59,30 +67,45 @@ class DisturbanceSlopes(NamedTuple):
     """
 
     friction: Array
+    stops: Array
+    at_stop: NDArray[np.intp]
     stiffness: Array
     damping: Array
     of_position: Array
     of_velocity: Array
 
-    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
+    def behind(self, n: int) -> DisturbanceSlopes:
+        """Return the slopes behind the first ``n`` samples."""
+        at_stop = np.maximum(self.at_stop[n:] - n, 0)
+        friction, stops, _, *others = self
+        return DisturbanceSlopes(friction[n:], stops, at_stop, *(one[n:] for one in others))
+
+    def change(self, weights: Array, changes: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
         """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
 
         Parameters
         ----------
         weights : (n_disturbances,) array
+        changes : (n, m) array, m
+            Changes of the commands, each a column.
         velocity : (n, m) array, m/s
             Changes of the commanded velocity, each a column.
         moved, moved_velocity : (n, m) array, m and m/s
             Changes of the position, and of its velocity.
         """
-        of_position = weights[N_FRICTION] * self.stiffness + self.of_position @ weights[N_LASTING:]
+        stiffness = N_FRICTION + N_STOPS
+        of_position = weights[stiffness] * self.stiffness + self.of_position @ weights[N_LASTING:]
         of_velocity = self.friction @ weights[:N_FRICTION]
         if n_own := self.of_velocity.shape[1]:
             of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
+        of_stops, moves = np.zeros_like(changes), np.concatenate((np.zeros_like(changes[:1]), changes))
+        for i, weight in enumerate(self.stops * weights[N_FRICTION:stiffness]):
+            of_stops += weight * (changes - moves[self.at_stop[:, i]])
         return np.asarray(
-            of_velocity[:, None] * velocity
+            of_stops
+            + of_velocity[:, None] * velocity
             + of_position[:, None] * moved
-            + (weights[N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
+            + (weights[stiffness + 1] * self.damping)[:, None] * moved_velocity
         )
 
 
@@ -112,9 +135,9 @@ class PlanModel:
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
         self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
-        self._state, self._late, self._start = state, late, start
+        self._state, self._late, self._start, self._path = state, late, start, path
         window = self._window(x_d)
-        self.scales = model.scales_of(window, path)
+        self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.fixed.settings.Np :]
@@ -125,7 +148,7 @@ class PlanModel:
         """Return the preview under commands ``x_d``, and what is late before it."""
         command = np.concatenate((self._late, x_d))
         x_pb, _ = self._discrete.forced_response(self._state, command)
-        return ResidualWindow(command, x_pb, self._start)
+        return ResidualWindow(command, x_pb, self._start, self._path)
 
     @property
     def has_learned(self) -> bool:
@@ -134,7 +157,7 @@ class PlanModel:
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
-        return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan.predictions)
+        return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)
 
     def position(self, at: AveragedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
@@ -154,9 +177,9 @@ class PlanModel:
         reach : float
             Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale.
         """
-        n_late, weights = len(self._late), self._model.learned.stack.weights.tolist()
+        n_late, weights = len(self._late), at.shares.tolist()
         over_all = slopes_of(self._static, self._model.run.static, at.window, at.x, self.scales.velocity, reach)
-        slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
+        slopes = over_all.behind(n_late)
         total: Array = passed.copy()
         for expert, one in self._solved.items():
             weight = weights[expert.place]
@@ -188,8 +211,8 @@ class PlanModel:
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
         weights, first = solved.solution.weights[: solved.n_static], 2 + self._static.n_differences
         linear, own, differences = np.split(weights[1:], [first - 1, first - 1 + self._static.n_disturbances])
-        disturbance = slopes.change(own, velocity, passed, moved)
-        disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
+        disturbance = slopes.change(own, changes, velocity, passed, moved)
+        disturbance += np.diff(slopes.change(differences, changes, velocity, passed, moved), axis=0, prepend=0.0)
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
         difference = passed
         for weight in linear:
@@ -216,7 +239,7 @@ def slopes_of(
         Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
         0: the tangent.
     """
-    x_d, x_pb, start = window
+    x_d, x_pb, start, _ = window
     v_d, spread = static.velocity(state, x_d), static.spread(velocity_scale)
     v, half = v_d[:, None], reach * velocity_scale
     if half > 0.0:
@@ -235,8 +258,17 @@ def slopes_of(
         )
         of_velocity = (static.own_at(start + x, v_d + half) - static.own_at(start + x, v_d - half)) / (2.0 * half)
     damping = 2.0 * np.abs(static.damped_velocity(state, x_pb, x))
+    distances, stops = static.distances(velocity_scale), static.stops(state, x_d, velocity_scale)
+    places = np.arange(1, len(x_d) + 1)[:, None]
+    at_stop = np.maximum.accumulate(np.where(np.abs(stops) < _AT_STOP * distances, 0, places))
     return DisturbanceSlopes(
-        friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
+        friction,
+        1.0 / distances,
+        at_stop,
+        2.0 * np.abs(x),
+        damping,
+        np.hstack([np.empty((len(x), 0)), *of_position]),
+        of_velocity,
     )
 
 

@@ -81,7 +81,7 @@ class PaperModel:
         """Return the model with what another one has learned."""
         return replace(self, regression=regressions[0])
 
-    def begin_in_motion(self, window: ResidualWindow) -> PaperModel:
+    def begin_in_motion(self, window: ResidualWindow, scales: FeatureScales | None) -> PaperModel:
         """Return the model at the beginning of a run in motion: the same, a run of the paper's begins at rest."""
         return self
 

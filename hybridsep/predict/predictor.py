@@ -179,7 +179,7 @@ class HybridPredictor:
         self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
 
     @one_blas_thread
-    def predict(self, x_d: ArrayLike, *, scales: FeatureScales | None = None) -> Prediction:
+    def predict(self, x_d: ArrayLike, *, path: Array | None = None, scales: FeatureScales | None = None) -> Prediction:
         """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
@@ -188,6 +188,8 @@ class HybridPredictor:
         ----------
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
+        path : (m,) array, m, optional
+            In a compensator, commands of its preview before they are modified; ``x_d`` if left out.
         scales : FeatureScales, optional
             With averaging: scales of the features, in a compensator; from ``x_d`` if left out.
 
@@ -205,9 +207,10 @@ class HybridPredictor:
         if n == 0:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if state.start is None else state.start
+        path = (command if path is None else path) - start
         command = np.concatenate((state.late, command - start))
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
-        forecast = state.residual.forecast(ResidualWindow(command, x_pb, start), scales)
+        forecast = state.residual.forecast(ResidualWindow(command, x_pb, start, path), scales)
         self.pending = self._with_error(forecast)
         std = np.maximum(self.pending.error.std[late:], state.residual.farthest)
         return Prediction(x_pb[late:] + start, forecast.e_h[late:], std, self._warm_up(n))
@@ -249,12 +252,12 @@ class HybridPredictor:
         e_pb = measured - start - forecast.window.x_pb[:m]
         if state.k == 0 and residual.may_miss and not self.planned:
             # The run may have begun in motion.
-            x_d, x_pb, _ = forecast.window
+            x_d, x_pb, _, path = forecast.window
             before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)
             if before is not None:
-                window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start)
+                window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start, path)
                 physics, e_pb = physics + before.state, e_pb - before.x_pb[:m]
-                forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window)
+                forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window, forecast.scales)
         residual, accepted = residual.learn(forecast, measured - start, fold=learn)
         uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
         x_d = forecast.window.x_d
@@ -367,7 +370,8 @@ class HybridPredictor:
         arrays = {"modes": np.array(modes), **arrays_of(self.state)}
         if self.pending is not None:  # its forecast follows from the state
             forecast = self.pending.forecast
-            arrays |= {"pending_x_d": forecast.window.x_d, "pending_x_pb": forecast.window.x_pb}
+            x_d, x_pb, _, path = forecast.window
+            arrays |= {"pending_x_d": x_d, "pending_x_pb": x_pb, "pending_path": path}
             meta["pending_start"] = forecast.window.start
             if (scales := forecast.scales) is not None:  # a compensator has them from its preview
                 arrays["pending_scales"] = np.array(
@@ -419,7 +423,8 @@ class HybridPredictor:
             scales = FeatureScales(velocity, saved.array("pending_largest", residual.n_scaled), *others)
             if min(velocity, *others, *scales.largest) < 0.0:
                 raise saved.error("the scales of the pending window must be ≥ 0")
-        window = ResidualWindow(x_d, saved.array("pending_x_pb", len(x_d)), saved.real("pending_start"))
+        x_pb, path = saved.array("pending_x_pb", len(x_d)), saved.array("pending_path", None)
+        window = ResidualWindow(x_d, x_pb, saved.real("pending_start"), path)
         with np.errstate(all="ignore"):
             forecast = residual.forecast(window, scales)
             if residual.may_miss and not np.isfinite(forecast.e_h).all():

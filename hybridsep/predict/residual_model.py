@@ -65,8 +65,8 @@ class ResidualModel(Protocol):
     def take_over(self, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
         """Return the model with what another one of its kind has learned."""
 
-    def begin_in_motion(self, window: ResidualWindow) -> ResidualModel:
-        """Return the model at the beginning of a run whose first window has motion before it."""
+    def begin_in_motion(self, window: ResidualWindow, scales: Any) -> ResidualModel:
+        """Return the model at the beginning of a run whose first window, of ``scales``, has motion before it."""
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
         """Predict the residual over the next window; a compensator gives the ``scales`` of its preview."""

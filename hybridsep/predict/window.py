@@ -32,11 +32,15 @@ class ResidualWindow(NamedTuple):
         Commands and physics-based prediction, relative to ``start``.
     start : float, m
         Initial position.
+    path : (m,) array, m
+        Commands as they came, as far as they are known, relative to ``start``: behind a compensator they are not
+        modified, and more than the window's; without those of ``x_d`` that are late.
     """
 
     x_d: Array
     x_pb: Array
     start: float
+    path: Array
 
 
 class FeatureScales(NamedTuple):

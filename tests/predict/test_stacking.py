@@ -13,7 +13,8 @@ from hybridsep.predict.averaging.constants import CONSTANTS
 from hybridsep.predict.averaging.experts import EXPERTS
 from hybridsep.predict.averaging.stacking import Stack, simplex_minimum
 
-FIRST = np.array([0.0, 0.5, 0.5, 0.0, 0.0])
+FIRST = np.array([one.first_weight for one in EXPERTS])
+N_EXPERTS = len(EXPERTS)
 NP = 50
 
 
@@ -49,8 +50,8 @@ def test_a_singular_problem_has_a_minimum() -> None:
 
 
 def experts(three: Array) -> Array:
-    """Return the predictions of all experts, of which the last two predict 0."""
-    return np.concatenate((three, np.zeros((2, three.shape[1]))))
+    """Return the predictions of all experts, of which those behind the first three predict 0."""
+    return np.concatenate((three, np.zeros((N_EXPERTS - 3, three.shape[1]))))
 
 
 def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, seed: int = 0) -> Stack:
@@ -71,7 +72,7 @@ def test_its_weights_are_the_formula() -> None:
     for predicted, measured in windows:
         stack = stack.update(predicted, measured, 0.0)
     fades = (CONSTANTS.gamma, 1.0)
-    squares = [0.0] * 6
+    squares = [0.0] * (N_EXPERTS + 1)
     for fade, (predicted, measured) in zip(fades, windows, strict=True):
         for i, one in enumerate((*predicted, np.zeros(NP))):
             squares[i] += fade * float(np.sum((measured - one) ** 2))
@@ -83,9 +84,9 @@ def test_its_weights_are_the_formula() -> None:
 
     found = minimize(
         cost,
-        np.full(5, 0.1),
+        np.full(N_EXPERTS, 0.1),
         method="SLSQP",
-        bounds=[(0.0, 1.0)] * 5,
+        bounds=[(0.0, 1.0)] * N_EXPERTS,
         constraints={"type": "ineq", "fun": lambda pi: 1.0 - pi.sum()},
         options={"ftol": 1e-14},
     )
@@ -105,7 +106,7 @@ def test_the_better_expert_is_preferred_and_evidence_fades() -> None:
 
 def test_without_evidence_the_weights_are_the_first_ones() -> None:
     stack = Stack.init()
-    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
+    stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-12)
 
 
@@ -113,7 +114,7 @@ def test_physics_is_preferred_to_experts_that_know_nothing() -> None:
     stack, rng = Stack.init(), np.random.default_rng(2)
     for _ in range(60):
         stack = stack.update(experts(rng.normal(size=(3, NP))), rng.normal(size=NP), 0.0)
-    assert stack.weights.sum() < 0.1
+    assert stack.weights[:3].sum() < 0.1
 
 
 def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
@@ -122,14 +123,19 @@ def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-4)
 
 
+def test_first_weights_are_an_average() -> None:
+    assert FIRST.min() >= 0.0
+    assert FIRST.sum() == pytest.approx(1.0)
+
+
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
     stack = Stack.init()
     stack = replayed(stack, (3.0, 0.1, 3.0), 30)
     stack = stack.copy(EXPERTS[1], EXPERTS[0])
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
-    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
+    stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
     stack = stack.forget(EXPERTS[0])
-    stack = stack.update(np.zeros((5, NP)), np.zeros(NP), 0.0)
+    stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     assert stack.weights[0] < 1e-9

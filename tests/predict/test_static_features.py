@@ -9,13 +9,15 @@ import pytest
 from hybridsep.base.signals import Array
 from hybridsep.base.state import numbers_of
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.averaging.features import StaticFeatures
+from hybridsep.predict.averaging.constants import CONSTANTS
+from hybridsep.predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures
 from hybridsep.predict.window import ResidualWindow
 
 TS, N = 1e-3, 800
 MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]
 SCALE = 0.05  # m/s
-SPREAD = 0.01 * np.sqrt(10.0) ** np.arange(6)
+SPREAD = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
+DISTANCES = SCALE * CONSTANTS.stop_least * CONSTANTS.stop_ratio ** np.arange(N_STOPS)  # m
 PERIOD, ORIGIN = 1.7e-3, 0.0123  # m
 LENGTHS = (100, 1, 7, 2, 300, 3, 387)
 
@@ -32,11 +34,21 @@ def signals() -> tuple[Array, Array]:
     return x_d, 0.98 * x_d + 2e-5 * np.sin(80 * t)
 
 
+def stop(x_d: Array, distance: float) -> Array:
+    """Return a stop operator by what it is: the command less the middle of a play that it drags along."""
+    found, middle = [], 0.0
+    for command in x_d.tolist():
+        middle = min(max(middle, command - distance), command + distance)
+        found.append((command - middle) / distance)
+    return np.array(found)
+
+
 def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int, period: float = 0.0) -> tuple[Array, Array]:
-    """Return the filtered disturbances and their first differences, (N, 8) each, (N, 10) with a period."""
+    """Return the filtered disturbances and their first differences, (N, n) each."""
     numerator, denominator = oracle.transfer_function(MODES)
     v_d, v_pb = np.diff(x_d, prepend=0.0) / TS, np.diff(x_pb, prepend=0.0) / TS
-    disturbances = [*(np.tanh(v_d / (SCALE * one)) for one in SPREAD), x * abs(x), v_pb * abs(v_pb)]
+    disturbances = [*(np.tanh(v_d / (SCALE * one)) for one in SPREAD), *(stop(x_d, one) for one in DISTANCES)]
+    disturbances += [x * abs(x), v_pb * abs(v_pb)]
     if period:
         angle, at_start = 2 * np.pi * (ORIGIN + x) / period, 2 * np.pi * ORIGIN / period
         disturbances += [np.sin(angle) - np.sin(at_start), np.cos(angle) - np.cos(at_start)]
@@ -52,14 +64,16 @@ def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int, period
 @pytest.mark.parametrize("period", [0.0, PERIOD])
 @pytest.mark.parametrize(("hold", "dead_time", "q"), [("zoh", 0, 3), ("foh", 0, 0), ("zoh", 5, 1), ("foh", 3, 40)])
 def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int, period: float) -> None:
-    static, count = features(hold, dead_time, q, period), 10 if period else 8
+    static, count = features(hold, dead_time, q, period), N_LASTING + (2 if period else 0)
     x_d, x = signals()
     x_pb, _ = static.discrete.forced_response(static.discrete.rest(), x_d)
     state, rows, first = static.rest(), [], 0
     for n in LENGTHS:
         window = slice(first, first + n)
         before = numbers_of(state)
-        more, after = static.rows(state, ResidualWindow(x_d[window], x_pb[window], ORIGIN), x[window], SCALE)
+        more, after = static.rows(
+            state, ResidualWindow(x_d[window], x_pb[window], ORIGIN, x_d[window]), x[window], SCALE
+        )
         np.testing.assert_array_equal(numbers_of(state), before)  # the state is not changed
         rows.append(more)
         state, first = after, first + n
@@ -82,7 +96,7 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
 def test_peak_velocity_looks_back_to_the_last_command() -> None:
     static = features("zoh", 0, 3)
     x_d, x = signals()
-    _, state = static.rows(static.rest(), ResidualWindow(x_d[:100], x_d[:100], ORIGIN), x[:100], SCALE)
+    _, state = static.rows(static.rest(), ResidualWindow(x_d[:100], x_d[:100], ORIGIN, x_d[:100]), x[:100], SCALE)
     assert static.peak_velocity(static.rest(), np.array([2e-6, 1e-6])) == pytest.approx(2e-3)
     assert static.peak_velocity(state, x_d[99:100]) == 0.0
     assert static.peak_velocity(state, x_d[99:100] - 3e-6) == pytest.approx(3e-3)
@@ -91,6 +105,6 @@ def test_peak_velocity_looks_back_to_the_last_command() -> None:
 def test_at_rest_only_the_constant_is_left() -> None:
     static = features("foh", 2, 3)
     still = np.zeros(50)
-    rows, _ = static.rows(static.rest(), ResidualWindow(still, still, ORIGIN), still, 0.0)
+    rows, _ = static.rows(static.rest(), ResidualWindow(still, still, ORIGIN, still), still, 0.0)
     np.testing.assert_array_equal(rows[:, 0], 1.0)
     np.testing.assert_array_equal(rows[:, 1:], 0.0)

@@ -212,7 +212,7 @@ def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> No
     ],
 )
 def test_a_changed_plant_is_relearned_as_by_the_library(
-    new_stream: StreamMaker, name: str, factor: float, saved_at: int, leading: int
+    new_stream: StreamMaker, name: str, factor: float, saved_at: int, leading: Regression
 ) -> None:
     """The state that is saved has what was learned in earlier runs and in this one, or what is left of it."""
     model = new_stream.model

@@ -23,9 +23,6 @@ class AveragingConstants:
         change errors by 1 to 3 %.
     gamma : float
         Factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %.
-    first_arx_residual, first_static : float
-        First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
-        the worst drives are worse.
     lags_of_command : int
         Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead
         of 20 errors are 2 % less on drives of modes, 8 % more on drives of two masses, and a third less where the
@@ -42,10 +39,10 @@ class AveragingConstants:
         Bound on the rows that count as one, and how fast their number follows: without, recordings are 1 to 4 % worse.
     bound, bound_of_command : float
         Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
-        larger was never seen. Where the command's expert leads, its bound grows with its steps: without,
-        CNC axes that creep before a motion have 3 and 4 times the error.
+        larger was never seen. Bounds on the command's expert grow with its steps, as it is linear in the command:
+        without, CNC axes that creep before a motion have 3 and 4 times the error.
     growth : float
-        Largest growth of that bound.
+        Largest growth of these bounds.
     velocity_jump : float
         Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep:
         without, the rounding of a command at rest sets their scale, and drives have to 1.4 times the error.
@@ -59,7 +56,18 @@ class AveragingConstants:
         changed are worse by 2 %.
     friction_least, friction_ratio : float
         Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the
-        six to the next: half a decade, which neighbours interpolate within.
+        six to the next: half a decade, which neighbours interpolate within; with 5/6 of one the stage's spiral has four
+        times the error, warm.
+    stop_least, stop_ratio : float
+        Least distance of a stop operator, as the time, s, that it takes at the velocity scale, and the ratio from one
+        of the three to the next, up to 0.3 s: up to a third of that servos lose what they gain; from 1 or 3 ms on what
+        a user's own disturbance describes is learned ten times as slowly.
+    recall_tolerance : float
+        Root of the distance of commands from those ahead, relative to their own changes, at which what was measured
+        then counts by half: with 0.2 or 0.3 recordings are the same, warm drives 1 % worse.
+    recall_fade : float
+        Time in which a recalled residual loses that it was moved to the last one, in windows: without an end, drives
+        that are repeated have to 7 times the error.
     difference_share : float
         Effect of a disturbance's first difference relative to its own: it only corrects the timing.
     gate_residuals, gate_steps : float
@@ -71,8 +79,6 @@ class AveragingConstants:
 
     kappa: float = 1.0
     gamma: float = 0.95
-    first_arx_residual: float = 0.5
-    first_static: float = 0.5
     lags_of_command: int = 36
     last_lag: float = 0.005
     least_noise: float = 1e-6
@@ -88,6 +94,10 @@ class AveragingConstants:
     discard_above: float = 0.7
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795
+    stop_least: float = 0.01
+    stop_ratio: float = 5.623413251903491
+    recall_tolerance: float = 0.1
+    recall_fade: float = 0.5
     difference_share: float = 0.03
     gate_residuals: float = 2.0
     gate_steps: float = 2.0

@@ -2,8 +2,10 @@
 
 What the physics model misses acts where the command does, so ``e_pb = G_pb d(x, v)``. A static feature, one without
 lags, is ``G_pb`` applied to a candidate disturbance ``d``: friction ``tanh(v/v_i)`` over a spread of velocities
-``v_i``, stiffness ``x·|x|`` and damping ``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over
-it, as of cogging or a screw's pitch; and functions of the user's own. First differences of the features take up errors
+``v_i``; friction before sliding and backlash, which follow the distance since a reversal, the stop operators of Prandtl
+and Ishlinskii ``u_i ← clip(u_i + Δx_d, −r_i, r_i)`` over a spread of distances ``r_i``; stiffness ``x·|x|`` and damping
+``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over it, as of cogging or a screw's pitch; and
+functions of the user's own. First differences of the features take up errors
 of ``G_pb`` in phase. As nothing here depends on the learned weights, no recursion can become unstable.
 
 The expert without a physics model, eq. (4) with ``G_pb = 1``, predicts the residual of the command,
@@ -31,6 +33,7 @@ __all__ = [
     "LEAST_VELOCITY",
     "N_FRICTION",
     "N_LASTING",
+    "N_STOPS",
     "CommandFeatures",
     "Disturbance",
     "StaticFeatures",
@@ -90,8 +93,8 @@ Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
-N_FRICTION, N_LASTING, _N_PERIODIC = 6, 8, 2
-"""Disturbances by friction, with stiffness and damping, and what repeats with the position."""
+N_FRICTION, N_STOPS, N_LASTING, _N_PERIODIC = 6, 3, 11, 2
+"""Disturbances by friction, by stop operators, both with stiffness and damping, and what repeats with the position."""
 
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
@@ -117,12 +120,15 @@ class StaticState:
         Last command.
     x_pb : (4,) array, m
         Last physics-based predictions, oldest first.
+    stops : (N_STOPS,) array, m
+        Of the stop operators.
     """
 
     filters: Array
     filtered: Array
     x_d: float
     x_pb: Array
+    stops: Array
 
 
 @dataclass(frozen=True)
@@ -139,16 +145,16 @@ class StaticFeatures:
         Of a disturbance that repeats with the position; 0: none.
     own : tuple of Disturbance
         The user's own.
-    damping_of_motion : bool
-        Whether the position's own velocity is damped; else the velocity of ``x_pb``. Behind a compensator ``x_pb``
-        turns with every change of the command, and is far from the motion.
+    is_planned : bool
+        Whether a compensator decides the commands: then the position's own velocity is damped, as ``x_pb`` turns with
+        every change of the command, and is far from the motion; else the velocity of ``x_pb``.
     """
 
     discrete: DiscreteModel
     q: int
     period: float = 0.0
     own: tuple[Disturbance, ...] = ()
-    damping_of_motion: bool = False
+    is_planned: bool = False
 
     @property
     def n_differences(self) -> int:
@@ -175,16 +181,32 @@ class StaticFeatures:
     def rest(self) -> StaticState:
         """Return the state at rest."""
         n = self.n_disturbances
-        return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1))
+        return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1), np.zeros(N_STOPS))
 
     def peak_velocity(self, state: StaticState, x_d: Array) -> float:
         """Return the largest magnitude of the commanded velocity over a window, m/s."""
         return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
 
     def spread(self, velocity_scale: float) -> Array:
-        """Return the velocities of the friction's change of sign, ``(6,)``, m/s."""
+        """Return the velocities of the friction's change of sign, ``(N_FRICTION,)``, m/s."""
         spread = CONSTANTS.friction_least * CONSTANTS.friction_ratio ** np.arange(N_FRICTION)
         return np.asarray((velocity_scale or 1.0) * spread)
+
+    def distances(self, velocity_scale: float) -> Array:
+        """Return the distances of the stop operators, ``(N_STOPS,)``, m."""
+        spread = CONSTANTS.stop_least * CONSTANTS.stop_ratio ** np.arange(N_STOPS)
+        return np.asarray((velocity_scale or 1.0) * spread)
+
+    def stops(self, state: StaticState, x_d: Array, velocity_scale: float) -> Array:
+        """Return the stop operators over a window, ``(n, N_STOPS)``, m."""
+        steps, found = np.diff(x_d, prepend=state.x_d).tolist(), np.empty((len(x_d), N_STOPS))
+        for i, distance in enumerate(self.distances(velocity_scale).tolist()):
+            u, of_operator = float(state.stops[i]), []
+            for step in steps:
+                u = min(max(u + step, -distance), distance)
+                of_operator.append(u)
+            found[:, i] = of_operator
+        return found
 
     def velocity(self, state: StaticState, x_d: Array) -> Array:
         """Return the commanded velocity over a window, ``(n,)``, m/s."""
@@ -193,7 +215,7 @@ class StaticFeatures:
     def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
         v = np.diff(x_pb, prepend=state.x_pb[-1])
-        if self.damping_of_motion:
+        if self.is_planned:
             e = x - x_pb
             v = v + np.diff(e, prepend=e[:1])
         return np.asarray(v / self.discrete.T_s)
@@ -230,7 +252,7 @@ class StaticFeatures:
         state : StaticState
         window : ResidualWindow
         x : (n,) array, m
-            Position that the stiffness acts at, and whose velocity is damped with ``damping_of_motion``.
+            Position that the stiffness acts at, and whose velocity is damped with ``is_planned``.
         velocity_scale : float
             Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
 
@@ -239,13 +261,15 @@ class StaticFeatures:
         SignalError
             If a disturbance of the user's own does not return a finite number for each sample.
         """
-        x_d, x_pb, start = window
+        x_d, x_pb, start, _ = window
         first, v_d, v = 2 + self.n_differences, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
         past = np.concatenate((state.x_pb, x_pb))
         disturbances = np.empty((len(x_d), self.n_disturbances))
         disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
-        disturbances[:, N_FRICTION] = x * np.abs(x)
-        disturbances[:, N_FRICTION + 1] = v * np.abs(v)
+        stops, stiffness = self.stops(state, x_d, velocity_scale), N_FRICTION + N_STOPS
+        disturbances[:, N_FRICTION:stiffness] = stops / self.distances(velocity_scale)
+        disturbances[:, stiffness] = x * np.abs(x)
+        disturbances[:, stiffness + 1] = v * np.abs(v)
         if self.period > 0.0:
             angle, at_start = self.angle(start + x), self.angle(start + 0.0)
             disturbances[:, N_LASTING] = np.sin(angle) - np.sin(at_start)
@@ -260,4 +284,5 @@ class StaticFeatures:
             rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
         rows[:, first : first + self.n_disturbances] = filtered
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
-        return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())
+        before = past[-_DIFFERENCES - 1 :].copy()
+        return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), before, stops[-1].copy())

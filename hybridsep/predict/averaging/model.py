@@ -32,6 +32,7 @@ from .experts import (
     EXPERTS,
     FRESH_START,
     MODEL_RESIDUAL,
+    RECALL,
     REGRESSIONS,
     STATIC,
     ExpertErrors,
@@ -43,7 +44,8 @@ from .experts import (
 )
 from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
 from .gate import InnovationGate, gated
-from .stacking import Stack
+from .recall import Memory
+from .stacking import ROUNDING, Stack
 from .warm_start import WarmStartRows
 
 __all__ = ["AveragedForecast", "AveragedModel", "Learned", "Parameters", "RunState"]
@@ -51,9 +53,6 @@ __all__ = ["AveragedForecast", "AveragedModel", "Learned", "Parameters", "RunSta
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
 penalties come from: a controller factors most of that solution in them."""
-
-_ROUNDING = 1e-6
-"""What rounding may have added to the sum of the stack's weights."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,8 @@ class RunState:
     gate : InnovationGate
     n_rejected : int
         Measurements that were missing or not plausible.
+    memory : Memory
+        Of this run and earlier ones.
     """
 
     static: StaticState
@@ -97,13 +98,14 @@ class RunState:
     bridged: NDArray[np.bool_]
     gate: InnovationGate
     n_rejected: int
+    memory: Memory
 
     @classmethod
-    def init(cls, fixed: Parameters) -> RunState:
+    def init(cls, fixed: Parameters, memory: Memory) -> RunState:
         """Return the beginning of a run, at rest."""
         p, command = fixed.settings.p, fixed.command
         past, bridged = (np.zeros(p), np.zeros(command.p)), np.zeros(max(p, command.p), dtype=np.bool_)
-        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0)
+        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0, memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +154,7 @@ class Learned:
     def is_sound(self) -> bool:
         """Whether the numbers, which are in range, fit each other."""
         scale = self.velocity_scale
-        return (scale == 0.0 or scale >= LEAST_VELOCITY) and float(self.stack.weights.sum()) <= 1.0 + _ROUNDING
+        return (scale == 0.0 or scale >= LEAST_VELOCITY) and float(self.stack.weights.sum()) <= 1.0 + ROUNDING
 
 
 @dataclass(frozen=True)
@@ -168,12 +170,18 @@ class AveragedForecast(Forecast):
         Predictions that are stacked; 0 where an expert knows nothing.
     predictions : mapping
         Of the regressions that know something.
+    shares : (n_experts,) array
+        Weights of the experts: RECALL counts as far as the commands are alike, the others for the rest.
+    memory : Memory
+        With the commands ahead.
     """
 
     scales: FeatureScales
     x: Array
     stacked: Array
     predictions: Mapping[Regression, ExpertPrediction]
+    shares: Array
+    memory: Memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +231,15 @@ class AveragedModel:
         fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
         evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * fixed.command.p + 2)
         noise, leader = (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
-        return cls(fixed, Learned.init(fixed), evidence, noise, 0.0, leader, RunState.init(fixed))
+        return cls(
+            fixed,
+            Learned.init(fixed),
+            evidence,
+            noise,
+            0.0,
+            leader,
+            RunState.init(fixed, Memory.init(settings.recall, settings.Np)),
+        )
 
     @property
     def leading(self) -> Regression:
@@ -304,12 +320,12 @@ class AveragedModel:
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
             stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
-        run = RunState.init(fixed)
+        run = RunState.init(fixed, self.run.memory.restart())
         return AveragedModel(fixed, learned, evidence, self.noise, 0.0, leading.place, run).with_noise(learned)
 
     def plan_ahead(self) -> AveragedModel:
         """Return the model where a compensator decides the commands."""
-        return replace(self, fixed=replace(self.fixed, static=replace(self.fixed.static, damping_of_motion=True)))
+        return replace(self, fixed=replace(self.fixed, static=replace(self.fixed.static, is_planned=True)))
 
     def take_over(self, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
         """Return the model with what another one has learned."""
@@ -318,14 +334,10 @@ class AveragedModel:
         )
         return replace(self, learned=learned, evidence=(of_physics, of_command))
 
-    def scales_of(self, window: ResidualWindow, path: Array | None = None) -> FeatureScales:
+    def scales_of(self, window: ResidualWindow) -> FeatureScales:
         """Return the scales of the features, with the next window's.
 
-        Parameters
-        ----------
-        window : ResidualWindow
-        path : (m,) array, m, optional
-            Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
+        A compensator begins to move before its path, with a creep.
         """
         static, learned, settings = self.fixed.static, self.learned, self.fixed.settings
         T_s = settings.T_s
@@ -333,14 +345,14 @@ class AveragedModel:
         peak = static.peak_velocity(self.run.static, window.x_d)
         outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
-        if path is not None and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
-            peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / T_s, before)
+        if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
+            peak = max(float(np.abs(np.diff(window.path)).max(initial=0.0)) / T_s, before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
         largest = np.zeros(static.n) if outgrown else learned.largest
         command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
-        if path is None and settings.Np > 1 and self.command_square > 0.0:
+        if not static.is_planned and settings.Np > 1 and self.command_square > 0.0:
             # A controller solves for the command's expert one sample before the window, as far as its commands are
             # known.
             known = window.x_d[: settings.n_late + settings.Np - 1]
@@ -360,7 +372,7 @@ class AveragedModel:
         solved: Mapping[Regression, SolvedExpert],
         window: ResidualWindow,
         scales: FeatureScales,
-        held: Mapping[Regression, ExpertPrediction] | None = None,
+        like: AveragedForecast | None = None,
         counts: NDArray[np.intp] | None = None,
     ) -> AveragedForecast:
         """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
@@ -368,14 +380,16 @@ class AveragedModel:
         Parameters
         ----------
         solved, window, scales
-        held : mapping, optional
-            Predictions whose shrinking is held.
+        like : AveragedForecast, optional
+            Under other commands, with the same path: its shrinking is held.
         counts : (n,) array, optional
             As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
-        x, held = window.x_pb, {} if held is None else held
+        x, held = window.x_pb, {} if like is None else like.predictions
+        memory = self.run.memory.hear(window.path, self.fixed.settings.Np) if like is None else like.memory
+        recalled = memory.recalled(max(len(x), self.fixed.settings.n_late + len(window.path)))
         rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
-        at = ExpertWindow(self, window, solved, scales, rows, {})
+        at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
             x = x + STATIC.predict(at, held.get(STATIC), None).e_h
@@ -385,13 +399,17 @@ class AveragedModel:
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
         for one in EXPERTS:
             stacked[one.place] = one.forecast(at)
+        others, (_, _, alike), recall = self.learned.stack.others(), at.recalled, RECALL.place
+        shares = self.learned.stack.weights + self.learned.stack.weights[recall] * (1.0 - alike) * others
+        shares[recall] = self.learned.stack.weights[recall] * alike
+        stacked[recall] = alike * stacked[recall] + (1.0 - alike) * (others @ stacked)
         weights = self.learned.stack.weights
         e_h = weights @ stacked
         second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
         for one, prediction in predictions.items():
             second[one.place] += prediction.variance
         variance = np.maximum(weights @ second - e_h**2, 0.0)
-        return AveragedForecast(window, e_h, variance, scales, x, stacked, predictions)
+        return AveragedForecast(window, e_h, variance, scales, x, stacked, predictions, shares, memory)
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
         """Predict the residual over the next window.
@@ -405,20 +423,23 @@ class AveragedModel:
         scales = self.scales_of(window) if scales is None else scales
         return self.forecast_by(self.solved(scales), window, scales)
 
-    def begin_in_motion(self, window: ResidualWindow) -> AveragedModel:
+    def begin_in_motion(self, window: ResidualWindow, scales: FeatureScales) -> AveragedModel:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
 
         Parameters
         ----------
         window : ResidualWindow
             The first one, with the motion before it.
+        scales : FeatureScales
+            Of the features in it.
         """
-        (x_d, x_pb, _), command, static = window, self.fixed.command, self.run.static
+        (x_d, x_pb, *_), command, static = window, self.fixed.command, self.run.static
         commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
         positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
         late = commands[-1 - command.dead_time :: -1][: command.p]
         past = self.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
-        static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :])
+        stops = np.sign(x_d[1] - x_d[0]) * self.fixed.static.distances(scales.velocity)
+        static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :], stops=stops)
         return replace(self, run=replace(self.run, static=static, commands=commands, past=past))
 
     def learn(
@@ -441,7 +462,7 @@ class AveragedModel:
             Which samples are accepted.
         """
         m, fixed, run = len(x), self.fixed, self.run
-        window = ResidualWindow(forecast.window.x_d[:m], forecast.window.x_pb[:m], forecast.window.start)
+        window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])
         fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
         learned, measured = state.learned, x - window.x_pb
@@ -458,7 +479,8 @@ class AveragedModel:
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
-        run = RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected)
+        memory = forecast.memory.remember(e)
+        run = RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected, memory)
         return replace(state, run=run), accepted
 
 

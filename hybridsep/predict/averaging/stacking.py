@@ -10,12 +10,16 @@ import numpy as np
 from ...base.signals import Array
 from ...base.state import bounded
 from .constants import CONSTANTS
-from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, STATIC, Expert, Regression
+from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert, Regression
 
-__all__ = ["Stack", "simplex_minimum"]
+__all__ = ["ROUNDING", "Stack", "simplex_minimum"]
 
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
+
+
+ROUNDING = 1e-6
+"""What rounding may have added to the sum of the weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,13 @@ class Stack:
         ridge = CONSTANTS.kappa * best * n
         weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * _first_weights())
         return Stack(weights, gram, cross, evidence)
+
+    def others(self) -> Array:
+        """Return the weights of all experts but RECALL, with its weight shared among them and physics."""
+        left = 1.0 - self.weights[RECALL.place]
+        others = self.weights / left if left > ROUNDING else _first_weights()
+        others[RECALL.place] = 0.0
+        return others
 
     @property
     def leader(self) -> Regression:

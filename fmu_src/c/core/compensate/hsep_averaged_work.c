@@ -22,8 +22,10 @@ static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 
 
 static const hsep_int work_solved[1 + HSEP_AVERAGED_STEPS] = {HSEP_NEWTON_SOLVED};
 
-/* Disturbances that are filtered for a prediction: friction once, stiffness and damping twice. */
-static const hsep_real work_filtered = 10.0, work_of_mode = 9.0;
+/* Disturbances that are filtered for a prediction: of the command once, stiffness and damping twice. Of a stop operator,
+ * in a sample of a prediction, and of a column. */
+static const hsep_real work_filtered = HSEP_DISTURBANCES_OF_COMMAND + 4.0, work_of_mode = 9.0, work_stop = 12.0,
+                       work_stopped = 5.0;
 
 /* Of the experts that predict: their number, features, squares of these, and lags. */
 typedef struct {
@@ -120,8 +122,8 @@ static hsep_real work_aim(const work_sizes *sizes) { return work_shifted * sizes
 /* Commands of a plan with their disturbances, and count samples that the experts predict. */
 static hsep_real work_commands(const work_sizes *sizes)
 {
-    return sizes->all *
-           (HSEP_FEATURES_N_FRICTION * work_tanh + work_filtered * work_of_mode * sizes->modes + work_command);
+    return sizes->all * (HSEP_FEATURES_N_FRICTION * work_tanh + HSEP_FEATURES_N_STOPS * work_stop +
+                         work_filtered * work_of_mode * sizes->modes + work_command);
 }
 
 static hsep_real work_run(const work_sizes *sizes, hsep_real count)
@@ -151,7 +153,7 @@ static hsep_real work_samples(const work_sizes *sizes, hsep_real count, hsep_rea
 
 static hsep_real work_slopes(const work_sizes *sizes)
 {
-    return sizes->all * (HSEP_FEATURES_N_FRICTION * work_tanh + work_slope);
+    return sizes->all * (HSEP_FEATURES_N_FRICTION * work_tanh + HSEP_FEATURES_N_STOPS * work_stop + work_slope);
 }
 
 static hsep_real work_linearise(const work_sizes *sizes) { return sizes->all * work_sample; }
@@ -166,7 +168,8 @@ static hsep_real work_columns(const work_sizes *sizes, hsep_real j, hsep_int par
     if (part < sizes->n_columns) {
         const hsep_real p = sizes->columns[part];
         const hsep_real lags = length > p ? p * (length - 0.5 * p) : 0.5 * length * length;
-        sum += work_lag * lags + length * (work_of_mode * sizes->modes + work_column);
+        sum += work_lag * lags +
+               length * (work_of_mode * sizes->modes + work_column + HSEP_FEATURES_N_STOPS * work_stopped);
     }
     return HSEP_PHYSICS_ABREAST * sum;
 }

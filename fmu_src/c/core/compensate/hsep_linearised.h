@@ -1,7 +1,7 @@
 /* Linearisation of the residual model with averaging (online model averaging) in the commands, over a preview.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
- * for friction and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,
+ * for friction, 1 / r_i for a stop operator off its stop, and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,
  * are held constant:
  *
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
@@ -28,10 +28,14 @@ typedef struct {
     /* Offsets in words from the beginning of the struct; oldest first; of experts: of the three experts of the physics
      * model's residual, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
     hsep_int slopes;      /* (n, count) slopes of the disturbances, sample after sample */
+    hsep_int at_stop;     /* (n, HSEP_FEATURES_N_STOPS) hsep_int, last sample at which a stop operator was at its stop,
+                           * counted from 1; 0: before all of them */
+    hsep_int stops;       /* (2, HSEP_FEATURES_N_STOPS) of experts: gains of stop operators and their differences */
     hsep_int gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
                            * before, from x now and in the two samples before */
     hsep_int shrink;      /* (n,) of experts: share of each one in the stack, */
     hsep_int shrinkage;   /* (2, n) and share of each expert of the command */
+    hsep_int commands;    /* (1 + preview,) of a change, with one sample before it, */
     hsep_int velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
     hsep_int position;    /* (2 + preview,) and it behind G_pb */
     hsep_int base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
@@ -45,7 +49,7 @@ typedef struct {
     hsep_int filters;     /* and of each column */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 19);
+HSEP_ASSERT_WORDS(hsep_linearised, 22);
 
 HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters);
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters);

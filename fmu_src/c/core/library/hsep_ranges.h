@@ -23,7 +23,8 @@
     RANGE(hsep_real, effect, 0.0, 0.0, 10.0, 1e-15, 0.0, 0) \
     RANGE(hsep_real, noise_std, 0.0, 0.0, 1.0, 1e-15, 0.0, 0) \
     RANGE(hsep_real, forgetting, 0.0, 0.0, 1000000000.0, 0.001, 0.0, 0) \
-    RANGE(hsep_real, period, 0.0, 0.0, 100.0, 1e-09, 0.0, 1)
+    RANGE(hsep_real, period, 0.0, 0.0, 100.0, 1e-09, 0.0, 1) \
+    RANGE(hsep_int, recall, 8192.0, 0.0, 1000000.0, 0.0, 0.0, 0)
 
 #define HSEP_COMPENSATOR_RANGES(RANGE) \
     RANGE(hsep_int, preview, 200.0, 8.0, 2000.0, 0.0, 8.0, 0) \

@@ -36,7 +36,9 @@
     /* time after which samples have lost 63 % of their weight, with averaging; 0: never, s */ \
     SETTING(hsep_real, forgetting) \
     /* period of a disturbance that repeats with the position (cogging, screw pitch), with averaging; 0: none, m */ \
-    SETTING(hsep_real, period)
+    SETTING(hsep_real, period) \
+    /* samples that are remembered, to predict a repeated motion by what was measured then, with averaging; 0: none */ \
+    SETTING(hsep_int, recall)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
     /* samples of the command that are planned ahead, at least Np + 4 spacing + 3 */ \

@@ -9,12 +9,13 @@
 #define HSEP_STATIC 2
 #define HSEP_ARX_COMMAND 3
 #define HSEP_FRESH_START 4
-#define HSEP_N_EXPERTS 5
+#define HSEP_RECALL 5
+#define HSEP_N_EXPERTS 6
 #define HSEP_REGRESSIONS 1
 #define HSEP_REGRESSIONS_END 5
 #define HSEP_N_REGRESSIONS 4
 /* First weight, target, whether it has lags, whether it is fresh */
-#define HSEP_EXPERTS {0.0, 0, 0, 0}, {0.5, 0, 1, 0}, {0.5, 0, 0, 0}, {0.0, 1, 1, 0}, {0.0, 0, 1, 1}
+#define HSEP_EXPERTS {0.0, 0, 0, 0}, {0.4, 0, 1, 0}, {0.4, 0, 0, 0}, {0.2, 1, 1, 0}, {0.0, 0, 1, 1}, {0.0, 0, 0, 0}
 
 /* hybridsep/predict/uncertainty.py */
 #define HSEP_UNCERTAINTY_SHARES 4.0, 2.0
@@ -43,6 +44,7 @@
 
 /* hybridsep/predict/averaging/stacking.py */
 #define HSEP_STACKING_LEAST_SQUARE HSEP_TINY(1e-300)
+#define HSEP_STACKING_ROUNDING 1e-06
 
 /* hybridsep/predict/averaging/experts.py */
 #define HSEP_MODEL_RESIDUAL 0
@@ -52,24 +54,28 @@
 #define HSEP_EXPERTS_LAG_BOUND 10.0
 #define HSEP_EXPERTS_RESOLUTION 1e-13
 #define HSEP_EXPERTS_LEAST HSEP_TINY(1e-150)
+#define HSEP_EXPERTS_FIRST 0.4
+#define HSEP_EXPERTS_FIRST_COMMAND 0.2
 
 /* hybridsep/predict/averaging/features.py */
 #define HSEP_FEATURES_N_FRICTION 6
-#define HSEP_FEATURES_N_LASTING 8
+#define HSEP_FEATURES_N_STOPS 3
+#define HSEP_FEATURES_N_LASTING 11
 #define HSEP_FEATURES_N_PERIODIC 2
 #define HSEP_FEATURES_LEAST_VELOCITY HSEP_TINY(1e-200)
 #define HSEP_FEATURES_DIFFERENCES 3
 
+/* hybridsep/predict/averaging/recall.py */
+#define HSEP_RECALL_UPDATES 25
+#define HSEP_RECALL_ALIKE HSEP_TINY(1e-100)
+
 /* hybridsep/predict/averaging/model.py */
 #define HSEP_AVERAGING_AHEAD 20
-#define HSEP_AVERAGING_ROUNDING 1e-06
 #define HSEP_AVERAGING_BRIDGED 3
 
 /* hybridsep/predict/averaging/constants.py */
 #define HSEP_AVERAGING_KAPPA 1.0
 #define HSEP_AVERAGING_GAMMA 0.95
-#define HSEP_AVERAGING_FIRST_ARX_RESIDUAL 0.5
-#define HSEP_AVERAGING_FIRST_STATIC 0.5
 #define HSEP_AVERAGING_LAGS_OF_COMMAND 36
 #define HSEP_AVERAGING_LAST_LAG 0.005
 #define HSEP_AVERAGING_LEAST_NOISE 1e-06
@@ -85,6 +91,10 @@
 #define HSEP_AVERAGING_DISCARD_ABOVE 0.7
 #define HSEP_AVERAGING_FRICTION_LEAST 0.01
 #define HSEP_AVERAGING_FRICTION_RATIO 3.1622776601683795
+#define HSEP_AVERAGING_STOP_LEAST 0.01
+#define HSEP_AVERAGING_STOP_RATIO 5.623413251903491
+#define HSEP_AVERAGING_RECALL_TOLERANCE 0.1
+#define HSEP_AVERAGING_RECALL_FADE 0.5
 #define HSEP_AVERAGING_DIFFERENCE_SHARE 0.03
 #define HSEP_AVERAGING_GATE_RESIDUALS 2.0
 #define HSEP_AVERAGING_GATE_STEPS 2.0
@@ -94,7 +104,7 @@
 #define HSEP_LEARNED_RANGES \
     {0.0, HSEP_HUGE(1e+100), 8}, {1.0, HSEP_HUGE(1e+100), 1}, {0.0, HSEP_HUGE(1e+100), 1}, {1.0, HSEP_HUGE(1e+100), \
     1}, {0.0, HSEP_HUGE(1e+100), 1}, {1.0, HSEP_HUGE(1e+100), 1}, {0.0, HSEP_HUGE(1e+100), 1}, {1.0, \
-    HSEP_HUGE(1e+100), 1}, {0.0, 1.0, 5}, {-HSEP_HUGE(1e+100), HSEP_HUGE(1e+100), 30}, {0.0, HSEP_HUGE(1e+100), 27}
+    HSEP_HUGE(1e+100), 1}, {0.0, 1.0, 6}, {-HSEP_HUGE(1e+100), HSEP_HUGE(1e+100), 42}, {0.0, HSEP_HUGE(1e+100), 33}
 #define HSEP_UNCERTAINTY_RANGES \
     {0.0, HSEP_HUGE(1e+100), 1}, {4e-09, 40000.0, 1}, {2e-09, 20000.0, 1}, {0.0, HSEP_HUGE(1e+100), 3}, {0.25, 4.0, \
     1}, {0.0625, 16.0, 1}, {0.0, HSEP_HUGE(1e+100), 1}

@@ -115,6 +115,13 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self)
 
 HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->averaged != 0; }
 
+HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command)
+{
+    if (self->averaged) {
+        hsep_recall_hear(hsep_averaged_recall(hsep_residual_averaged(self)), command);
+    }
+}
+
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 {
     self->learning = learning != 0;

@@ -52,6 +52,9 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self);
 /* Whether a measurement may be missing, NaN. */
 HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 
+/* Take in the command that comes next, as it came, m, relative to the start. */
+HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command);
+
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 

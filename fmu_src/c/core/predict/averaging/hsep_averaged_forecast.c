@@ -102,15 +102,12 @@ static void averaged_solved(hsep_averaged *self, int outgrown)
     }
 }
 
-/* Largest step of the command relative to that before the window, >= 1, where its expert leads: it is linear in the
- * command, and may predict as much more than anything so far. */
+/* Largest step of the command relative to that before the window, >= 1: its expert is linear in the command, and may
+ * predict as much more than anything so far. */
 static hsep_real averaged_growth(const hsep_averaged *self)
 {
-    const hsep_learned *learned = &self->learned;
-    if (!(learned->largest_step > 0.0 && hsep_stack_leader(&learned->stack) == HSEP_ARX_COMMAND)) {
-        return 1.0;
-    }
-    return hsep_fmin(self->forecast_step / learned->largest_step, HSEP_AVERAGING_GROWTH);
+    const hsep_real before = self->learned.largest_step;
+    return before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_GROWTH) : 1.0;
 }
 
 /* Features without lags of an expert, sample after sample. */
@@ -153,17 +150,39 @@ static void averaged_take(hsep_averaged *self, hsep_int place, const hsep_real x
     }
 }
 
+/* What is recalled for the window, and how much: where it is not alike, the other experts share its weight. last: m, the
+ * last residual of the physics model. */
+static void averaged_recall(hsep_averaged *self, hsep_real last)
+{
+    const hsep_stack *stack = &self->learned.stack;
+    hsep_real *recalled = hsep_at(self, self->recalled);
+    self->alike = hsep_recall_forecast(hsep_averaged_recall(self), last, recalled);
+    for (hsep_int j = 0; j < self->n; j++) {
+        recalled[j] = hsep_clip(recalled[j], self->bound);
+    }
+    hsep_stack_others(stack, self->others);
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->shares[i] = stack->weights[i] + stack->weights[HSEP_RECALL] * (1.0 - self->alike) * self->others[i];
+    }
+    self->shares[HSEP_RECALL] = stack->weights[HSEP_RECALL] * self->alike;
+}
+
 /* e: the stack of the experts, which have predicted the places begin ... end - 1. */
 static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, hsep_int end)
 {
-    const hsep_real *weights = self->learned.stack.weights, *stacked = hsep_at(self, self->stacked);
+    const hsep_real *weights = self->learned.stack.weights, *recalled = hsep_at(self, self->recalled);
+    hsep_real *stacked = hsep_at(self, self->stacked);
     hsep_real *variance = hsep_at(self, self->variance);
     for (hsep_int j = begin; j < end; j++) {
-        hsep_real sum = 0.0, square = 0.0;
+        hsep_real sum = 0.0, square = 0.0, others = 0.0;
+        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+            others += self->others[i] * stacked[i * self->n + j];
+        }
+        stacked[HSEP_RECALL * self->n + j] = self->alike * recalled[j] + (1.0 - self->alike) * others;
         for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
             const hsep_real predicted = stacked[i * self->n + j];
             hsep_real left = 0.0; /* of the variance of the residual */
-            if (self->predicted[i] && i != HSEP_HOLD) {
+            if (self->predicted[i]) {
                 const hsep_expert *expert = hsep_averaged_expert(self, i);
                 left = expert->largest_square * (1.0 - hsep_at_const(expert, expert->shrinkage)[j]);
             }
@@ -215,6 +234,7 @@ HSEP_API void hsep_averaged_forecast(
     for (hsep_int j = 0; j < self->n; j++) {
         stacked[HSEP_HOLD * self->n + j] = hold;
     }
+    averaged_recall(self, e[self->n]);
     averaged_begin(self, x_d, e + self->n);
     hsep_averaged_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */
 }

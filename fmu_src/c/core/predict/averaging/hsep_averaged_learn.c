@@ -12,7 +12,7 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
     const hsep_real step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
     hsep_real *past = hsep_at(self, self->e_0) + Np;
     hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
-    hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np);
+    hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np, self->forecast_scale);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
     hsep_command_begin_in_motion(hsep_averaged_command(self), x_d[Np - 1], x_d[Np - 2]);
     for (hsep_int i = 0; i < hsep_averaged_command(self)->p; i++) {
@@ -351,6 +351,7 @@ HSEP_API void hsep_averaged_learn(
     }
     self->n_rejected += self->Np - (hsep_int)self->n_accepted;
     hsep_disturbances_end(hsep_averaged_disturbances(self));
+    hsep_recall_remember(hsep_averaged_recall(self), e);
     if (fold && self->n_accepted > 0.0) {
         averaged_judge(self, e);
     }

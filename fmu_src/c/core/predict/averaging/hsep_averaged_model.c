@@ -66,10 +66,12 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     self->bridged = hsep_take(&end, Np + hsep_fmax(p, p_of_command));
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, HSEP_N_EXPERTS * n);
+    self->recalled = hsep_take(&end, n);
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(parameters));
     self->command = hsep_take_block(&end, hsep_command_size(parameters));
+    self->recall = hsep_take_block(&end, hsep_recall_size(parameters));
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         self->evidence[i] = hsep_take_block(&end, hsep_warm_start_size(averaged_n_features(self, i)));
     }
@@ -92,6 +94,7 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
     hsep_stack_init(&self->learned.stack);
     hsep_disturbances_init(hsep_averaged_disturbances(self), parameters, start);
     hsep_command_init(hsep_averaged_command(self), parameters);
+    hsep_recall_init(hsep_averaged_recall(self), parameters);
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_warm_start_init(hsep_averaged_evidence(self, i), averaged_n_features(self, i));
     }
@@ -110,7 +113,8 @@ HSEP_API int hsep_averaged_valid(const void *block, const hsep_residual_paramete
                 got.known <= got.followed && got.reach.known <= 1 &&
                 hsep_within(&got.reach.farthest, 1, HSEP_PREDICTION_MAX) && got.settled <= 1 &&
                 hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
-                hsep_command_valid(hsep_at_bytes(block, got.command), parameters);
+                hsep_command_valid(hsep_at_bytes(block, got.command), parameters) &&
+                hsep_recall_valid(hsep_at_bytes(block, got.recall), parameters);
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         sound = sound && hsep_warm_start_valid(hsep_at_bytes(block, got.evidence[i]), averaged_n_features(&got, i));
     }
@@ -173,7 +177,7 @@ HSEP_API int hsep_averaged_sound(const hsep_averaged *self)
     }
     return hsep_in_ranges(&learned->velocity_scale, hsep_averaged_n_learned(self), averaged_ranges) &&
            (learned->velocity_scale == 0.0 || learned->velocity_scale >= HSEP_FEATURES_LEAST_VELOCITY) &&
-           sum <= 1.0 + HSEP_AVERAGING_ROUNDING;
+           sum <= 1.0 + HSEP_STACKING_ROUNDING;
 }
 
 HSEP_API void hsep_averaged_restart(hsep_averaged *self)

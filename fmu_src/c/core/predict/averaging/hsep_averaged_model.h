@@ -15,6 +15,7 @@
 #include "hsep_warm_start.h"
 #include "hsep_experts.h"
 #include "hsep_gate.h"
+#include "hsep_recall.h"
 #include "hsep_stacking.h"
 
 /* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
@@ -62,6 +63,9 @@ typedef struct {
     hsep_real bound;                    /* m, on what is predicted, */
     hsep_real growth;                   /* how much larger the command's bound may be, as its largest step is */
     hsep_int predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
+    hsep_real alike;                    /* how much HSEP_RECALL counts */
+    hsep_real others[HSEP_N_EXPERTS];   /* weights of the others where it does not, */
+    hsep_real shares[HSEP_N_EXPERTS];   /* and of all as they count */
     /* Of the window that is measured */
     hsep_int followed;      /* samples that were judged and, as far as they are believed, learned */
     hsep_int known;         /* samples up to the last one that is believed */
@@ -75,9 +79,10 @@ typedef struct {
     hsep_int bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
     hsep_int stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
+    hsep_int recalled; /* (n,) m, what HSEP_RECALL predicts */
     hsep_int variance; /* (n,) m2, of the mixture of the experts */
     hsep_int rows;     /* (n, n_static) features without lags, sample after sample */
-    hsep_int disturbances, command;
+    hsep_int disturbances, command, recall;
     hsep_int evidence[HSEP_N_RESIDUALS];
     hsep_int experts[HSEP_N_EXPERTS]; /* hold has none, 0 */
     hsep_int largest;                 /* (n_static,) largest magnitudes of the features without lags */
@@ -87,7 +92,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_STACK_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    35 + HSEP_N_RESIDUALS + 2 * HSEP_N_EXPERTS + (sizeof(hsep_gate) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    38 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + (sizeof(hsep_gate) + sizeof(hsep_learned)) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
@@ -102,6 +107,10 @@ static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)
 static inline hsep_command *hsep_averaged_command(hsep_averaged *self)
 {
     return (hsep_command *)hsep_at(self, self->command);
+}
+static inline hsep_recall *hsep_averaged_recall(hsep_averaged *self)
+{
+    return (hsep_recall *)hsep_at(self, self->recall);
 }
 static inline hsep_warm_start *hsep_averaged_evidence(hsep_averaged *self, hsep_int kind)
 {

@@ -1,6 +1,7 @@
 #include "hsep_features.h"
 
 #include "hsep_math.h"
+#include "hsep_range.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -78,9 +79,14 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
 }
 
 HSEP_API void hsep_disturbances_begin_in_motion(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n)
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale)
 {
     hsep_disturbed *before = &self->before;
+    const hsep_real step = x_d[n - 2] - x_d[n - 1];
+    for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
+        const hsep_real distance = hsep_disturbances_distance(velocity_scale, i);
+        before->stops[i] = step > 0.0 ? distance : step < 0.0 ? -distance : 0.0;
+    }
     before->x_d = 2.0 * x_d[n - 1] - x_d[n - 2];
     for (int i = 0; i <= HSEP_FEATURES_DIFFERENCES; i++) {
         before->x_pb[i] = x_pb[n - 1] - (x_pb[n - 2] - x_pb[n - 1]) * (hsep_real)(i + 1);
@@ -144,29 +150,55 @@ static void disturbances_differences(const hsep_disturbances *self, const hsep_r
     }
 }
 
-HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i)
+/* Member i of a spread from least on, relative to the velocity scale. */
+static hsep_real disturbances_spread(hsep_real velocity_scale, hsep_real least, hsep_real ratio, hsep_int i)
 {
-    hsep_real spread = HSEP_AVERAGING_FRICTION_LEAST;
     for (; i > 0; i--) {
-        spread *= HSEP_AVERAGING_FRICTION_RATIO;
+        least *= ratio;
     }
-    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * spread;
+    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * least;
 }
 
-/* Friction of n samples of the velocity v_d, m/s, into the rows. */
-static void disturbances_friction(
-    hsep_disturbances *self, const hsep_real v_d[], hsep_int n, hsep_real velocity_scale, hsep_real rows[])
+HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i)
+{
+    return disturbances_spread(velocity_scale, HSEP_AVERAGING_FRICTION_LEAST, HSEP_AVERAGING_FRICTION_RATIO, i);
+}
+
+HSEP_API hsep_real hsep_disturbances_distance(hsep_real velocity_scale, hsep_int i)
+{
+    return disturbances_spread(velocity_scale, HSEP_AVERAGING_STOP_LEAST, HSEP_AVERAGING_STOP_RATIO, i);
+}
+
+/* Friction or stop operator i of n samples, side by side with others. */
+static void disturbances_one(
+    hsep_disturbances *self, hsep_int i, const hsep_real steps[], hsep_int n, hsep_real velocity_scale, hsep_real u[])
+{
+    if (i < HSEP_FEATURES_N_FRICTION) {
+        const hsep_real velocity = hsep_disturbances_sign_velocity(velocity_scale, i);
+        for (hsep_int k = 0; k < n; k++) {
+            u[HSEP_PHYSICS_ABREAST * k] = hsep_tanh(steps[k] / self->T_s / velocity);
+        }
+        return;
+    }
+    const hsep_real distance = hsep_disturbances_distance(velocity_scale, i - HSEP_FEATURES_N_FRICTION);
+    hsep_real *stop = &self->after.stops[i - HSEP_FEATURES_N_FRICTION];
+    for (hsep_int k = 0; k < n; k++) {
+        *stop = hsep_clip(*stop + steps[k], distance);
+        u[HSEP_PHYSICS_ABREAST * k] = *stop / distance;
+    }
+}
+
+/* Friction and stop operators of n samples of the command's steps, m, into the rows. */
+static void disturbances_of_command(
+    hsep_disturbances *self, const hsep_real steps[], hsep_int n, hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     memset(u, 0, HSEP_PHYSICS_ABREAST * n * sizeof *u); /* places without a disturbance are filtered, too */
-    for (hsep_int first = 0; first < HSEP_FEATURES_N_FRICTION; first += HSEP_PHYSICS_ABREAST) {
-        const hsep_int left = HSEP_FEATURES_N_FRICTION - first;
+    for (hsep_int first = 0; first < HSEP_DISTURBANCES_OF_COMMAND; first += HSEP_PHYSICS_ABREAST) {
+        const hsep_int left = HSEP_DISTURBANCES_OF_COMMAND - first;
         const hsep_int count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
         for (hsep_int i = 0; i < count; i++) {
-            const hsep_real spread = hsep_disturbances_sign_velocity(velocity_scale, first + i);
-            for (hsep_int k = 0; k < n; k++) {
-                u[HSEP_PHYSICS_ABREAST * k + i] = hsep_tanh(v_d[k] / spread);
-            }
+            disturbances_one(self, first + i, steps, n, velocity_scale, u + i);
         }
         disturbances_filter_samples(self, first, count, u, n, rows);
     }
@@ -177,15 +209,16 @@ HSEP_API void hsep_disturbances_command(
     hsep_real rows[])
 {
     hsep_disturbed *now = &self->after;
-    hsep_real v_d[DISTURBANCES_TOGETHER];
-    disturbances_rewind(self, 0, HSEP_FEATURES_N_FRICTION);
+    hsep_real steps[DISTURBANCES_TOGETHER];
+    disturbances_rewind(self, 0, HSEP_DISTURBANCES_OF_COMMAND);
+    memcpy(now->stops, self->before.stops, sizeof now->stops);
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
     for (hsep_int j = n; j > 0;) {
         const hsep_int count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
         for (hsep_int k = 0; k < count; k++) {
             j--;
-            v_d[k] = (x_d[j] - now->x_d) / self->T_s;
+            steps[k] = x_d[j] - now->x_d;
             now->x_d = x_d[j];
             for (int i = HSEP_FEATURES_DIFFERENCES; i > 0; i--) {
                 now->x_pb[i] = now->x_pb[i - 1];
@@ -193,7 +226,7 @@ HSEP_API void hsep_disturbances_command(
             now->x_pb[0] = x_pb[j];
             disturbances_differences(self, now->x_pb, rows + k * self->n);
         }
-        disturbances_friction(self, v_d, count, velocity_scale, rows);
+        disturbances_of_command(self, steps, count, velocity_scale, rows);
         rows += count * self->n;
     }
 }

@@ -16,7 +16,8 @@
 #include "hsep_real.h"
 #include "hsep_window.h"
 
-#define HSEP_DISTURBANCES_STIFFNESS HSEP_FEATURES_N_FRICTION /* place, behind friction */
+#define HSEP_DISTURBANCES_OF_COMMAND (HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS)
+#define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_OF_COMMAND /* place, behind friction and stop operators */
 #define HSEP_DISTURBANCES_DAMPING (HSEP_DISTURBANCES_STIFFNESS + 1)
 #define HSEP_DISTURBANCES_MAX (HSEP_FEATURES_N_LASTING + HSEP_FEATURES_N_PERIODIC)
 #define HSEP_DISTURBANCES_PAST (HSEP_FEATURES_DIFFERENCES + 1) /* predictions that differences need */
@@ -27,6 +28,7 @@ typedef struct {
     hsep_real x_d;                             /* m, last command */
     hsep_real x_pb[HSEP_DISTURBANCES_PAST];    /* m, last predictions, newest first */
     hsep_real filtered[HSEP_DISTURBANCES_MAX]; /* last filtered disturbances */
+    hsep_real stops[HSEP_FEATURES_N_STOPS];    /* m, stop operators */
 } hsep_disturbed;
 
 typedef struct {
@@ -45,8 +47,8 @@ typedef struct {
                               * the samples that were tried last */
 } hsep_disturbances;
 
-HSEP_ASSERT_WORDS(hsep_disturbed, 15);
-HSEP_ASSERT_WORDS(hsep_disturbances, 39);
+HSEP_ASSERT_WORDS(hsep_disturbed, 1 + HSEP_DISTURBANCES_PAST + HSEP_DISTURBANCES_MAX + HSEP_FEATURES_N_STOPS);
+HSEP_ASSERT_WORDS(hsep_disturbances, 9 + 2 * sizeof(hsep_disturbed) / sizeof(hsep_real));
 
 /* Disturbances, and features. */
 HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters);
@@ -63,14 +65,14 @@ HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_para
 
 /* Begin in motion, which went on as the n samples of the first window begin, (n,) m each. */
 HSEP_API void hsep_disturbances_begin_in_motion(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n);
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale);
 
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n);
 
 /* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for what
- * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6
- * tanh and 9 (6 n_modes) multiply-adds a sample. */
+ * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost:
+ * HSEP_FEATURES_N_FRICTION tanh and 9 n_modes HSEP_DISTURBANCES_OF_COMMAND multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale,
     hsep_real rows[]);
@@ -84,9 +86,11 @@ HSEP_API void hsep_disturbances_motion(
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
-/* Velocity of the change of sign of friction i, m/s; velocity of the damping at place j of n samples, m/s; angle within
+/* Velocity of the change of sign of friction i, m/s; distance of stop operator i, m;
+ * velocity of the damping at place j of n samples, m/s; angle within
  * the period at a position, rad, 0 without a period. */
 HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i);
+HSEP_API hsep_real hsep_disturbances_distance(hsep_real velocity_scale, hsep_int i);
 HSEP_API hsep_real hsep_disturbances_damped_velocity(
     const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j);
 HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);

@@ -124,6 +124,15 @@ HSEP_API void hsep_stack_update(
     stack_minimise(H, l, self->weights);
 }
 
+HSEP_API void hsep_stack_others(const hsep_stack *self, hsep_real others[HSEP_N_EXPERTS])
+{
+    const hsep_real left = 1.0 - self->weights[HSEP_RECALL];
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        others[i] = left > HSEP_STACKING_ROUNDING ? self->weights[i] / left : hsep_expert_of(i).first_weight;
+    }
+    others[HSEP_RECALL] = 0.0;
+}
+
 HSEP_API hsep_int hsep_stack_leader(const hsep_stack *self)
 {
     const hsep_real *weights = self->weights;

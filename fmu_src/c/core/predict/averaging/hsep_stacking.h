@@ -49,6 +49,9 @@ HSEP_API void hsep_stack_init(hsep_stack *self);
 HSEP_API void hsep_stack_update(
     hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
 
+/* Weights of all experts but HSEP_RECALL, 0, with its weight shared among them and physics. */
+HSEP_API void hsep_stack_others(const hsep_stack *self, hsep_real others[HSEP_N_EXPERTS]);
+
 /* HSEP_ARX_COMMAND, if it has more weight than HSEP_ARX_RESIDUAL and HSEP_STATIC together; else HSEP_ARX_RESIDUAL. */
 HSEP_API hsep_int hsep_stack_leader(const hsep_stack *self);
 

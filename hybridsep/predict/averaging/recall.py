@@ -1,0 +1,105 @@
+"""Memory of a run for recall: what the physics model missed the last time that the machine was told the same.
+
+Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
+residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
+much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in a window. The lag with
+the least gives the residuals that were measured then. They count by ``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of
+the changes themselves, and a tolerance ``ρ``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.signals import Array
+from .constants import CONSTANTS
+
+__all__ = ["Memory"]
+
+_UPDATES = 25
+"""Samples of a window, at most, at which all lags are compared: a controller does it in the samples between them."""
+
+_ALIKE = 1e-100
+"""Square of a change, m², that counts as 0: sums of smaller ones would slow a processor down."""
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """Commands and residuals, oldest first; zeros before the first ones.
+
+    Attributes
+    ----------
+    commands : (n + stride,) array, m
+        As they came, as far as they are known, relative to the start.
+    residuals : (n,) array, m
+        Of the physics model, as far as they are measured.
+    distances : (n,) array, m²
+        ``D_τ`` of the lags n … 1.
+    moved : float, m²
+        ``S``.
+    n_ahead : int
+        Commands that are known ahead of those that were predicted.
+    """
+
+    commands: Array
+    residuals: Array
+    distances: Array
+    moved: float
+    n_ahead: int
+
+    @classmethod
+    def init(cls, n: int, Np: int) -> Memory:
+        """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
+        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), 0.0, 0)
+
+    def restart(self) -> Memory:
+        """Return the memory at the beginning of another run, at rest at its start."""
+        here = self.commands - self.commands[-1]
+        return replace(self, commands=here, distances=np.zeros_like(self.distances), moved=0.0, n_ahead=0)
+
+    def hear(self, path: Array, Np: int) -> Memory:
+        """Return the memory that knows the commands ahead, ``(m,)``, m."""
+        n, new = len(self.residuals), path[self.n_ahead :]
+        stride = len(self.commands) - n
+        commands, distances = np.concatenate((self.commands, new)), self.distances.copy()
+        gamma, moved, begin = math.exp(-stride / Np), self.moved, len(self.commands)
+        end = begin + len(new)
+        begin = end - Np * (len(new) // Np)  # windows end with the commands; before the first one there is rest
+        changes = commands[stride:] - commands[:-stride]
+        for first in range(begin, end, Np):
+            for k in range(first - stride, first - stride + Np // stride * stride, stride):
+                distances *= gamma
+                distances += (changes[k] - changes[k - n : k]) ** 2 + _ALIKE
+                moved = gamma * moved + (float(changes[k]) ** 2 + _ALIKE)
+        n_ahead = max(self.n_ahead, len(path))
+        return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
+
+    def recalled(self, n: int) -> tuple[Array, float, float]:
+        """Return residuals after the commands most like those ahead, ``(n,)``, m, the one before, and how they count.
+
+        They do not if the memory is shorter.
+
+        Parameters
+        ----------
+        n : int
+            Samples from the last measured one to the last known command.
+        """
+        size = len(self.residuals)
+        if size <= n:
+            return np.zeros(n), 0.0, 0.0
+        lag = n + int(np.argmin(self.distances[1 : size - n + 1][::-1]))  # the shortest lag of equals
+        distance, tolerated = float(self.distances[size - lag]), CONSTANTS.recall_tolerance**2 * self.moved
+        alike = tolerated / (tolerated + distance) if distance > 0.0 else 0.0
+        return self.residuals[size - lag : size - lag + n], float(self.residuals[size - lag - 1]), alike
+
+    def remember(self, residuals: Array) -> Memory:
+        """Return the memory with the residuals of measured samples, ``(m,)``, m."""
+        n = len(self.residuals)
+        return replace(
+            self,
+            residuals=np.concatenate((self.residuals, residuals))[-n:] if n else self.residuals,
+            n_ahead=max(self.n_ahead - len(residuals), 0),
+        )
