@@ -199,7 +199,7 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
 def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
     sep = SepCompensator.from_bytes(learned())
     sep.change(change_max=2e-4)
-    away = run(sep, sensor=no_faster(0.04), t_init=0.0)
+    away = run(sep, sensor=no_faster(0.05), t_init=0.0)
     first = int(np.argmax(away.state == SepState.PHYSICS))
     assert 50 < first < 250
     assert (away.state[:first] == SepState.HYBRID).all()
@@ -211,7 +211,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
     assert sep.plan(moves()[:200]).state is SepState.HYBRID
     free = SepCompensator.from_bytes(learned())
     free.change(change_max=None)  # no bound, no plan at it
-    found = cosimulate(free, STAGE.new_plant(), moves()[: first + 100], sensor=no_faster(0.04), t_init=0.0)
+    found = cosimulate(free, STAGE.new_plant(), moves()[: first + 100], sensor=no_faster(0.05), t_init=0.0)
     assert (found.state[first:] == SepState.HYBRID).any()
 
 

@@ -159,7 +159,7 @@ def test_a_prediction_that_overflows_is_refused() -> None:
     arrays["residual.run.past.0"] = np.full(6, 1e100)
     arrays["residual.learned.scales.0.largest_square"] = np.array(1e-200)
     arrays["residual.learned.scales.0.largest"] = np.array(1e-100)
-    arrays["residual.evidence.0.this.factor"] = 1e-100 * np.eye(27)
+    arrays["residual.evidence.0.this.factor"] = 1e-100 * np.eye(33)
     for i in range(4):
         arrays[f"residual.noise.{i}"] = np.array(1e-202)
     with pytest.raises(StateError, match="the prediction of the pending window must be finite"):
