@@ -30,12 +30,13 @@ __all__ = ["count"]
 
 WINDOWS = 60
 LIMITS = {
-    "predictor, cold": 0.26e6,
-    "predictor, warm": 0.3e6,
-    "compensator, cold": 1.35e6,
-    "compensator, warm": 1.45e6,
+    "predictor, cold": 0.32e6,
+    "predictor, warm": 0.36e6,
+    "predictor, warm, recall": 0.42e6,
+    "compensator, cold": 1.5e6,
+    "compensator, warm": 1.5e6,
 }
-"""Instructions of the dearest sample."""
+"""Instructions of the dearest sample; with recall with its memory of 8192 samples, else without."""
 
 
 def count(folder: Path) -> dict[str, list[float]]:
@@ -49,10 +50,11 @@ def count(folder: Path) -> dict[str, list[float]]:
     predictor = build(folder / "predictor", "HybridPredictor", PREDICTOR)
     compensator = build(folder / "compensator", "SepCompensator", COMPENSATOR)
     earlier, in_loop = warm(trained(), folder / "warm"), warm(trained_in_loop(), folder / "warm_in_loop")
-    alone, tight = {"averaging": 1, "t_init": -1.0}, {**AVERAGING, **TIGHT}
+    alone, tight = {"averaging": 1, "t_init": -1.0, "recall": 0}, {**AVERAGING, **TIGHT, "recall": 0}
     cases: dict[str, tuple[Host, dict[str, Any], int, int]] = {
         "predictor, cold": (predictor, alone, 100, 100),
         "predictor, warm": (predictor, alone | earlier, 100, 100),
+        "predictor, warm, recall": (predictor, alone | earlier | {"recall": 8192}, 100, 100),
         "compensator, cold": (compensator, tight, 50, 200),
         "compensator, warm": (compensator, tight | in_loop, 50, 200),
     }
