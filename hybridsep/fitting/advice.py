@@ -212,8 +212,10 @@ def extent(logs: Sequence[Log]) -> str:
     rate are said as well.
     """
     T_s, n = logs[0].T_s, sum(len(log.t) for log in logs)
-    n_used, n_recorded = sum(map(_n_used, logs)), sum(map(_n_recorded, logs))
-    words = f"{n} samples" if _is_all(logs) else f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
+    n_used, n_recorded = _used(logs)
+    words = f"{n} samples"
+    if n_used < _ALL * n_recorded:
+        words = f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
     words += f", {n * T_s:.4g} s at {1 / T_s:.4g} Hz"
     own = logs[0].T_recorded
     if own and abs(T_s / own - 1.0) > _RATE:
@@ -227,20 +229,13 @@ def extent(logs: Sequence[Log]) -> str:
 
 def partly_used(log: Log) -> str:
     """Return the extent of a log of which a part is used, or at another rate than its file's; empty otherwise."""
-    own = log.T_recorded or log.T_s
-    if _is_all([log]) and abs(log.T_s / own - 1.0) <= _RATE:
+    own, (n_used, n_recorded) = log.T_recorded or log.T_s, _used([log])
+    if n_used >= _ALL * n_recorded and abs(log.T_s / own - 1.0) <= _RATE:
         return ""
     return f"{log.path.name}: used are {extent([log])}"
 
 
-def _is_all(logs: Sequence[Log]) -> bool:
-    return sum(map(_n_used, logs)) >= _ALL * sum(map(_n_recorded, logs))
-
-
-def _n_used(log: Log) -> int:
-    """Return the samples that are measured."""
-    return int(np.count_nonzero(~np.isnan(log.x_meas)))
-
-
-def _n_recorded(log: Log) -> int:
-    return log.n_recorded or len(log.t)
+def _used(logs: Sequence[Log]) -> tuple[int, int]:
+    """Return how many samples are measured and used, and how many were recorded."""
+    used = sum(int(np.count_nonzero(~np.isnan(log.x_meas))) for log in logs)
+    return used, sum(log.n_recorded or len(log.t) for log in logs)

@@ -23,7 +23,6 @@ from ..logs.log import Log
 from ..machines.machine import Machine
 
 __all__ = [
-    "SAMPLES_MAX",
     "Built",
     "StepTimes",
     "build_fmus",
@@ -34,7 +33,7 @@ __all__ = [
     "write_commands",
 ]
 
-SAMPLES_MAX = 5000
+_TIMED_MAX = 5000
 """Samples that are timed, at most."""
 
 _MODELS = {"": "HybridPredictor", "compensator ": "SepCompensator"}
@@ -157,7 +156,7 @@ def step_times(fmu: Path, x_d: Array, x: Array) -> StepTimes:
     x_d, x : (n,) array, m
         Commanded and measured positions.
     """
-    n = min(len(x_d), SAMPLES_MAX)
+    n = min(len(x_d), _TIMED_MAX)
     taken = np.empty(n)
     controller = FmuController(fmu, {}, 0.0)
     with controller:

@@ -32,7 +32,6 @@ __all__ = [
     "settings_to_try",
     "trained_rms",
     "window_scores",
-    "window_sizes",
     "with_window",
 ]
 
@@ -128,15 +127,10 @@ def trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequ
 
     The earlier half shows which learns fastest, but machines run warm.
     """
-    errors = replay(HybridPredictor(model, settings), recordings, training=True).errors(training=True)[2]
+    training = [Recording(*one.training, 0) for one in recordings if one.n_train]
+    errors = replay(HybridPredictor(model, settings), training).errors()[2]
     later = errors[len(errors) // 2 :]
     return rms(later[~np.isnan(later)])
-
-
-def window_sizes(Np: int, n_samples: int) -> list[int]:
-    """Return the windows over which the error is shown: the controller's, and others that a log is long enough for."""
-    sizes = dict.fromkeys(max(1, round(share * Np)) for share in _WINDOWS)
-    return [size for size in sizes if size <= max(n_samples, Np)]
 
 
 def window_scores(
@@ -155,9 +149,10 @@ def window_scores(
     offset : float
         As of :class:`~hybridsep.fitting.replay.Replay`, m.
     """
-    sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
+    most = max(min(len(recording.x) for recording in recordings), settings.Np)
+    sizes = dict.fromkeys(max(1, round(share * settings.Np)) for share in _WINDOWS)
     scores = []
-    for i, Np in enumerate(sizes):
+    for i, Np in enumerate(size for size in sizes if size <= most):
         found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
         scores.append(WindowErrors(Np, *replace(found, offset=offset).rms()))
         progress((i + 1) / len(sizes))

@@ -72,12 +72,11 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
         If some of the three limits are missing.
     """
     found = {entry: given[one.name] for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
-    names = {entry: DRIVE_LIMIT_ENTRIES[entry].name for entry in Limits.parameters()}
-    missing = [f"--{name}" for entry, name in names.items() if entry not in found]
-    if found and missing:
+    names = [parameter.name for parameter in Limits.parameters().values()]
+    if found and (missing := [name for name in names if name not in given]):
+        verb = "is" if len(missing) == 1 else "are"
         raise ParameterError(
-            f"a compensator needs the drive's limits {', '.join(f'--{name}' for name in names.values())}; "
-            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+            f"a compensator needs the drive's limits {', '.join(names)}; {', '.join(missing)} {verb} missing"
         )
     return found
 

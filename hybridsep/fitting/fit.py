@@ -20,7 +20,7 @@ from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
 from ..identify.model import IdentifiedModel, machine_of
-from ..identify.operation import SAMPLES_MIN, TOO_LITTLE, identify_operation, unit_gain_model
+from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
 from ..logs.checks import Finding, checked
 from ..logs.log import Log, Table, read_log
@@ -377,20 +377,12 @@ def _identified(
 ) -> IdentifiedModel:
     """Return the identification from the training samples, in the units of the logs."""
     training = [in_time(*one.training, settings.n_late) for one in recordings if one.n_train > 1]
-    n, n_all = (sum(lengths) for lengths in zip(*((one.n_train, len(one.x)) for one in recordings), strict=True))
-    log = "this log" if len(logs) == 1 else "these logs"
-    rests = all(np.ptp(one.x_d) == 0 for one in recordings)
     try:
-        if n < SAMPLES_MIN:
-            raise IdentificationError(
-                f"this log cannot determine a model, because {n} of its {n_all} samples train, at least {SAMPLES_MIN} "
-                "are needed"
-            )
         return identify_operation(
             *(training, settings.T_s),
             unit=logs[0].unit,
             shown=logs[0].shown,
-            part=log if rests else f"the first half of {log}",
+            part=f"the first half of {'this log' if len(logs) == 1 else 'these logs'}",
             progress=lambda _message, done: progress(done),
         )
     except IdentificationError as error:

@@ -219,7 +219,8 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
         def residual(theta: Array, most: float = 1.0 if with_stiffness else 0.0) -> Array:
             one = plant(theta)
             one = one._replace(kappa=most * one.kappa)
-            errors = _errors(settings, one, fitted, "fitted")
+            discrete = one.model.discretise(settings.T_s, settings.input_hold)
+            errors = [piece.error(discrete, one)[piece.fitted] for piece in fitted]
             return np.concatenate([(error - error.mean()) / scale for error in errors])
 
         modes = len(alone.model.modes)
@@ -245,12 +246,6 @@ def _moved(mode: Mode, frequency: float, damping: float, alpha: float, beta: flo
     return Mode(
         mode.f_n * math.exp(frequency), mode.zeta * math.exp(damping), mode.alpha + alpha * w**2, mode.beta + beta * w
     )
-
-
-def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> list[Array]:
-    """Return the errors of a plant over a part of each piece, m."""
-    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
-    return [piece.error(discrete, plant)[getattr(piece, part)] for piece in pieces]
 
 
 def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float | None:

@@ -214,30 +214,30 @@ class Replay:
         pieces = [Piece(one.x_d, one.x, one.n_train, one.first_judged(self.Np)) for one in self.recordings]
         return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))
 
-    def joined(self, name: str, *, training: bool = False) -> Array:
-        """Return a signal of a :class:`Backtest` over all test samples, or over the training samples, ``(n,)``."""
-        return self._parts([getattr(result, name) for result in self.results], training)
+    def joined(self, name: str) -> Array:
+        """Return a signal of a :class:`Backtest` over all test samples, ``(n,)``."""
+        return self._parts([getattr(result, name) for result in self.results])
 
     def commands(self) -> Array:
         """Return the commanded position over all test samples, ``(n,)``, m."""
-        return self._parts([recording.x_d for recording in self.recordings], False)
+        return self._parts([recording.x_d for recording in self.recordings])
 
-    def errors(self, *, training: bool = False) -> Array:
-        """Return ``x`` minus each of :data:`PREDICTIONS` over the test samples, or the training samples, ``(3, n)``, m.
+    def errors(self) -> Array:
+        """Return ``x`` minus each of :data:`PREDICTIONS` over the test samples, ``(3, n)``, m.
 
         NaN where a measurement is missing. The physics model is judged with its offset.
         """
-        x = self._measured(training)
-        return np.stack([x - self._parts(list(rows), training) for rows in zip(*self._predictions(), strict=True)])
+        x = self._measured()
+        return np.stack([x - self._parts(list(rows)) for rows in zip(*self._predictions(), strict=True)])
 
-    def rms(self, *, training: bool = False) -> list[float]:
+    def rms(self) -> list[float]:
         """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
-        return [_rms(row) for row in self.errors(training=training)]
+        return [_rms(row) for row in self.errors()]
 
     def scored(self) -> list[Scored]:
         """Return the errors of physics model, hold, every peer, and the hybrid, over the test samples."""
-        x, (pb, hold, h) = self._measured(False), self.errors()
-        peers = [Scored(one.title, x - self._parts(one.predictions, False), one.diverged) for one in self.peers]
+        x, (pb, hold, h) = self._measured(), self.errors()
+        peers = [Scored(one.title, x - self._parts(one.predictions), one.diverged) for one in self.peers]
         return [Scored("physics model", pb), Scored("hold", hold), *peers, Scored("hybrid", h)]
 
     def best_ways(self) -> list[Peer]:
@@ -265,7 +265,7 @@ class Replay:
 
     def _place(self) -> Array:
         """Return the number of each test sample in its window, ``(n,)``."""
-        return self._parts([np.arange(len(one.x), dtype=np.float64) % self.Np for one in self.recordings], False)
+        return self._parts([np.arange(len(one.x), dtype=np.float64) % self.Np for one in self.recordings])
 
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
@@ -326,15 +326,12 @@ class Replay:
         """Return the measured position, ``(n,)``, NaN where it is of before the recording."""
         return np.where(np.arange(len(recording.x)) < self.delay, np.nan, recording.x)
 
-    def _measured(self, training: bool) -> Array:
-        return self._parts([self._compared(recording) for recording in self.recordings], training)
+    def _measured(self) -> Array:
+        return self._parts([self._compared(recording) for recording in self.recordings])
 
-    def _parts(self, signals: Sequence[Array], training: bool) -> Array:
-        parts = [
-            signal[: recording.n_train] if training else signal[recording.first_judged(self.Np) :]
-            for recording, signal in zip(self.recordings, signals, strict=True)
-        ]
-        return np.concatenate(parts)
+    def _parts(self, signals: Sequence[Array]) -> Array:
+        pairs = zip(self.recordings, signals, strict=True)
+        return np.concatenate([signal[recording.first_judged(self.Np) :] for recording, signal in pairs])
 
 
 def _rms(errors: Array) -> float:
@@ -346,8 +343,6 @@ def _rms(errors: Array) -> float:
 def replay(
     predictor: HybridPredictor,
     recordings: Sequence[Recording],
-    *,
-    training: bool = False,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Replay:
     """Replay recordings with one predictor, which goes on from its state and learns them.
@@ -357,8 +352,6 @@ def replay(
     predictor : HybridPredictor
         It is at the beginning of a run; another begins with each further recording.
     recordings : sequence of Recording
-    training : bool
-        Whether only the training parts are replayed.
     progress : callable, optional
         Called with the fraction done.
 
@@ -367,13 +360,8 @@ def replay(
     SignalError
         If samples cannot be used, or a prediction diverges.
     """
-    used = [
-        Recording(*recording.training, recording.n_train) if training else recording
-        for recording in recordings
-        if recording.n_train or not training
-    ]
-    n, done, results = sum(len(recording.x) for recording in used), 0, []
-    for i, recording in enumerate(used):
+    n, done, results = sum(len(recording.x) for recording in recordings), 0, []
+    for i, recording in enumerate(recordings):
         if i:
             predictor.restart()
         before = done
@@ -386,7 +374,7 @@ def replay(
             )
         )
         done += len(recording.x)
-    return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.n_late)
+    return Replay(tuple(recordings), tuple(results), predictor.Np, predictor.settings.n_late)
 
 
 def knew(saved: HybridPredictor, replayed: HybridPredictor) -> bool:

@@ -261,16 +261,9 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
     ParameterError
         If a value does not fit the window, or has no effect.
     """
-    for name, given in values.items():
+    for name in values:
         if name in PredictorSettings.AVERAGING and not settings.averaging:
             raise ParameterError(f"{TUNED[name].name} has an effect with averaging only: set averaging = true, too")
-        for value in given:
-            try:
-                replace(settings, **{name: value})
-            except ParameterError as error:
-                raise ParameterError(f"{TUNED[name].name}: {error}") from error
-    combined = [
-        replace(settings, **dict(zip(values, combination, strict=True)))
-        for combination in itertools.product(*values.values())
-    ]
+    combinations = itertools.product(*values.values())
+    combined = [replace(settings, **dict(zip(values, one, strict=True))) for one in combinations]
     return list(dict.fromkeys([settings, *combined]))

@@ -195,7 +195,7 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
 def test_too_short_a_log_judges_nothing(tmp_path: Path) -> None:
     log = write_rows(tmp_path / "short.csv", commanded()[1000:1150], measured(0)[1000:1150])
     found = fit(read_log(log), Np=NP)
-    words = "because 75 of its 150 samples train, at least 100 are needed; a gain of 1"
+    words = "because it has 75 samples, at least 100 are needed; a gain of 1"
     assert words in found.identification.findings[0]
     told = "Nothing could be judged: the log's second half has 1 window of 50 samples; record at least 2.1 s."
     assert found.advice == told

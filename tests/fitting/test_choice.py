@@ -53,7 +53,8 @@ def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     candidates = settings_to_try(settings)
     assert [(one.p, one.q) for one in tried] == [(one.p, one.q) for one in candidates]
     for one, candidate in zip(tried, candidates, strict=True):
-        errors = replay(HybridPredictor(MODEL, candidate), recordings, training=True).errors(training=True)[2]
+        training = [Recording(*one.training, 0) for one in recordings]
+        errors = replay(HybridPredictor(MODEL, candidate), training).errors()[2]
         assert one.rms_h == pytest.approx(np.sqrt(np.mean(errors[200:] ** 2)))
     best = min(tried, key=lambda one: one.rms_h)
     best = best if best.rms_h < 0.95 * tried[0].rms_h else tried[0]

@@ -41,8 +41,8 @@ def test_the_least_penalty_that_is_allowed_bounds_the_defaults() -> None:
 @pytest.mark.parametrize(
     ("settings", "values", "words"),
     [
-        (PAPER, {"p": (5, 101)}, "p: p must be 1 … Np = 100, got 101; lower p or raise Np"),
-        (PAPER, {"q": (100,)}, "q: q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
+        (PAPER, {"p": (5, 101)}, "p must be 1 … Np = 100, got 101; lower p or raise Np"),
+        (PAPER, {"q": (100,)}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
         (PAPER, {"effect": (1e-5,)}, "effect has an effect with averaging only: set averaging = true, too"),
     ],
 )

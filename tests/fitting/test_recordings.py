@@ -63,7 +63,6 @@ def test_a_replay_is_the_backtest_of_the_whole_judged_on_its_second_half() -> No
         np.testing.assert_array_equal(found.joined(name), getattr(whole, name)[half:])
         np.testing.assert_array_equal(found.errors()[i], (x - getattr(whole, name))[half:])
         assert found.rms()[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[half:] ** 2)))
-        assert found.rms(training=True)[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[:half] ** 2)))
 
 
 def test_one_set_of_samples_judges() -> None:
@@ -107,14 +106,6 @@ def test_late_measurements_are_judged_where_they_stand() -> None:
     found = replay(late, [Recording(x_d, x, 0)]).with_peers()
     assert np.isnan(found.errors()[:, :7]).all()
     assert not any(np.isnan(one.errors[7:]).any() for one in found.scored())
-
-
-def test_only_what_trains_is_seen_where_asked() -> None:
-    x_d, x = pieces(N)[0]
-    spoiled = x.copy()
-    spoiled[N // 2 :] = np.nan
-    given, other = (replay(predictor(), split_log([(x_d, one)], 0.5), training=True) for one in (x, spoiled))
-    np.testing.assert_array_equal(given.errors(training=True), other.errors(training=True))
 
 
 def test_the_error_over_the_horizon() -> None:
