@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import SignalError
 from ..base.metrics import rms, rms_ratio
-from ..base.signals import Array, Indices
+from ..base.signals import Array
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
@@ -272,28 +272,16 @@ class Replay:
         place = self._place()
         return [_rms(one.errors[place < n]) for one in self.scored()]
 
-    def window_errors(self) -> tuple[Indices, Array]:
-        """Return the first sample of each test window, and the RMS of each prediction over it.
-
-        Returns
-        -------
-        begins : (n,) array of int
-            Counted in test samples.
-        rms : (3, n) array, m
-            NaN where nothing was measured.
-        """
-        begins, found = [], []
-        for _, x, predictions, begin in self._windows(()):
-            begins.append(begin)
-            found.append([_rms(x - row) for row in predictions])
-        return np.array(begins, dtype=np.intp), np.reshape(found, (-1, len(PREDICTIONS))).T
-
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""
         peers = self.best_ways()
         tally = Tally(self.Np, [peer.title for peer in peers], self.least)
-        for x_d, x, predictions, _ in self._windows(peers):
-            tally.add(x_d, x, predictions)
+        for i, (recording, (pb, hold, h)) in enumerate(zip(self.recordings, self._predictions(), strict=True)):
+            rows = np.stack((pb, hold, *(peer.predictions[i] for peer in peers), h))
+            x = self._compared(recording)
+            for begin in range(recording.first_judged(self.Np), len(x), self.Np):
+                window = slice(begin, begin + self.Np)
+                tally.add(recording.x_d[window], x[window], rows[:, window])
         return tally.verdict()
 
     def judgement(self) -> Judgement:
@@ -307,20 +295,6 @@ class Replay:
     def _predictions(self) -> list[list[Array]]:
         """Return what each of :data:`PREDICTIONS` is judged by, of each recording, ``(n,)``, m."""
         return [[result.x_pb + self.offset, result.x_hold, result.x_h] for result in self.results]
-
-    def _windows(self, peers: Sequence[Peer]) -> Iterator[tuple[Array, Array, Array, int]]:
-        """Yield command, measurement, predictions and place among the test samples, of each test window.
-
-        The predictions, ``(3 + peers, m)``, are in the order of a :class:`Tally`.
-        """
-        before = 0
-        for i, (recording, (pb, hold, h)) in enumerate(zip(self.recordings, self._predictions(), strict=True)):
-            rows = np.stack((pb, hold, *(peer.predictions[i] for peer in peers), h))
-            x, first = self._compared(recording), recording.first_judged(self.Np)
-            for begin in range(first, len(x), self.Np):
-                window = slice(begin, begin + self.Np)
-                yield recording.x_d[window], x[window], rows[:, window], before + begin - first
-            before += max(len(x) - first, 0)
 
     def _compared(self, recording: Recording) -> Array:
         """Return the measured position, ``(n,)``, NaN where it is of before the recording."""

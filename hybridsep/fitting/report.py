@@ -46,7 +46,6 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     _write_figures(report, judged, heading, how)
     if not np.isnan(judged.replay.errors()[0]).all():  # else nothing judges
         _write_time(report, judged)
-        _write_windows(report, judged)
         _write_horizon(report, judged)
         _write_spectra(report, judged)
     return report
@@ -162,27 +161,6 @@ def _write_time(report: Report, judged: Judged) -> None:
     )
     report.heading("Errors over time")
     report.chart(chart)
-
-
-def _write_windows(report: Report, judged: Judged) -> None:
-    scale, unit = judged.unit
-    begins, errors = judged.replay.window_errors()
-    if len(begins) < 2:
-        return
-    t = np.repeat(judged.T_s * np.append(begins, len(judged.replay.commands())), 2)[1:-1]
-    lines = [
-        Line(name, t, scale * np.repeat(row, 2), colour)
-        for name, row, colour in zip(_NAMES, errors, _COLOURS, strict=True)
-    ]
-    worse = int((errors[2] > errors[0]).sum())
-    report.chart(
-        Chart(
-            f"time in {judged.part} [s]",
-            (f"RMS of each window [{unit}]",),
-            lines,
-            f"Window by window: the hybrid is worse than the physics model in {worse} of {len(begins)}.",
-        )
-    )
 
 
 def _write_horizon(report: Report, judged: Judged) -> None:
