@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.metrics import shown_figure
 from ..evaluate.report import Report
@@ -22,19 +21,8 @@ PRINTED = {
 Summary = Mapping[str, Mapping[str, Any]]
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table of cases and their figures.
-
-    Attributes
-    ----------
-    title, note : str
-        Above it and below it.
-    columns : tuple of str
-        Heads of the figures' columns; the first column has the cases.
-    rows : list of tuple of str
-        Case and figures.
-    """
+class Table(NamedTuple):
+    """A table of cases: title above it, note below it, heads of the figures' columns, rows of case and figures."""
 
     title: str
     note: str
