@@ -116,6 +116,7 @@ def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path,
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quick_fit")
 def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, tmp_path: Path, log: Path) -> None:
     out = tmp_path / "axis"
     arguments = ("fit", log, "--Np", 20, "--out", out)

@@ -153,7 +153,7 @@ def test_the_reports_script_replays_a_log(fitted: Fit, built: Built, monkeypatch
 
 
 @pytest.mark.slow
-def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
+def test_the_command_line(hybridsep: Run, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     part = np.r_[:400, 999:1399]  # a move in each half, between them at rest
     log = write_rows(tmp_path / "my axis.csv", commanded()[part], measured(0)[part])
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json")
@@ -163,6 +163,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert [one["Np"] for one in result["windows"]] == [8, 20, 40, 80]
     assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
     assert load_machine(tmp_path / "fit" / "machine.toml").name == "my_axis"
+    request.getfixturevalue("quick_fit")
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out

@@ -177,7 +177,7 @@ def test_the_plants(in_c: bool, kind: str, data: st.DataObject, samples: Any, h:
         if in_c:
             friction_on = {} if feed else {"friction_on": int(kind == "motion")}
             model = CModel("feed_drive" if feed else "stage_drive", {**values, **modes, **friction_on})
-            check_c_model(model, samples[:10], h)
+            check_c_model(model, samples[: 10 if h < 1.0 else 2], h)  # a step of 100 s takes seconds
             return
         plant: Drive = (
             FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
