@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import c_core
 import elf
@@ -21,10 +20,6 @@ from hybridsep.fmi.c_header import all_c
 SUFFIXES = (".c", ".h", ".cpp")
 SANITISED = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 """Not optimised: that would take three times as long to compile."""
-
-
-def at_night(*values: object) -> Any:
-    return pytest.param(*values, marks=pytest.mark.nightly)
 
 
 @pytest.mark.slow
@@ -76,7 +71,13 @@ def test_everything_compiles_as_one_file(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("predictor_2", [["input_hold=1", "t_init=0"], ["averaging=1", "Np=7", "p=7", "q=6"]]),
+        (
+            "predictor_2",
+            [
+                *(["input_hold=1", "t_init=0"], ["Np=1", "p=1", "q=0"], ["p=100", "q=99", "lambda=1e-20"]),
+                *(["averaging=1", "Np=7", "p=7", "q=6"], ["averaging=1", "Np=150", "p=2", "q=0", "dead_time=13"]),
+            ],
+        ),
         (
             "compensator",
             [
@@ -89,25 +90,6 @@ def test_everything_compiles_as_one_file(name: str) -> None:
         ("feed_drive", [[]]),
         ("stage_drive", [[]]),
         ("trajectory", [[]]),
-        # Sizes that are longest, shortest and others
-        at_night(
-            "predictor",
-            [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]],
-        ),
-        at_night(
-            "predictor_2", [["p=100", "q=99", "lambda=1e-20"], ["averaging=1"], ["averaging=1", "Np=1", "p=1", "q=0"]]
-        ),
-        at_night("predictor", [["averaging=1", "Np=150", "p=2", "q=0", "dead_time=13", "forgetting=0.001"]]),
-        at_night(
-            "compensator",
-            [
-                ["v_max=0.08", "a_max=8", "j_max=1000"],
-                ["Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
-                ["averaging=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
-                ["averaging=1", "Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
-                ["averaging=1", "Np=50", "p=20", "measurement_delay=300", "t_init=0"],
-            ],
-        ),
     ],
 )
 def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:

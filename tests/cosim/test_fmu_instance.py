@@ -112,19 +112,6 @@ def test_a_closed_instance_refuses_every_call(drive: Path) -> None:
     assert instance.variables["x"].name == "x"
 
 
-def test_closing_after_refusals(drive: Path) -> None:
-    """After a refused call, which pythonfmu reports as fatal, and before any."""
-    for values in ({"m": -1.0}, None):
-        instance = FmuInstance(drive)
-        if values:
-            with pytest.raises(FmuError, match=r"m must be 1e-06 … 1000000 kg, got -1.0"):
-                instance.initialise(values)
-        instance.close()
-        instance.close()
-        with pytest.raises(FmuError, match="closed"):
-            instance.get("m")
-
-
 def test_a_forgotten_instance_is_closed(drive: Path, temporary: Path) -> None:
     instance = FmuInstance(drive)
     instance.initialise()

@@ -164,6 +164,13 @@ def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkey
     module._version.cache_clear()
 
 
+def test_only_a_few_versions_are_kept(without: Path) -> None:
+    for i in range(7):
+        fill(without / "kept" / f"version {i}", [("FeedDrive", "x86_64-linux")])
+    module._forget_old_versions()
+    assert len(list((without / "kept").iterdir())) == 4
+
+
 def test_the_build_requirement_is_the_compiler_of_the_libraries() -> None:
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     assert set(re.findall(r'"(ziglang==[\d.]+)', project)) == {ZIG.replace(" ", "==")}

@@ -22,8 +22,8 @@ static const hsep_real work_residuals = 160.0, work_slacks = 400.0, work_gram = 
 
 static const hsep_int work_solved[1 + HSEP_AVERAGED_STEPS] = {HSEP_NEWTON_SOLVED};
 
-/* Disturbances that are filtered for a prediction: of the command once, stiffness and damping twice. Of a stop operator,
- * in a sample of a prediction, and of a column, most of which it leaves early. */
+/* Disturbances that are filtered for a prediction: of the command once, stiffness and damping twice. Of a stop
+ * operator, in a sample of a prediction, and of a column, most of which it leaves early. */
 static const hsep_real work_filtered = HSEP_DISTURBANCES_OF_COMMAND + 4.0, work_of_mode = 9.0, work_stop = 12.0,
                        work_stopped = 1.5;
 

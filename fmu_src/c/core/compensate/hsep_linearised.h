@@ -1,8 +1,8 @@
 /* Linearisation of the residual model with averaging (online model averaging) in the commands, over a preview.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
- * for friction, 1 / r_i for a stop operator off its stop, and 2 |x| for stiffness. The weights of the experts and of the stack, and the shrinking by the variance,
- * are held constant:
+ * for friction, 1 / r_i for a stop operator off its stop, and 2 |x| for stiffness. The weights of the experts and of
+ * the stack, and the shrinking by the variance, are held constant:
  *
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *

@@ -150,8 +150,8 @@ static void averaged_take(hsep_averaged *self, hsep_int place, const hsep_real x
     }
 }
 
-/* What is recalled for the window, and how much: where it is not alike, the other experts share its weight. last: m, the
- * last residual of the physics model. */
+/* What is recalled for the window, and how much: where it is not alike, the other experts share its weight. last: m,
+ * the last residual of the physics model. */
 static void averaged_recall(hsep_averaged *self, hsep_real last)
 {
     const hsep_stack *stack = &self->learned.stack;
