@@ -15,7 +15,7 @@
 #define HSEP_REGRESSIONS_END 5
 #define HSEP_N_REGRESSIONS 4
 /* First weight, target, whether it has lags, whether it is fresh */
-#define HSEP_EXPERTS {0.0, 0, 0, 0}, {0.4, 0, 1, 0}, {0.4, 0, 0, 0}, {0.2, 1, 1, 0}, {0.0, 0, 1, 1}, {0.0, 0, 0, 0}
+#define HSEP_EXPERTS {0.0, 0, 0, 0}, {0.5, 0, 1, 0}, {0.5, 0, 0, 0}, {0.0, 1, 1, 0}, {0.0, 0, 1, 1}, {0.0, 0, 0, 0}
 
 /* hybridsep/predict/uncertainty.py */
 #define HSEP_UNCERTAINTY_SHARES 4.0, 2.0
@@ -54,8 +54,7 @@
 #define HSEP_EXPERTS_LAG_BOUND 10.0
 #define HSEP_EXPERTS_RESOLUTION 1e-13
 #define HSEP_EXPERTS_LEAST HSEP_TINY(1e-150)
-#define HSEP_EXPERTS_FIRST 0.4
-#define HSEP_EXPERTS_FIRST_COMMAND 0.2
+#define HSEP_EXPERTS_FIRST 0.5
 
 /* hybridsep/predict/averaging/features.py */
 #define HSEP_FEATURES_N_FRICTION 6
