@@ -135,7 +135,7 @@ class PlanModel:
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
         self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
-        self._state, self._late, self._start, self._path = state, late, start, path
+        self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
         window = self._window(x_d)
         self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)

@@ -207,7 +207,7 @@ class HybridPredictor:
         if n == 0:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if state.start is None else state.start
-        path = (command if path is None else path) - start
+        path = np.concatenate((state.late, (command if path is None else path) - start))
         command = np.concatenate((state.late, command - start))
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
         forecast = state.residual.forecast(ResidualWindow(command, x_pb, start, path), scales)

@@ -33,8 +33,8 @@ class ResidualWindow(NamedTuple):
     start : float, m
         Initial position.
     path : (m,) array, m
-        Commands as they came, as far as they are known, relative to ``start``: behind a compensator they are not
-        modified, and more than the window's; without those of ``x_d`` that are late.
+        Commands as they came, as far as they are known, relative to ``start``: behind a compensator they are more than
+        the window's, and not modified but for those that are late.
     """
 
     x_d: Array

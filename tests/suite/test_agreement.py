@@ -226,13 +226,13 @@ def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: Strea
 
 
 def slow(k: int, x_meas: float, last: float) -> float:
-    return last + min(max(x_meas - last, -3e-5), 3e-5)  # a motor that does not get beyond 30 of 80 mm/s
+    return last + min(max(x_meas - last, -4e-5), 4e-5)  # a motor that does not get beyond 40 of 80 mm/s
 
 
 @pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 def test_a_plan_that_runs_away_ends_the_hybrids_plans(new_stream: StreamMaker) -> None:
-    values: dict[str, Value] = {"p": 10, "change_max": 3e-4, "recall": 0}
+    values: dict[str, Value] = {"p": 10, "change_max": 5e-4, "recall": 0}
     loop = assert_agreement(new_stream, 900, values, 1e-8, sensor=slow)
     state = loop.column(COMPENSATOR, "sep_state")
     planned = np.flatnonzero(state == 2.0)

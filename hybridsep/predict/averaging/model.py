@@ -346,7 +346,7 @@ class AveragedModel:
         outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
-            peak = max(float(np.abs(np.diff(window.path)).max(initial=0.0)) / T_s, before)
+            peak = max(float(np.abs(np.diff(window.path[settings.n_late :])).max(initial=0.0)) / T_s, before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
@@ -387,7 +387,7 @@ class AveragedModel:
         """
         x, held = window.x_pb, {} if like is None else like.predictions
         memory = self.run.memory.hear(window.path, self.fixed.settings.Np) if like is None else like.memory
-        recalled = memory.recalled(max(len(x), self.fixed.settings.n_late + len(window.path)))
+        recalled = memory.recalled(len(window.path))
         rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:
