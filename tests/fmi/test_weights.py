@@ -16,7 +16,7 @@ import c_core
 import fmpy
 import numpy as np
 import pytest
-from c_core import CModel, refusal, write_weights
+from c_core import CModel, refusal
 from library_models import trained_state
 from properties import share
 from spoiled_weights import spoiled
@@ -131,14 +131,25 @@ def mutations(content: bytes, count: int) -> Iterator[bytes]:
             yield bytes(changed)
 
 
+SMALL = {"p": 4, "q": 2, "Np": 20, "averaging": 1}
+
+
+def small_predictor(n_windows: int = 0, *, averaging: bool = True) -> HybridPredictor:
+    """Return a predictor of the default machine with short windows that has learned."""
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=averaging)
+    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings, start=0.0)
+    for k in range(n_windows):
+        command = 1e-3 * np.sin(0.01 * np.arange(20 * k, 20 * k + 20))
+        predictor.predict(command)
+        predictor.update(0.99 * command)
+    return predictor
+
+
 @pytest.mark.slow
-def test_no_mutation_of_the_file_is_accepted_in_either_language(tmp_path: Path) -> None:
+def test_no_mutation_of_the_file_is_accepted_in_either_language() -> None:
     """Of a small factor, so that the head is hit as often as the triangle."""
-    rows = np.random.default_rng(1).normal(size=(40, 9))
-    write_weights(tmp_path, "predictor", np.linalg.qr(rows)[1], 40, p=4, q=2, Np=8)
-    model, content = CModel("predictor", {"p": 4, "q": 2, "Np": 8}), (tmp_path / WEIGHTS_FILE).read_bytes()
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=8)
-    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
+    content, predictor = weights_file(small_predictor(20, averaging=False)), small_predictor(averaging=False)
+    model = CModel("predictor", {**SMALL, "averaging": 0})
     for changed in mutations(content, share(1500)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
@@ -151,25 +162,9 @@ def test_no_mutation_of_the_file_is_accepted_in_either_language(tmp_path: Path) 
     assert predictor.weights.any()
 
 
-AVERAGING = {"p": 4, "q": 2, "Np": 20, "averaging": 1}
-
-
-def trained_with_averaging() -> HybridPredictor:
-    """Return a predictor of the default machine with short windows that has learned with averaging."""
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=True)
-    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings, start=0.0)
-    for k in range(20):
-        command = 1e-3 * np.sin(0.01 * np.arange(20 * k, 20 * k + 20))
-        predictor.predict(command)
-        predictor.update(0.99 * command)
-    return predictor
-
-
 def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
-    content = weights_file(trained_with_averaging())
-    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=True)
-    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
-    from_file, in_memory = CModel("predictor", AVERAGING, tmp_path), CModel("predictor", AVERAGING)
+    content, predictor = weights_file(small_predictor(20)), small_predictor()
+    from_file, in_memory = CModel("predictor", SMALL, tmp_path), CModel("predictor", SMALL)
     damaged, other = spoiled(content)
     for name, changed in (damaged | other).items():
         with pytest.raises(StateError):
@@ -182,7 +177,7 @@ def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
     assert predictor.regression.n_rows == 0.0
     (tmp_path / WEIGHTS_FILE).write_bytes(content)
     in_memory.context.weights, in_memory.context.weights_size = content, len(content)
-    states = [model.initialise().state.tobytes() for model in (from_file, in_memory, CModel("predictor", AVERAGING))]
+    states = [model.initialise().state.tobytes() for model in (from_file, in_memory, CModel("predictor", SMALL))]
     assert states[0] == states[1] != states[2]
 
 

@@ -13,9 +13,6 @@ from random_drives.generator import RandomDrive, Recipe, random_drives
 from random_drives.simulation import simulate
 from scipy.signal import cont2discrete, dlsim
 
-from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
-
 Array = NDArray[np.float64]
 
 SEED = 1
@@ -76,14 +73,3 @@ def test_sub_steps_are_short_enough(recipes: list[Recipe]) -> None:
     linear = simulate(models, [Disturbances()] * len(some), commands)
     for x, y, z in zip(coarse, fine, linear, strict=True):
         assert np.sqrt(np.mean((x - y) ** 2)) <= 0.03 * np.sqrt(np.mean((y - z) ** 2)) + 1e-11
-
-
-def test_backlash_is_a_play_of_the_output() -> None:
-    model = ModalModel([Mode(f_n=20.0, zeta=1.0, alpha=(40 * np.pi) ** 2)])  # without overshoot
-    there_and_back = rest_to_rest([0.0, 0.01, 0.0], PAPER_LIMITS, dwell=0.5)
-    tight, loose = simulate(
-        [model] * 2, [Disturbances(), Disturbances(play=1e-4, play_start=0.0)], [there_and_back] * 2
-    )
-    half = len(tight) // 2
-    assert tight[half] - loose[half] == pytest.approx(5e-5, abs=1e-7)
-    assert tight[-1] - loose[-1] == pytest.approx(-5e-5, abs=1e-7)

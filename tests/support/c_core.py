@@ -6,7 +6,6 @@ import ctypes
 import hashlib
 import os
 import struct
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cache
@@ -21,8 +20,6 @@ from numpy.typing import NDArray
 from places import ROOT
 
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.settings import PARAMETERS
-from hybridsep.base.state import numbers_of
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import (
     AVERAGING_SETTINGS,
@@ -32,7 +29,6 @@ from hybridsep.fmi.variables import (
     FmuTable,
 )
 from hybridsep.machines.machine import load_machine
-from hybridsep.predict.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -249,20 +245,6 @@ class CModel:
         if status == 1:
             raise RefusedError(message.value.decode("utf-8"))
         self.warning = message.value.decode("utf-8") if status else ""
-
-
-def write_weights(folder: Path, name: str, factor: Array, n_rows: int, **settings: float) -> None:
-    """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
-    values = {"averaging": 0, "period": 0.0, **TABLES[name].parameters, **settings}
-    modes = TABLES[name].modes
-    names = (*PREDICTOR_SETTINGS, "averaging", "period")
-    learned = {key: values[key] for key in names if PARAMETERS[key].learned}
-    learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
-    errors = numbers_of(Uncertainty.init(values["lambda"]))
-    content = b"HSEPWG14" + struct.pack("<3Q", len(learned), len(modes), len(errors))
-    content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
-    content += np.concatenate([errors, [n_rows], *(factor[i, i:] for i in range(len(factor)))]).astype("<f8").tobytes()
-    (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 
 
 def write_trajectory(folder: Path, samples: Array, T_s: float = TS) -> None:
