@@ -225,7 +225,7 @@ class Fit:
     def results(self) -> dict[str, Any]:
         """Return plain values for JSON, as in ``fit.json``: errors in m over the test samples."""
         return {
-            "identification": plain(self.identification.summary()),
+            "identification": self.identification.summary(),
             "choice": plain(self.choice),
             "windows": plain(self.windows),
             "plant": plain(self.plant),

@@ -11,7 +11,7 @@ from scipy.signal import welch
 from ..base.metrics import coverage
 from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
-from ..identify.model import IdentifiedModel, deviation_words, shown_estimates
+from ..identify.model import IdentifiedModel
 from ..logs.checks import Finding
 from ..logs.log import Log
 from .advice import Judged, extent, peers_in_words, recommendation
@@ -78,10 +78,11 @@ def write_identification(report: Report, found: IdentifiedModel, judged: Judged)
         f"{found.model.dead_time} samples."
     )
     if found.parameters:
-        rows = [
-            [name, f"{value:.6g}", deviation_words(std, "± "), unit]
-            for name, value, std, unit in shown_estimates(found.parameters, judged.shown)
-        ]
+        rows = []
+        for one in found.parameters:
+            factor, name = judged.shown.error(abs(one.value)) if one.unit in ("m", "rad") else (1.0, one.unit)
+            std = f"± {factor * one.std:.2g}" if one.std > 0 else "fixed"
+            rows.append([one.name, f"{factor * one.value:.6g}", std, name])
         report.table(["parameter", "value", "standard deviation", "unit"], rows)
     if found.alternatives:
         rows = [

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..logs.units import DisplayUnits
+from ..base.files import plain
 from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
-__all__ = ["Alternative", "IdentifiedModel", "deviation_words", "machine_of", "shown_estimates"]
+__all__ = ["Alternative", "IdentifiedModel", "machine_of"]
 
 
 @dataclass(frozen=True)
@@ -22,9 +21,6 @@ class Alternative:
     ----------
     name : str
     n_parameters : int
-    model : ModalModel or None
-        Fitted to the part before the held-out one; None where there is an objection.
-    input_hold : {"zoh", "foh"}
     rms_fitted, rms_held_out : float
         Error of the simulated position on the part that was fitted to and on the later one, m.
     objection : str
@@ -33,8 +29,6 @@ class Alternative:
 
     name: str
     n_parameters: int
-    model: ModalModel | None
-    input_hold: str
     rms_fitted: float
     rms_held_out: float
     objection: str
@@ -103,33 +97,12 @@ class IdentifiedModel:
         """
         return machine_of(self.model, self.input_hold, self.T_s, name, title, unit=self.unit, **entries)
 
-    def summary(self) -> Mapping[str, Any]:
+    def summary(self) -> dict[str, Any]:
         """Return plain values for JSON and tables."""
-        return {
-            "structure": self.structure,
-            "T_s": self.T_s,
-            "unit": self.unit,
-            "input_hold": self.input_hold,
-            "dead_time": self.model.dead_time,
-            "modes": [vars(mode) for mode in self.model.modes],
-            "parameters": [vars(estimate) for estimate in self.parameters],
-            "offset": self.offset,
-            "rms": self.rms,
-            "rms_held_out": self.rms_held_out,
-            "n_samples": self.n_samples,
-            "n_effective": self.n_effective,
-            "alternatives": [
-                {
-                    "name": other.name,
-                    "n_parameters": other.n_parameters,
-                    "rms_fitted": other.rms_fitted,
-                    "rms_held_out": other.rms_held_out,
-                    "objection": other.objection,
-                }
-                for other in self.alternatives
-            ],
-            "findings": list(self.findings),
-        }
+        own = ("parameters", "offset", "rms", "rms_held_out", "n_samples", "n_effective", "alternatives", "findings")
+        model = {"dead_time": self.model.dead_time, "modes": plain(self.model.modes)}
+        heads = {name: getattr(self, name) for name in ("structure", "T_s", "unit", "input_hold")}
+        return {**heads, **model, **{name: plain(getattr(self, name)) for name in own}}
 
 
 def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title: str, **entries: Any) -> Machine:
@@ -140,15 +113,3 @@ def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title:
         "input_hold": input_hold,
     }
     return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
-
-
-def deviation_words(std: float, sign: str = "") -> str:
-    """Return a standard deviation as text; "fixed" for a parameter that was not estimated."""
-    return f"{sign}{std:.2g}" if std > 0 else "fixed"
-
-
-def shown_estimates(parameters: Iterable[Estimate], shown: DisplayUnits) -> Iterator[tuple[str, float, float, str]]:
-    """Yield name, value, standard deviation and unit of parameters; positions in the units of their log."""
-    for one in parameters:
-        factor, unit = shown.error(abs(one.value)) if one.unit in ("m", "rad") else (1.0, one.unit)
-        yield one.name, factor * one.value, factor * one.std, unit

@@ -135,7 +135,7 @@ def identify_operation(
         rms_held_out=chosen.rms_held_out,
         n_samples=sum(int(segment.known.sum()) for segment in segments),
         n_effective=n_effective,
-        alternatives=tuple(_alternative(candidate, chosen, T_s) for candidate in candidates),
+        alternatives=tuple(_alternative(candidate, chosen) for candidate in candidates),
         findings=tuple(findings),
     )
 
@@ -205,21 +205,11 @@ def _modal(fit: Fit, T_s: float) -> ModalModel:
     return ModalModel(fit.structure.modes(fit.theta, fit.linear, T_s), fit.delay.samples)
 
 
-def _alternative(candidate: Candidate, chosen: Candidate, T_s: float) -> Alternative:
-    fit = candidate.fit
-    possible = not candidate.objection
-    objection = candidate.objection
-    if possible and candidate is not chosen and candidate.slow_parts:
+def _alternative(candidate: Candidate, chosen: Candidate) -> Alternative:
+    fit, objection = candidate.fit, candidate.objection
+    if not objection and candidate is not chosen and candidate.slow_parts:
         objection = f"zeros all but cancel a slow part of {candidate.slow_parts[0]:.3g} Hz, and it explains too little"
-    return Alternative(
-        name=fit.structure.name,
-        n_parameters=fit.structure.n_parameters,
-        model=_modal(fit, T_s) if possible else None,
-        input_hold=fit.delay.input_hold,
-        rms_fitted=fit.rms,
-        rms_held_out=candidate.rms_held_out,
-        objection=objection,
-    )
+    return Alternative(fit.structure.name, fit.structure.n_parameters, fit.rms, candidate.rms_held_out, objection)
 
 
 def _findings(
