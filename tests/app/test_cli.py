@@ -185,11 +185,3 @@ def test_a_value_that_is_no_number_is_named(hybridsep: Run) -> None:
     status, out, err = hybridsep("fit", "log.csv", "--Np", "10.5")
     assert (status, out) == (2, "")
     assert "Invalid value for '--Np': must be a whole number, got '10.5'" in " ".join(err.split())
-
-
-def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:
-    log = tmp_path / "untimed.csv"
-    log.write_text("x_d,x\n" + "".join(f"{k * 1e-5},{k * 1.1e-5}\n" for k in range(200)))
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--T_s", 0.001, "--json")
-    assert status == 0
-    assert json.loads(out)["n_samples"] == 200

@@ -24,13 +24,6 @@ def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybr
     assert "joint" in lines[1]
 
 
-def test_a_replay_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run) -> None:
-    log = write_log(tmp_path / "axis.csv", scale=1e3)
-    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
-    assert status == 2
-    assert f"  hybridsep backtest {log} -m spring_mass_damper --unit mm " in err
-
-
 def test_a_machine_file_that_fit_wrote_is_named(
     tmp_path: Path, hybridsep: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,7 +32,6 @@ class Page(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__()
         self.loads: list[str] = []
-        self.links: list[str] = []
         self.anchors: set[str] = set()
         self.feed(text)
 
@@ -43,8 +42,6 @@ class Page(HTMLParser):
             self.loads.append(found.get("href") or "")
         if tag in LOADED:
             self.loads += [found[key] or "" for key in (LOADED[tag], "srcset") if key in found]
-        if tag == "a" and "href" in found:
-            self.links.append(found["href"] or "")
 
 
 @pytest.fixture(scope="module")

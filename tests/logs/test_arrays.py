@@ -54,6 +54,12 @@ def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> No
     assert len(str(caught.value)) < 400
 
 
+def test_datetimes_of_numpy(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.npz", columns() | {"t": np.datetime64("2026-03-05T10:20:30", "ns") + np.arange(50)})
+    with pytest.raises(LogError, match=r"column 't' must be numbers, got datetime64\[ns\]; save \(t - t\[0\]\)"):
+        read_log(path)
+
+
 def test_zeros_that_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ten megabytes of zeros in ten kilobytes."""
     monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)

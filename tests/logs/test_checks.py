@@ -161,6 +161,7 @@ NOTES: dict[str, Callable[[Log], Log]] = {
     "start in motion": lambda log: log_of(log.x_d[1200:] - log.x_d[1200], log.x_meas[1200:] - log.x_d[1200], log.T_s),
     "stuck samples": lambda log: replace(log, x_meas=held(log.x_meas)),
     "outliers": lambda log: replace(log, x_meas=log.x_meas + 0.1 * (np.arange(len(log.t)) == 500)),
+    "clipped": lambda log: replace(log, x_meas=np.minimum(log.x_meas, 0.8 * float(log.x_meas.max()))),
     "jumps": lambda log: replace(log, x_d=log.x_d + jump(log), x_meas=log.x_meas + jump(log)),
 }
 
@@ -200,12 +201,6 @@ def test_rows_that_are_lost_between_even_times_are_noted() -> None:
     keep = np.delete(np.arange(3000), np.arange(100, 3000, 150))
     assert "lost rows" in names(log_of(log.x_d[keep], log.x_meas[keep]), refused=False)
     assert "lost rows" not in names(log, refused=False)
-
-
-def test_a_clipped_position_is_noted() -> None:
-    log = sines()
-    limit = 0.8 * float(log.x_meas.max())
-    assert names(replace(log, x_meas=np.minimum(log.x_meas, limit)), refused=False) == ["clipped"]
 
 
 # Any log

@@ -146,19 +146,6 @@ def test_any_step_from_any_start_gives_the_same_motion() -> None:
                 plant.step(r, TS / 4)
 
 
-def test_state_can_be_saved_and_restored() -> None:
-    for name in ("spring_mass_damper", "als25010_x"):
-        machine = load_machine(name)
-        plant, other = machine.new_plant(), machine.new_plant()
-        for k in range(30):
-            plant.step(1e-4 * k, TS)
-        other.restore(plant.state())
-        for k in range(30, 60):
-            plant.step(1e-4 * k, TS)
-            other.step(1e-4 * k, TS)
-            assert (plant.x, plant.v) == (other.x, other.v)
-
-
 def test_encoder_draws_split_mix_64_and_box_muller() -> None:
     # The first numbers of SplitMix64 from seed 0, as published with the generator
     first, second = 0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4

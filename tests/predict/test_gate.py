@@ -7,7 +7,6 @@ import pytest
 from averaged_cases import averaged_model
 from numpy.typing import NDArray
 
-from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
@@ -147,10 +146,3 @@ def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags
     # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
     assert learned.evidence[MODEL_RESIDUAL].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
     assert learned.evidence[COMMAND_RESIDUAL].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
-
-
-def test_infinite_measurements_stay_errors_with_averaging() -> None:
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=True))
-    predictor.predict(np.zeros(NP))
-    with pytest.raises(SignalError, match="must be finite, got inf at sample 3"):
-        predictor.update(np.where(np.arange(NP) == 3, np.inf, 0.0))

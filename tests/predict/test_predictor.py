@@ -83,20 +83,6 @@ def test_equals_the_oracle_with_other_parameters(
     np.testing.assert_array_equal(active, slow.active)
 
 
-@pytest.mark.parametrize(("t_init", "count"), [(0.0, 0), (0.010, 10), (0.0234, 24), (0.1, 100)])
-def test_warm_up_counts_samples_inside_a_window(t_init: float, count: int) -> None:
-    predictor = trained(0, t_init=t_init)
-    x_d, x = small_signals(60)
-    assert predictor.predict(x_d[:10]).n_warm_up == min(count, 10)
-    x_pb, x_h, active = replay(predictor, x_d, x)
-    np.testing.assert_array_equal(active, np.arange(60) >= count)
-    np.testing.assert_array_equal(x_h[:count], x_pb[:count])
-    # It learns from the first window on: beyond the warm-up the second window already differs.
-    late = max(count, 10)
-    assert np.all(x_h[late:] != x_pb[late:])
-    np.testing.assert_array_equal(x_pb[:10], x_h[:10])
-
-
 @examples(80)
 @given(data=st.data(), Np=st.integers(1, 12), windows=st.integers(0, 8), hold=st.sampled_from(["zoh", "foh"]))
 def test_operator_equals_predict(data: st.DataObject, Np: int, windows: int, hold: str) -> None:
