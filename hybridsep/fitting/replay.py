@@ -272,6 +272,14 @@ class Replay:
         place = self._place()
         return [_rms(one.errors[place < n]) for one in self.scored()]
 
+    def residuals(self) -> list[tuple[Array, Array]]:
+        """Return ``x_pb``, ``(n,)``, and ``x`` and ``x_h`` minus it, ``(2, n)``, m, over each whole recording."""
+        return [
+            (result.x_pb, np.stack((self._compared(recording), result.x_h)) - result.x_pb)
+            for recording, result in zip(self.recordings, self.results, strict=True)
+            if len(recording.x) > 1
+        ]
+
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""
         peers = self.best_ways()
