@@ -199,7 +199,7 @@ REFUSED = [
     ("cosim --set predictor=1", "predictor must be a table, got 1"),
     ("cosim --set predictor.p", "an entry is set as in predictor.p=20, got 'predictor.p'"),
     ("cosim --set plant.seed=1 --plant p.fmu", "is for an FMU that is built here; leave out --plant"),
-    ("tune {log} {m} --try p=5,105", "p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
+    ("tune {log} {m} --try p=5,105", "p must be 1 … Np = 100, got 105; lower p or raise Np"),
     ("tune {log} {m} --try lambda=1e-12:1e-6", "--try lambda must be a number, got '1e-12:1e-6'"),
     ("tune {log} {m} --try p=5,50.5", "--try p must be a whole number, got 50.5"),
     (
