@@ -24,6 +24,7 @@ __all__ = [
     "coverage",
     "hold",
     "html_table",
+    "known_rms",
     "largest",
     "last_residual",
     "line_plot",
@@ -43,6 +44,12 @@ _NODES = 20_000
 def rms(error: ArrayLike) -> float:
     """Return the root mean square of samples of any shape."""
     return float(np.sqrt(np.mean(np.square(error))))
+
+
+def known_rms(error: Array) -> float:
+    """Return the RMS of the samples that are known, not NaN; NaN if there are none."""
+    known = error[~np.isnan(error)]
+    return rms(known) if known.size else math.nan
 
 
 def largest(error: ArrayLike) -> float:

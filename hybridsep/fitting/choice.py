@@ -10,10 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..base.errors import SignalError
-from ..base.metrics import rms, shown_figure
+from ..base.metrics import known_rms, shown_figure
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..identify.output_error import in_time
 from ..identify.periodic import residual_period
@@ -129,8 +127,7 @@ def trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequ
     """
     training = [Recording(*one.training, 0) for one in recordings if one.n_train]
     errors = replay(HybridPredictor(model, settings), training).errors()[2]
-    later = errors[len(errors) // 2 :]
-    return rms(later[~np.isnan(later)])
+    return known_rms(errors[len(errors) // 2 :])
 
 
 def window_scores(

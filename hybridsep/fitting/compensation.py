@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
-from ..base.metrics import peak_derivatives, rms
+from ..base.metrics import known_rms, peak_derivatives
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..logs.units import DisplayUnits
@@ -107,19 +108,17 @@ class Tracking:
 
     Attributes
     ----------
-    none : float or None
-        As measured; None without a test sample.
-    physics, hybrid : float or None
-        Estimates with each model; None where a plan diverges, too.
+    none, physics, hybrid : float
+        As measured, and estimates with each model; NaN without a test sample, or where a plan diverges.
     limits : mapping
         Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
     """
 
-    none: float | None
-    physics: float | None
-    hybrid: float | None
+    none: float
+    physics: float
+    hybrid: float
     limits: Mapping[str, Mapping[str, float]]
     change_max: float | None
     following_error_max: float
@@ -128,7 +127,7 @@ class Tracking:
         """Return the errors in words, what binds them and, last, how they came about."""
 
         def figure(value: float | None) -> str:
-            return "not known" if value is None else shown.words(value, ".4g")
+            return "not known" if value is None or math.isnan(value) else shown.words(value, ".4g")
 
         return [
             f"Tracking error (commanded minus measured, RMS): {figure(self.none)} as recorded; with the compensator "
@@ -149,7 +148,7 @@ def expected_tracking(
     settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
     pairs = [(one.x_d, one.x) for one in recordings]
     firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
-    found: dict[str, float | None] = {}
+    found = dict.fromkeys(("none", "physics", "hybrid"), math.nan)
     bound: dict[str, dict[str, float]] = {}
     for i, model in enumerate(("physics", "hybrid")):
         compensator = replace(machine.compensator_settings, compensate=model)
@@ -160,14 +159,14 @@ def expected_tracking(
         parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(expected, firsts, strict=True)]
         judged = Expected(*map(np.concatenate, zip(*parts, strict=True)))
         for name, errors in (("none", judged.without), (model, judged.compensated)):
-            known = errors[~np.isnan(errors)]
-            found[name] = rms(known) if known.size else None
+            found[name] = known_rms(errors)
         if len(judged.x_d):
             bound[model] = limits_that_bind(judged.x_d, judged.x_dm, settings.T_s, compensator)
         progress((i + 1) / 2)
-    none, physics, hybrid = (found.get(name) for name in ("none", "physics", "hybrid"))
     allowed = machine.compensator_settings
-    return Tracking(none, physics, hybrid, bound, allowed.change_max, allowed.following_error_max)
+    return Tracking(
+        **found, limits=bound, change_max=allowed.change_max, following_error_max=allowed.following_error_max
+    )
 
 
 def binding_words(shares: Mapping[str, float]) -> str:

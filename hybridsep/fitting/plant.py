@@ -65,16 +65,16 @@ class IdentifiedPlant:
     ----------
     entries : mapping
         Of the section ``[plant]`` of a machine file.
-    rms, rms_pb : float or None
+    rms, rms_pb : float
         RMS of what was measured less the plant and less the physics model, over the test samples, without their offset,
-        m; None where there are none.
+        m; NaN where there are none.
     reason : str
         Why there is no plant to this model, empty if there is one.
     """
 
     entries: Mapping[str, Any]
-    rms: float | None = None
-    rms_pb: float | None = None
+    rms: float = math.nan
+    rms_pb: float = math.nan
     reason: str = ""
 
     @property
@@ -86,7 +86,7 @@ class IdentifiedPlant:
         """Return what the plant is, and how far it follows the log, in words."""
         words = "the identified model "
         words += "refitted with the friction and stiffness of the log" if self.disturbed else "alone"
-        if self.rms is not None and self.rms_pb is not None:
+        if math.isfinite(self.rms):
             words += f"; it follows the held-out half to {shown.words(self.rms)} RMS"
             words += f" (physics model {shown.words(self.rms_pb)})" if self.disturbed else ""
         return f"{words}. A plant to try with, no measurement: results on it are optimistic"
@@ -167,9 +167,8 @@ def identified_plant(
     alone = _Disturbed(model, 0.0, 0.0, PARAMETERS["v_friction"].default)
     candidates = [alone, *_refined(alone, settings, begun)]
     errors = [_rms_of(settings, one, pieces, "choosing") for one in candidates]
-    least = [math.inf if error is None else error for error in errors]
-    best = int(np.argmin(least))
-    if not least[best] < _WORTH * least[0]:
+    best = int(np.argmin(errors))  # the first where none is known
+    if not errors[best] < _WORTH * errors[0]:
         best = 0
     chosen = candidates[best]
     entries = {**(chosen.entries() if best else {}), "noise_std": float(f"{_noise(settings, chosen, pieces):.3g}")}
@@ -202,7 +201,7 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
     fitted = [piece for piece in pieces if piece.fitted.any()]
     fastest = max((float(np.abs(piece.v_d).max()) for piece in fitted), default=0.0)
     reach = max((float(np.abs(piece.path).max()) for piece in fitted), default=0.0)
-    scale = _rms_of(settings, alone, pieces, "fitted") or 0.0
+    scale = _rms_of(settings, alone, pieces, "fitted")
     if not (scale > 0.0 and reach > 0.0 and fastest * _SMALLEST_SPREAD >= (PARAMETERS["v_friction"].minimum or 0.0)):
         return []
     n = 4 * len(alone.model.modes)
@@ -248,7 +247,7 @@ def _moved(mode: Mode, frequency: float, damping: float, alpha: float, beta: flo
     )
 
 
-def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float | None:
+def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float:
     """Return the RMS error of a plant over a part of all pieces, m, less the mean error of what was fitted to."""
     discrete = plant.model.discretise(settings.T_s, settings.input_hold)
     parts = []
@@ -257,7 +256,7 @@ def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Pi
         of_offset = piece.fitted if piece.fitted.any() else getattr(piece, part)
         if getattr(piece, part).any():
             parts.append(error[getattr(piece, part)] - error[of_offset].mean())
-    return rms(np.concatenate(parts)) if parts else None
+    return rms(np.concatenate(parts)) if parts else math.nan
 
 
 def _noise(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> float:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.metrics import rms, rms_ratio
+from ..base.metrics import known_rms, rms_ratio
 from ..base.signals import Array
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
@@ -139,7 +139,7 @@ class Scored:
     @cached_property
     def rms(self) -> float:
         """RMS of the errors, m; infinite where it diverged, NaN without a measurement."""
-        return math.inf if self.diverged else _rms(self.errors)
+        return math.inf if self.diverged else known_rms(self.errors)
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class Replay:
 
     def rms(self) -> list[float]:
         """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
-        return [_rms(row) for row in self.errors()]
+        return [known_rms(row) for row in self.errors()]
 
     def scored(self) -> list[Scored]:
         """Return the errors of physics model, hold, every peer, and the hybrid, over the test samples."""
@@ -270,7 +270,7 @@ class Replay:
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
         place = self._place()
-        return [_rms(one.errors[place < n]) for one in self.scored()]
+        return [known_rms(one.errors[place < n]) for one in self.scored()]
 
     def residuals(self) -> list[tuple[Array, Array]]:
         """Return ``x_pb``, ``(n,)``, and ``x`` and ``x_h`` minus it, ``(2, n)``, m, over each whole recording."""
@@ -314,12 +314,6 @@ class Replay:
     def _parts(self, signals: Sequence[Array]) -> Array:
         pairs = zip(self.recordings, signals, strict=True)
         return np.concatenate([signal[recording.first_judged(self.Np) :] for recording, signal in pairs])
-
-
-def _rms(errors: Array) -> float:
-    """Return the RMS of errors, NaN where there is no measurement; NaN without any."""
-    known = errors[~np.isnan(errors)]
-    return rms(known) if known.size else math.nan
 
 
 def replay(

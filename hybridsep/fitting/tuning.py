@@ -151,7 +151,7 @@ class Tuning:
 def joint_ratio(rms: Array, rms_hold: Array) -> float:
     """Return the geometric mean of RMS errors relative to hold's; infinite if one is."""
     ratios = [rms_ratio(float(one), float(hold)) for one, hold in zip(rms, rms_hold, strict=True)]
-    if any(math.isinf(ratio) for ratio in ratios) or 0.0 in ratios:
+    if math.inf in ratios or 0.0 in ratios:
         return math.inf if math.inf in ratios else 0.0
     return math.exp(math.fsum(map(math.log, ratios)) / len(ratios))
 
@@ -228,14 +228,9 @@ def losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: No
 
 
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
-    """Return the values to try, by the fields of settings.
+    """Return the values to try, a machine's own among them, by the fields of settings.
 
     Some sixteen combinations with averaging, and two dozen without.
-
-    Parameters
-    ----------
-    settings : PredictorSettings
-        The machine's own, whose values are among them.
     """
     tried = settings_to_try(settings)
     lags = {name: tuple(sorted({getattr(one, name) for one in tried})) for name in ("p", "q")}
@@ -247,14 +242,7 @@ def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
 
 
 def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSettings]:
-    """Return all combinations of values, after the settings themselves.
-
-    Parameters
-    ----------
-    settings : PredictorSettings
-        The machine's own, which have the other parameters.
-    values : mapping
-        Values by the fields of settings, of :data:`TUNED`.
+    """Return all combinations of values, after a machine's own settings, which have the other parameters.
 
     Raises
     ------
