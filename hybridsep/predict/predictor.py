@@ -27,9 +27,8 @@ from .averaging.model import AveragedModel
 from .averaging.start import motion_before
 from .paper import PaperModel
 from .regression import RidgeRegression
-from .residual_model import ResidualModel
 from .uncertainty import Uncertainty, first_variance
-from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualWindow, WindowOperator
+from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualModel, ResidualWindow, WindowOperator
 
 __all__ = ["HybridPredictor", "PredictorState"]
 
