@@ -20,11 +20,10 @@ from typer.core import TyperGroup
 from ..base.errors import HybridSepError, LogError, ParameterError, brief
 from ..base.version import version_text
 from .cosim import cosim, system
-from .fit import fit
+from .fit import fit, tune
 from .fmus import build, hal, header
 from .logs import backtest
 from .start import demo, example_log, init
-from .tune import tune
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

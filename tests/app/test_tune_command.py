@@ -11,7 +11,7 @@ import pytest
 from command_line import Run, predictor, write_log
 
 from hybridsep import load_machine
-from hybridsep.app.tune import print_tuning
+from hybridsep.app.fit import print_tuning
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fitting.tuning import Tuning
 
