@@ -1,4 +1,4 @@
-"""Monitor of what is measured, as drives have one: following error, and measurements that are missing."""
+"""Monitor of the following error, as drives have one, and of measurements that are missing."""
 
 from __future__ import annotations
 
