@@ -43,6 +43,12 @@ def constants(**values: float) -> Changes:
     }
 
 
+def first_weights(residual: float, static: float) -> Changes:
+    """Return the change of the first weights of L and S."""
+    old = "{0.5, 0, 1, 0}, {0.5, 0, 0, 0}"
+    return {"predict/hsep_predict_constants.h": [(old, f"{{{residual}, 0, 1, 0}}, {{{static}, 0, 0, 0}}")]}
+
+
 def together(*changes: Changes) -> Changes:
     """Return several changes as one."""
     found: dict[str, list[tuple[str, str]]] = {}
@@ -70,7 +76,7 @@ NO_DOUBTING: Changes = {
 }
 
 NO_STATIC = together(
-    constants(first_arx_residual=1.0, first_static=0.0),
+    first_weights(1.0, 0.0),
     {
         FORECAST: [
             (
@@ -88,9 +94,12 @@ VARIANTS: Mapping[str, Changes] = {
     "no doubting expert D": NO_DOUBTING,
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(warm_windows_max=3.0)),
     "earlier runs never forgotten": constants(discard_above=2.0),
-    "A's bound does not grow": {FORECAST: [("    if (!(learned->largest_step > 0.0 &&", "    if (!(0 &&")]},
+    "A's bound does not grow": {FORECAST: [("return before > 0.0 ?", "return before < 0.0 ?")]},
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
+    "no recall": {
+        AVERAGING + "hsep_recall.c": [("    if (self->size <= n) {", "    if (self->size <= n + self->size) {")]
+    },
     "no first differences of disturbances": constants(difference_share=1e-6),
     "first differences as large": constants(difference_share=1.0),
     "last lag as the first": constants(last_lag=1.0),
@@ -111,8 +120,8 @@ VARIANTS: Mapping[str, Changes] = {
     },
     "A: 20 lags": constants(lags_of_command=20),
     "runs begin at rest": {START: [("return known >= HSEP_START_SAMPLES", "return known < 0 * HSEP_START_SAMPLES")]},
-    "L from the first": constants(first_arx_residual=1.0, first_static=0.0),
-    "S from the first": constants(first_arx_residual=0.0, first_static=1.0),
+    "L from the first": first_weights(1.0, 0.0),
+    "S from the first": first_weights(0.0, 1.0),
     "kappa 0.3": constants(kappa=0.3),
     "kappa 3": constants(kappa=3.0),
     "gamma 0.9": constants(gamma=0.9),
