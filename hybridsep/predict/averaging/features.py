@@ -93,8 +93,11 @@ Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
-N_FRICTION, N_STOPS, N_LASTING, _N_PERIODIC = 6, 3, 11, 2
-"""Disturbances by friction, by stop operators, both with stiffness and damping, and what repeats with the position."""
+N_FRICTION, N_STOPS, _N_PERIODIC = 6, 3, 2
+"""Disturbances by friction, by stop operators, and what repeats with the position."""
+
+N_LASTING = N_FRICTION + N_STOPS + 2
+"""Disturbances that every axis has: friction, stop operators, stiffness and damping."""
 
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""

@@ -97,9 +97,6 @@ class Memory:
 
     def remember(self, residuals: Array) -> Memory:
         """Return the memory with the residuals of measured samples, ``(m,)``, m."""
-        n = len(self.residuals)
-        return replace(
-            self,
-            residuals=np.concatenate((self.residuals, residuals))[-n:] if n else self.residuals,
-            n_ahead=max(self.n_ahead - len(residuals), 0),
-        )
+        m = len(residuals)
+        both = np.concatenate((self.residuals, residuals))
+        return replace(self, residuals=both[m:], n_ahead=max(self.n_ahead - m, 0))
