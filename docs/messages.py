@@ -128,14 +128,6 @@ FINDINGS: Mapping[str, Explanation] = {
         "Sampling intervals differ; the rows are taken as if they were even.",
         "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",
     ),
-    "lost rows": Explanation(
-        "Both positions make steps of twice the steps around them, although the times are even: rows are missing.",
-        "Check the recorder for a buffer overflow.",
-    ),
-    "jumps": Explanation(
-        "Both positions jump within one sample, as where two logs were joined.",
-        "Give the logs as files of their own.",
-    ),
     "outliers": Explanation(
         "Single samples leave the signal: glitches of the encoder or of the transmission.",
         "None is needed with `averaging = true`, which rejects what is out of reach.",

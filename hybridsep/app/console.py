@@ -154,7 +154,6 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     """
     from ..logs.columns import channels
     from ..logs.formats import open_source
-    from ..logs.names import guesses
 
     found = {str(path): channels(open_source(path)) for path in logs}
     if as_json:
@@ -168,8 +167,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
         missing = [role for role in _ROLES if role != "t" and role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):
             words = " and ".join(_ROLES[role] for role in missing)
-            meant = guesses([one.name for one in listed], missing)
-            options = " ".join(f"--{role} {shlex.quote(name) if name else 'NAME'}" for role, name in meant)
+            options = " ".join(f"--{role} NAME" for role in missing)
             console.print(
                 f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}",
                 soft_wrap=True,

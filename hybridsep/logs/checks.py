@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -68,7 +68,7 @@ _LATE = 0.1
 """Lag, s, from which it is noted: the look-ahead of a controller of which nothing is known."""
 
 _ALONE, _SIZE = 10.0, 0.02
-"""Size of a jump or an outlier in the steps around it, of an offset in the spread of the error, and of each relative to
+"""Size of an outlier in the usual steps, of an offset in the spread of the error, and of each relative to
 the travel, from which it is noted."""
 
 _USUAL = 0.98
@@ -77,10 +77,6 @@ _USUAL = 0.98
 _HELD, _REPEATED = 0.1, 0.2
 """Way of the command, relative to its travel, while the measured position is held; and share of the samples in fast
 motion that repeat the one before, from which they are noted."""
-
-_WHOLE, _LOST = 0.1, 3
-"""Largest distance of a step from twice the steps around it, relative to them, in both positions, where a row is
-missing between even times; and fewest such steps."""
 
 
 @dataclass(frozen=True)
@@ -463,19 +459,6 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: Following) -> Iterator
         yield Finding("offset", words, {"offset": offset, "spread": spread}, picture)
 
 
-def _note_jumps(log: Log) -> Iterator[Finding]:
-    """Note jumps of both positions within one sample, as where logs were pasted together."""
-    both = np.intersect1d(_jumps(log.x_d, log.starts), _jumps(log.x_meas, log.starts))
-    if len(both):
-        largest = float(np.abs(np.diff(log.x_d))[both - 1].max())
-        words = (
-            f"both positions jump {len(both)} time{'s' if len(both) > 1 else ''} within one sample, by up to "
-            f"{log.shown.words(largest)}, first at sample {both[0] + 1}: where logs were pasted together, give them as "
-            "several files"
-        )
-        yield Finding("jumps", words, {"n": float(len(both)), "largest": largest}, _over_time(log, "Jumps", both))
-
-
 def _note_outliers(log: Log) -> Iterator[Finding]:
     """Note samples of a column that leave it for one sample."""
     for name, x in (("commanded", log.x_d), ("measured", log.x_meas)):
@@ -532,44 +515,13 @@ def _note_held(log: Log) -> Iterator[Finding]:
         yield Finding(name, words, evidence, _over_time(log, name.capitalize(), np.arange(first, last)))
 
 
-def _note_lost_rows(log: Log) -> Iterator[Finding]:
-    """Note steps of both positions that are twice the steps around them: rows are missing between even times."""
-    twice = []
-    for x in (log.x_d, log.x_meas):
-        steps = np.diff(x)
-        around = np.stack((steps[:-4], steps[1:-3], steps[3:-1], steps[4:]))
-        mean = around.mean(axis=0)
-        smooth = np.ptp(around, axis=0) < _WHOLE * np.abs(mean)
-        twice.append(smooth & (np.abs(steps[2:-2] / mean - 2.0) < _WHOLE))
-    where = np.setdiff1d(np.flatnonzero(twice[0] & twice[1]) + 3, log.starts)
-    if len(where) >= _LOST:
-        words = (
-            f"{len(where)} rows seem to be missing although the times are even: both positions go two steps at once, "
-            f"first before sample {where[0] + 1}"
-        )
-        yield Finding("lost rows", words, {"n": float(len(where))}, _over_time(log, "Lost rows", where))
-
-
 _NOTES = (
     _note_missing,
     _note_rate,
-    _note_lost_rows,
-    _note_jumps,
     _note_outliers,
     _note_held,
     _note_start,
 )
-
-
-def _jumps(x: Array, starts: Sequence[int]) -> Indices:
-    """Return the samples to which a signal jumps, first ones of segments aside."""
-    steps = np.abs(np.diff(x))
-    steps[np.array(starts[1:], dtype=np.intp) - 1] = 0.0
-    padded = np.pad(steps, 2)
-    beside = np.maximum.reduce([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]])
-    usual = float(np.nanquantile(steps, _USUAL))
-    least = np.maximum(_ALONE * np.maximum(beside, usual), _SIZE * _travel(x))
-    return np.asarray(np.flatnonzero(steps > least) + 1)
 
 
 def _travel(x: Array) -> float:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import re
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.errors import LogError, brief, listed
-from ..base.signals import Array
-from .names import ROLES, axes_of, guesses, known_names
-from .source import ArraysSource, Source
+from .names import ROLES, axes_of, known_names
+from .source import Block, Source, sample_number
 from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["COUNT", "Column", "channels", "choose_columns", "on_one_clock"]
+__all__ = ["COUNT", "Column", "channels", "choose_columns", "side_by_side"]
 
 COUNT = "such as unit='0.1um' (--unit 0.1um)"
 """Example of the unit of a log in encoder counts, for messages."""
@@ -174,7 +172,7 @@ def _only_clock(source: Source) -> str | None:
 
 
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
-    """Return the error of columns that are not there, by role, with the options that name those that may be meant."""
+    """Return the error of columns that are not there, by role."""
     there = listed(source.names)
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
@@ -185,13 +183,9 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
         )
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
-    meant = dict(guesses(source.names, list(names)))
-    options = " ".join(f"--{role} {shlex.quote(name) if name else 'NAME'}" for role, name in meant.items())
+    options = " ".join(f"--{role} NAME" for role in names)
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    error = LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
-    if all(meant.values()):
-        error.options = ((options, "if these are meant"),)
-    return error
+    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
 
 
 def _stated(source: Source, name: str) -> str:
@@ -249,10 +243,8 @@ class Channel:
         As the file states it, or the format's convention; empty if there is none.
     role : str
         What it is read as without a word of the user's, ``"t"``, ``"x_d"`` or ``"x"``; empty otherwise.
-    n_samples : int, optional
-        None where it cannot be read.
-    interval : float, s, optional
-        Mean of its times' intervals, where it has times.
+    n_samples, interval : int, float, s, optional
+        Number and mean interval of its times, where it has times.
     """
 
     name: str
@@ -270,44 +262,31 @@ def channels(source: Source) -> list[Channel]:
     with suppress(LogError):
         roles[source.times.get(next(iter(roles), None) or "") or _name(source, "t", None) or _only_clock(source)] = "t"
     t = next((name for name, role in roles.items() if role == "t"), None)
-    whole, clocks = isinstance(source, ArraysSource), {*source.times.values(), t}
-    extents: dict[str, tuple[int | None, float | None]] = {}
-
-    def extent(name: str | None) -> tuple[int | None, float | None]:
-        if name is None:
-            return None, None
-        if name not in extents:
-            extents[name] = _extent(source, name, is_time=name in clocks)
-        return extents[name]
-
-    # The rows of a text are counted by one column for all
-    probe = t or next((name for name in source.names if not whole and extent(name)[0] is not None), None)
+    extents = {clock: _extent(source, clock) for clock in {*source.times.values(), t} if clock is not None}
     units = {**source.assumed_units, **source.units}
     found = []
     for name in source.names:
-        n, interval = extent(source.times.get(name) or (name if name in clocks or whole else probe))
-        if interval is None and t is not None and extent(t)[0] == n:
-            interval = extent(t)[1]
+        clock = name if name in extents else source.times.get(name) or t or ""
+        n, interval = extents.get(clock, (None, None))
         found.append(Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, ""), n, interval))
     return found
 
 
-def _extent(source: Source, name: str, *, is_time: bool) -> tuple[int | None, float | None]:
-    """Return a column's samples, and of times the mean interval, s; None of a column that is not numbers."""
+def _extent(source: Source, clock: str) -> tuple[int | None, float | None]:
+    """Return the number of times of a column, and their mean interval, s; None if they are not numbers."""
     try:
-        factor = _time(source, name).unit.factor if is_time else None
-        (values,) = source.read([name]).columns
+        factor = _time(source, clock).unit.factor
+        (t,) = source.read([clock]).columns
     except LogError:
         return None, None
-    n = len(values)
-    return n, factor * float(values[-1] - values[0]) / (n - 1) if factor is not None and n > 1 else None
+    return len(t), factor * float(t[-1] - t[0]) / (len(t) - 1) if len(t) > 1 else None
 
 
 # Rates of their own
 
 
-def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: bool) -> tuple[Source, dict[str, Column]]:
-    """Return a source whose columns can be read side by side, and the columns.
+def side_by_side(source: Source, columns: Mapping[str, Column], *, resample: bool) -> tuple[Block, str]:
+    """Return columns side by side, and what was done to them; empty if nothing was.
 
     Where commanded and measured position have times of their own that differ, both are taken at the times of the one
     that is sampled more slowly, between its first and last time in which there are both; the other is interpolated
@@ -326,19 +305,19 @@ def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: boo
     LogError
         If the times differ and are not to be resampled, or cannot be.
     """
-    chosen = dict(columns)
-    x_d, x = chosen["x_d"].name, chosen["x"].name
-    t_d, t_x = source.times.get(x_d), source.times.get(x)
-    if t_d is None or t_x is None or t_d == t_x or "t" not in chosen or chosen["t"].name != t_d:
-        return source, chosen
-    read = {x_d: source.read((t_d, x_d)).columns, x: source.read((t_x, x)).columns}
+    names = {role: column.name for role, column in columns.items()}
+    x_d, x = names["x_d"], names["x"]
+    clocks = {name: source.times[name] for name in (x_d, x) if name in source.times}
+    if len({*clocks.values()}) < 2 or names.get("t") != clocks[x_d]:
+        return source.read(list(names.values())), ""
+    read = {name: source.read((clock, name)).columns for name, clock in clocks.items()}
     if not all(len(t) for t, _ in read.values()):
         raise LogError(f"{source.path}: columns {brief(x_d)} and {brief(x)} need samples, got none")
     intervals = {name: (t[-1] - t[0]) / max(len(t) - 1, 1) for name, (t, _) in read.items()}
     (a, _), (b, _) = read.values()
     if len(a) == len(b) and (np.abs(a - b) <= _SAME * min(np.abs(list(intervals.values())))).all():
-        return source, chosen
-    unit = chosen["t"].unit.factor
+        return source.read(list(names.values())), ""
+    unit = columns["t"].unit.factor
     rates = ", ".join(
         f"{brief(name)} has {len(t)} samples every {unit * intervals[name]:.6g} s" for name, (t, _) in read.items()
     )
@@ -348,46 +327,20 @@ def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: boo
             "resample=True (--resample) takes both at the times of the slower one"
         )
     slow, fast = sorted((x, x_d), key=lambda name: -intervals[name])
-    t, values = read[slow]
-    inside = (t >= max(a[0], b[0])) & (t <= min(a[-1], b[-1]))
-    t, values = t[inside], values[inside]
-    followed = _interpolated(source, source.times[fast], fast, read[fast], t, _GAP * intervals[slow])
-    chosen["t"] = Column(source.times[slow], chosen["t"].unit, True)
-    columns_read = {source.times[slow]: t, slow: values, fast: followed}
-    return _Resampled(source, columns_read, f"resampled onto the times of the slower column: {rates}"), chosen
-
-
-def _interpolated(source: Source, t_name: str, name: str, samples: Sequence[Array], at: Array, gap: float) -> Array:
-    """Return a column at other times; LogError where its samples there are further apart than ``gap``."""
-    t, x = samples
+    (at, values), (t, followed) = read[slow], read[fast]
+    inside = (at >= max(a[0], b[0])) & (at <= min(a[-1], b[-1]))
+    at, values = at[inside], values[inside]
     if not (np.diff(t) > 0.0).all():
         i = int(np.argmin(np.diff(t) > 0.0)) + 2
-        raise LogError(f"{source.path}, sample {i}: time {brief(t_name)} must increase to be resampled")
+        raise LogError(f"{source.path}, sample {i}: time {brief(clocks[fast])} must increase to be resampled")
     after = np.searchsorted(t, at)
     apart = np.where(t[after] == at, 0.0, t[after] - t[np.maximum(after - 1, 0)])
-    if apart.max(initial=0.0) > gap:
-        i = int(np.argmax(apart > gap))
+    if (far := apart > _GAP * intervals[slow]).any():
+        i = int(np.argmax(far))
         raise LogError(
-            f"{source.path}: column {brief(name)} has a gap of {apart[i]:.6g} at time {at[i]:.9g} and cannot be "
+            f"{source.path}: column {brief(fast)} has a gap of {apart[i]:.6g} at time {at[i]:.9g} and cannot be "
             "resampled; record it without, or both columns at one rate"
         )
-    return np.interp(at, t, x)
-
-
-class _Resampled(ArraysSource):
-    """Columns of a source at the times of one of them."""
-
-    def __init__(self, source: Source, columns: Mapping[str, Array], remark: str) -> None:
-        super().__init__(source.path)
-        self._columns = columns
-        self.names, self.units, self.axes = source.names, source.units, source.axes
-        self.remarks = [*source.remarks, remark]
-
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return False: it is no format of files."""
-        return False
-
-    def column(self, name: str) -> Array:
-        """Return a column."""
-        return self._columns[name]
+    found = {slow: values, fast: np.interp(at, t, followed)}
+    block = Block([found.get(name, at) for name in names.values()], sample_number)
+    return block, f"resampled onto the times of the slower column: {rates}"

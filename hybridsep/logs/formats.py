@@ -13,7 +13,7 @@ from ..base.errors import LogError
 from ..base.files import written_whole
 from .arrays import MatSource, NpzSource, ParquetSource
 from .capture import CaptureSource
-from .halscope import HalscopeCsvSource, HalscopePairsSource
+from .halscope import HalscopeSource
 from .sinumerik import SinumerikSource
 from .source import Source
 from .text import TextSource
@@ -31,8 +31,7 @@ READERS: tuple[type[Source], ...] = (
     CaptureSource,
     SinumerikSource,
     TwinCatSource,
-    HalscopeCsvSource,
-    HalscopePairsSource,
+    HalscopeSource,
     TextSource,
 )
 """Readers by precedence; text, which has no mark of its own, is last."""
@@ -56,6 +55,12 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("NI TDMS", (b"TDSm",), _PAGE),
     ("Arrow or Feather", (b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"), _PANDAS.format("feather")),
     ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
+    (
+        "halscope's file of LinuxCNC before 2.9",
+        (b"Sampling period is",),
+        "import pandas; a = pandas.read_csv('{path}', sep=r'\\s+', skiprows=2, header=None)[:-1]; "
+        "a.iloc[:, 1::2].set_axis(a.iloc[0, ::2], axis=1).to_csv('log.csv', index=False); the first line has T_s",
+    ),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
     (

@@ -15,23 +15,14 @@ from ..base.errors import LogError, brief
 from ..base.settings import check
 from ..base.signals import Array
 from .arrays import TableSource
-from .columns import COUNT, Column, choose_columns, on_one_clock
+from .columns import Column, choose_columns, side_by_side
 from .formats import open_source
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
 from .source import Block, Source
 from .times import given_times, recorded_times
-from .units import POSITION_UNITS, UNIT_OPTIONS, DisplayUnits, position_unit, shown_of, stated_unit
+from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
 __all__ = ["Log", "Table", "check_reading", "read_log"]
-
-TRAVEL_MAX = 100.0
-"""Largest plausible travel of a linear axis, m; a larger one indicates a log in a smaller unit."""
-
-TIME_MAX = 1e19
-"""Largest time in a file: a clock in ns since 1970 has 2e18; differences of larger times may overflow."""
-
-_SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm"}
-"""Unit that a log may be in if its travel is implausible in the key's."""
 
 _OWN_NAMES = ("x_d", "x", "x_meas")
 """Names of columns of positions that leave no doubt."""
@@ -158,11 +149,10 @@ def read_log(
     path = source.path
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
     source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
-    source, chosen = on_one_clock(source, chosen, resample=resample)
     _check_twins(source, chosen)
-    read = _read(source, chosen)
+    block, resampling = side_by_side(source, chosen, resample=resample)
+    read = _checked(path, block, chosen)
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
-    _check_travel(path, chosen["x_d"], x_d)
     time = chosen.get("t")
     if time is None:
         times = given_times(len(x_d), given or 0.0)  # given, as there is no time
@@ -183,7 +173,13 @@ def read_log(
         *(*samples[:4], path, si),
         unit_stated=chosen["x_d"].stated and chosen["x"].stated,
         starts=samples.starts,
-        remarks=(*source.remarks, *_guessed(source, chosen, columns or {}), *source.notes(), *remarks),
+        remarks=(
+            *source.remarks,
+            *filter(None, [resampling]),
+            *_guessed(source, chosen, columns or {}),
+            *source.notes(),
+            *remarks,
+        ),
         file_unit=chosen["x_d"].unit.name,
         n_recorded=len(x_d),
         T_recorded=times.T_s,
@@ -200,32 +196,22 @@ def _opened(recording: Any) -> Source:
     raise LogError(f"a log is a file, a mapping of columns or a table, got {type(recording).__name__}; x beside x_d?")
 
 
-def _read(source: Source, columns: Mapping[str, Column]) -> dict[str, Array]:
+def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[str, Array]:
     """Return the columns by role as they are in the file, checked to be finite; LogError for fewer than 2 samples."""
-    whole = source.read([column.name for column in columns.values()])
-    read = dict(zip(columns, whole.columns, strict=True))
+    read = dict(zip(columns, block.columns, strict=True))
     n = len(read["x_d"])
     if n < 2:
-        raise LogError(f"{source.path}: a log needs at least 2 samples, got {n or 'none'}")
+        raise LogError(f"{path}: a log needs at least 2 samples, got {n or 'none'}")
     for role, column in columns.items():
-        _check_finite(source.path, whole, column.name, read[role], role)
+        wrong = np.isinf(read[role]) if role == "x" else ~np.isfinite(read[role])
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise LogError(f"{path}, {block.where(i)}: column {brief(column.name)} must be finite, got {read[role][i]}")
     if np.isnan(read["x"]).all():
         raise LogError(
-            f"{source.path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or "
-            "record it"
+            f"{path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or record it"
         )
     return read
-
-
-def _check_finite(path: Path, block: Block, name: str, column: Array, role: str) -> None:
-    """Raise LogError if a value is infinite, NaN and not a measurement, or a time that no clock has."""
-    wrong = np.isinf(column) if role == "x" else ~np.isfinite(column)
-    if wrong.any():
-        i = int(np.argmax(wrong))
-        raise LogError(f"{path}, {block.where(i)}: column {brief(name)} must be finite, got {column[i]}")
-    if role == "t" and np.abs(column).max() > TIME_MAX:
-        i = int(np.argmax(np.abs(column) > TIME_MAX))
-        raise LogError(f"{path}, {block.where(i)}: time {brief(name)} must be within ±{TIME_MAX:g}, got {column[i]:g}")
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
@@ -238,22 +224,6 @@ def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, 
             f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x_d, --x) name "
             "others"
         )
-
-
-def _check_travel(path: Path, column: Column, x_d: Array) -> None:
-    """Raise LogError if the commanded position spans more than any linear axis does."""
-    travel = float(np.ptp(x_d))
-    if column.unit.si != "m" or travel <= TRAVEL_MAX:
-        return
-    smaller = _SMALLER.get(column.unit.name)
-    hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
-    hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller else ""
-    error = LogError(
-        f"{path}: column {brief(column.name)} read in {column.unit.name} spans {travel:.4g} m, more than "
-        f"{TRAVEL_MAX:g} m{hint}"
-    )
-    error.options = () if column.stated else UNIT_OPTIONS
-    raise error
 
 
 def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from .units import stated_unit
 
-__all__ = ["ROLES", "axes_of", "guesses", "known_names", "n_known"]
+__all__ = ["ROLES", "axes_of", "known_names", "n_known"]
 
 ROLES = ("t", "x_d", "x")
 """Time, commanded and measured position."""
@@ -29,9 +29,6 @@ _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoin
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder"}
 _POSITION = {"pos", "position"}
 """Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
-
-_GERMAN = {"t": r"zeit|time", "x_d": r"soll|lagesoll", "x": r"ist|lageist"}
-"""Beginnings of names that are not read without a word of the user's: a message proposes them."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
@@ -78,13 +75,6 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     if not found and [len(names) for names in whole.values()] == [1, 1]:  # the only ones, whatever their axis
         return {"": (whole["x_d"][0], whole["x"][0])}
     return found
-
-
-def guesses(names: Sequence[str], roles: Sequence[str]) -> Iterator[tuple[str, str | None]]:
-    """Yield for each role the first column whose name may mean it, in German too; None without one."""
-    for role in roles:
-        begins = re.compile(_GERMAN[role], re.IGNORECASE)
-        yield role, next((name for name in names if begins.match(name.strip())), None)
 
 
 def _axis(name: str) -> str:

@@ -18,15 +18,11 @@ import numpy as np
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .source import N_COLUMNS, ArraysSource, check_declared
-from .text import is_number
+from .source import ArraysSource
 
 __all__ = ["SinumerikSource"]
 
 _ROOT = b"<traceSession"
-
-_HEAD = 4096
-"""Bytes in which the root, and what stands before it, begins."""
 
 _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")
 """``/Nck/!SD/nckServoDataCmdPos2ndEnc64 [u1, 7]``: a variable of axis 7."""
@@ -59,39 +55,31 @@ def _signals_of(path: Path) -> tuple[list[_Signal], float]:
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise LogError(f"{path}: is truncated, damaged or not XML: {first_line(error)}") from error
     signals: dict[str, _Signal] = {}
-    for given in () if frame is None else frame.iter("dataSignal"):
-        name = _ADDRESS.fullmatch(given.get("name", ""))
-        if not given.get("id") or name is None:
-            raise LogError(f"{path}: dataSignal must have an id and a name, got {brief(given.attrib)}")
-        interval, n = (_number(path, given, key) for key in ("interval", "datapointCount"))
-        if not 0.0 < interval < 1e6 or not 0.0 <= n < 1e15:
-            raise LogError(
-                f"{path}: dataSignal must have an interval above 0 s and a number of points, got {brief(given.attrib)}"
-            )
-        signal = _Signal(name["name"], name["axis"] or "", interval, int(n), given.get("unitsType", ""))
-        signals[given.attrib["id"]] = signal
-    if frame is None or not signals:
-        raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
     last = -math.inf
-    for record in frame.iter("rec"):
-        t = _number(path, record, "time")
-        if not last <= t < 1e12:
-            raise LogError(f"{path}: time of rec must increase, got {t:.9g} s after {last:.9g} s")
-        last = t
-        for key in record.keys() & signals.keys():
-            if (value := _number(path, record, key)) <= _NOT_A_NUMBER:
-                signals[key].t.append(t)
-                signals[key].values.append(value)
+    try:
+        for given in () if frame is None else frame.iter("dataSignal"):
+            name, interval = _ADDRESS.fullmatch(given.attrib["name"]), float(given.attrib["interval"])
+            if name is None or not 0.0 < interval < 1e6:
+                raise ValueError(f"{name} at intervals of {interval} s")
+            n, kind = int(float(given.attrib["datapointCount"])), given.get("unitsType", "")
+            signals[given.attrib["id"]] = _Signal(name["name"], name["axis"] or "", interval, n, kind)
+        for record in () if frame is None else frame.iter("rec"):
+            t = float(record.attrib["time"])
+            if not last <= t < 1e12:
+                raise ValueError(f"time {t:.9g} s after {last:.9g} s")
+            last = t
+            for key in record.keys() & signals.keys():
+                if (value := float(record.attrib[key])) <= _NOT_A_NUMBER:
+                    signals[key].t.append(t)
+                    signals[key].values.append(value)
+    except (LookupError, ValueError, OverflowError) as error:
+        raise LogError(
+            f"{path}: each dataSignal must have id, name, datapointCount and an interval above 0 s, and each rec a "
+            f"time, which increases, and numbers: {type(error).__name__}: {first_line(error)}"
+        ) from error
+    if not signals:
+        raise LogError(f"{path}: no signals (traceData, dataFrame, dataSignal) were found")
     return list(signals.values()), last
-
-
-def _number(path: Path, element: ElementTree.Element, key: str) -> float:
-    text = element.get(key, "")
-    if not is_number(text):
-        at = f" at time {element.get('time'):.20}" if key != "time" and element.get("time") else ""
-        came = brief(text) if text else "nothing"
-        raise LogError(f"{path}: {key} of {element.tag}{at} must be a number, got {came}")
-    return float(text)
 
 
 class SinumerikSource(ArraysSource):
@@ -106,9 +94,6 @@ class SinumerikSource(ArraysSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        with path.open("rb") as file:
-            if b"<!DOCTYPE" in file.read(_HEAD):
-                raise LogError(f"{path}: a document type is not read")
         signals, self._last = _signals_of(path)
         self._signals: dict[str, _Signal] = {}
         for signal in signals:
@@ -141,7 +126,6 @@ class SinumerikSource(ArraysSource):
         start, interval = self._clocks[clock]
         most = min(self._signals[one].n for one, own in self.times.items() if own == clock)
         n = min(most, math.floor((self._last - start) / interval + 1.5))
-        check_declared(self.path, N_COLUMNS * 8 * n)  # of values that are held
         k = np.arange(n, dtype=np.float64)
         if name == clock:
             return start + interval * k
@@ -153,14 +137,12 @@ class SinumerikSource(ArraysSource):
         """Return commanded and measured position by axis."""
         found: dict[str, tuple[str, str]] = {}
         for x_d, signal in self._signals.items():
-            if not _COMMANDED.search(signal.name) or signal.axis in found:
-                continue
             there = [
                 name
                 for pattern in _MEASURED
                 for name, other in self._signals.items()
                 if other.axis == signal.axis and pattern.search(other.name)
             ]
-            if there:
-                found[signal.axis] = (x_d, there[0])
+            if there and _COMMANDED.search(signal.name):
+                found.setdefault(signal.axis, (x_d, there[0]))
         return found

@@ -14,23 +14,7 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = [
-    "N_COLUMNS",
-    "ArraysSource",
-    "Block",
-    "Source",
-    "check_column",
-    "check_declared",
-    "line_number",
-]
-
-
-_SMALL, _COMPRESSION_MAX = 1 << 28, 100
-"""Bytes that any file may declare, and those that it may declare for each of its own: positions, of which the last
-digits are noise, never compress so far."""
-
-N_COLUMNS = 3
-"""Columns that are read of a log."""
+__all__ = ["ArraysSource", "Block", "Source", "check_column", "line_number", "past_midnights", "sample_number"]
 
 
 @dataclass(frozen=True)
@@ -131,7 +115,17 @@ class ArraysSource(Source):
         if len(set(lengths.values())) > 1:
             text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
             raise LogError(f"{self.path}: all columns must have the same number of samples, got: {text}")
-        return Block(columns, lambda i: f"sample {i + 1} (the first is 1)")
+        return Block(columns, sample_number)
+
+
+def past_midnights(times: Array, day: float) -> Array:
+    """Return times of day, ``(n,)``, which pass midnight where they fall by more than half a ``day``."""
+    return np.asarray(times + day * np.cumsum(np.diff(times, prepend=times[:1]) < -day / 2))
+
+
+def sample_number(i: int) -> str:
+    """Return the location, for messages, of sample ``i`` of a log."""
+    return f"sample {i + 1} (the first is 1)"
 
 
 def line_number(numbers: Sequence[int] | NDArray[np.int64]) -> Callable[[int], str]:
@@ -151,13 +145,3 @@ def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
         raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
     return 0 if 0 in lengths else max(lengths, default=1)
-
-
-def check_declared(path: Path, n_bytes: int) -> None:
-    """Raise LogError if a file declares more than its size can hold."""
-    size = path.stat().st_size
-    if n_bytes > max(_SMALL, _COMPRESSION_MAX * size):
-        raise LogError(
-            f"{path}: has {n_bytes} bytes of values in a file of {size}: is truncated, damaged or made to fill "
-            "the memory; save the log again, without compression"
-        )

@@ -14,33 +14,28 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
-from .source import Block, Source, check_declared, line_number
-from .timestamps import CELL, Clock, cell, stamp_kind
+from .source import Block, Source, line_number, past_midnights
+from .timestamps import SECOND, nanoseconds, stamp_kind
 from .units import plain_name, position_unit, time_unit
 
-__all__ = ["TextSource", "bounded_lines", "decimal_points", "is_number", "split", "with_own_names"]
+__all__ = ["TextSource", "decimal_points", "is_number", "split", "with_own_names"]
 
 _HEAD_LINES = 1000
 """Lines, blank ones aside, in which names and numbers must begin."""
 
 _BLOCK = 10_000
 """Lines that are converted at once."""
-
-_LINE_MAX = 1_000_000
-"""Largest length of a line, in characters: a thousand columns; a file without line ends must not fill the memory."""
 
 _COMMENTS = ("#", "%", "//", "!")
 """Beginnings of a comment line."""
@@ -50,6 +45,9 @@ _DELIMITERS = (";", "\t", ",", None)
 
 _NO_UNITS = ("", "-", "1", "[-]")
 """Entries of a row of units where a column has none."""
+
+_BLANK = -math.inf
+"""Stands for a blank cell of the command until it is filled."""
 
 _MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|null|none", re.IGNORECASE)
 """Spellings of a missing number: of C libraries, R, databases and Excel."""
@@ -77,9 +75,8 @@ class _Table:
         Line number of the names, from 1.
     first : int
         Line number from which numbers are read.
-    clocks : mapping
-        Index of a column of timestamps with a time of day → index of the column with their dates, None if they hold
-        them or there are none.
+    clocks : set of int
+        Indices of columns of timestamps with a time of day.
     """
 
     names: list[str]
@@ -88,7 +85,7 @@ class _Table:
     decimal_comma: bool
     header: int
     first: int
-    clocks: Mapping[int, int | None]
+    clocks: set[int]
 
 
 class TextSource(Source):
@@ -110,7 +107,7 @@ class TextSource(Source):
             with gzip.open(path) if self._compressed else path.open("rb") as file:
                 self._encoding = _encoding(file.read(1 << 16))
             with self._open() as text:
-                numbered = ((i, line) for i, line in enumerate(bounded_lines(self.path, text), 1) if not line.isspace())
+                numbered = ((i, line) for i, line in enumerate(text, 1) if not line.isspace())
                 table = _find_table(list(islice(numbered, _HEAD_LINES)))
         except _DAMAGE as error:
             raise LogError(f"{path}: is truncated or damaged: {first_line(error)}") from error
@@ -122,9 +119,8 @@ class TextSource(Source):
             twin: table.units[name] for name, twins in self.twins.items() if name in table.units for twin in twins
         }
         self.stamps = frozenset(self.names[i] for i in table.clocks)
-        self._dates = {i: date for i, date in table.clocks.items() if date is not None}
         self._left_out: list[tuple[int, str]] = []
-        self._held, self._last = 0, math.nan
+        self._held = 0
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -134,29 +130,38 @@ class TextSource(Source):
     def read(self, names: Sequence[str]) -> Block:
         """Return the columns ``names``."""
         use = [self.names.index(name) for name in names]
-        clocks = {
-            i: Clock(self.path, self.names[i], self.names[self._dates[i]] if i in self._dates else "")
-            for i in use
-            if i in self._table.clocks
-        }
-        line, size = self._table.first - 1, 0
-        self._left_out, self._held, self._last = [], 0, math.nan
+        line = self._table.first - 1
+        self._left_out, self._held = [], 0
         parts, numbers = [], []
         try:
             with self._open() as file:
-                rest = islice(bounded_lines(self.path, file), line, None)
+                rest = islice(file, line, None)
                 while lines := list(islice(rest, _BLOCK)):
                     numbered = [one for one in enumerate(lines, line + 1) if not self._is_skipped(*one)]
                     line += len(lines)
-                    size += sum(map(len, lines))
-                    check_declared(self.path, size)  # gzip packs a text of zeros a thousand times
                     if numbered:
-                        parts.append(self._block(numbered, use, clocks))
-                        numbers.append(np.array([number for number, _ in numbered]))
+                        parts.append(self._rows(numbered, use))
+                        numbers += [number for number, _ in numbered]
         except _DAMAGE as error:
             raise LogError(f"{self.path}: is truncated or damaged after line {line}: {first_line(error)}") from error
-        columns = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)] or [np.empty(0)] * len(names)
-        return Block(columns, line_number(np.concatenate(numbers) if numbers else []))
+        columns = dict(zip(names, np.concatenate(parts).T if parts else np.empty((len(names), 0)), strict=True))
+        for name in self.stamps & columns.keys():
+            since = past_midnights(columns[name], 86_400.0 * SECOND)
+            columns[name] = (since - since[:1]) / SECOND
+        if self.commanded in columns:
+            columns[self.commanded] = self._filled(columns[self.commanded], numbers)
+        return Block([np.ascontiguousarray(columns[name]) for name in names], line_number(numbers))
+
+    def _filled(self, column: Array, numbers: Sequence[int]) -> Array:
+        """Return the command with what is blank as before, which is noted."""
+        blank = column == _BLANK
+        if blank[:1].any():
+            raise LogError(
+                f"{self.path}, line {numbers[0]}: column {brief(self.commanded)} must be a number, got nothing"
+            )
+        last = np.maximum.accumulate(np.where(blank, 0, np.arange(len(column))))
+        self._held = int(blank.sum())
+        return column[last]
 
     def notes(self) -> list[str]:
         """Return what the last pass over the file left out or filled."""
@@ -189,18 +194,8 @@ class TextSource(Source):
         self._left_out.append((number, text))
         return True
 
-    def _block(self, numbered: list[tuple[int, str]], use: list[int], clocks: Mapping[int, Clock]) -> list[Array]:
-        """Return the columns ``use`` of some lines, timestamps as seconds."""
-        dates = {i: self._dates[i] for i in clocks if i in self._dates}
-        read = [*use, *dates.values()]
-        found = dict(zip(read, self._columns(numbered, read, {*clocks, *dates.values()}), strict=True))
-        where = line_number([number for number, _ in numbered])
-        for i, clock in clocks.items():
-            found[i] = clock.seconds(found[i], where, found[dates[i]] if i in dates else None)
-        return [found[i] for i in use]
-
-    def _columns(self, numbered: list[tuple[int, str]], use: list[int], stamps: set[int]) -> list[NDArray[Any]]:
-        """Return the columns ``use``, ``stamps`` among them as text."""
+    def _rows(self, numbered: list[tuple[int, str]], use: list[int]) -> Array:
+        """Return the columns ``use`` of some lines, ``(n_lines, n_use)``, timestamps as times of day, ns."""
         mark, expected = self._table.delimiter, len(self._table.names)
         lines = [decimal_points(text) if self._table.decimal_comma else text for _, text in numbered]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
@@ -208,62 +203,44 @@ class TextSource(Source):
             for (number, _), text in zip(numbered, lines, strict=True):
                 fields = split(text.strip(" \r\n"), mark)  # without delimiters between quotation marks
                 if len(fields) < expected or any(fields[expected:]):
-                    self._row(text, number, use, stamps)  # a decimal comma is the likelier fault
+                    self._row(text, number, use)  # a decimal comma is the likelier fault
                     raise LogError(
                         f"{self.path}, line {number}: {expected} columns were expected as in line "
                         f"{self._table.header}, got {len(fields)}"
                     )
-        types = np.dtype([(str(k), CELL.str if i in stamps else "f8") for k, i in enumerate(use)])
+        stamps = dict.fromkeys(self._table.clocks.intersection(use), nanoseconds)
         try:
-            rows = np.loadtxt(lines, types, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=1)
+            how: Any = {"converters": stamps, "comments": None, "quotechar": '"', "ndmin": 2, "encoding": None}
+            return np.loadtxt(lines, np.float64, delimiter=mark, usecols=use, **how)
         except ValueError:  # what is no number, or one that only Python's float() accepts
-            converted = [
-                self._row(text, number, use, stamps) for (number, _), text in zip(numbered, lines, strict=True)
-            ]
-            rows = np.array(converted, types)
-        columns = [np.ascontiguousarray(rows[name]) for name in types.names or ()]
-        for i, column in zip(use, columns, strict=True):
-            if self.names[i] == self.commanded and i not in stamps:
-                self._last = float(column[-1])
-        return columns
+            return np.array([self._row(text, number, use) for (number, _), text in zip(numbered, lines, strict=True)])
 
-    def _row(self, text: str, number: int, use: list[int], stamps: set[int]) -> tuple[float | bytes, ...]:
-        """Return the numbers, and texts of ``stamps``, of one line in the columns ``use``, as far as it has them."""
+    def _row(self, text: str, number: int, use: list[int]) -> list[float]:
+        """Return the numbers of one line in the columns ``use``, as far as it has them."""
         fields = split(text.strip(" \r\n"), self._table.delimiter)
-        row: list[float | bytes] = []
+        row: list[float] = []
         for i in use:
             if i >= len(fields):
                 continue
             name, field = self.names[i], fields[i]
-            missing = (not field or _MISSING.fullmatch(field)) and name in (
-                *(self.measured, *self.twins.get(self.measured, ())),
-            )
-            if i in stamps:
-                row.append(cell(field))
-            elif is_number(decimal_points(field)):
-                row.append(float(decimal_points(field)))
-            elif missing:
-                row.append(math.nan)
-            elif not field and name == self.commanded and not math.isnan(self._last):
-                self._held += 1
-                row.append(self._last)
-            else:
-                came = brief(field) if field else "nothing"
+            may_miss = name in (self.measured, *self.twins.get(self.measured, ()))
+            try:
+                if i in self._table.clocks:
+                    row.append(nanoseconds(field))
+                elif may_miss and (not field or _MISSING.fullmatch(field)):
+                    row.append(math.nan)
+                elif not field and name == self.commanded:
+                    row.append(_BLANK)
+                else:
+                    row.append(_number(decimal_points(field)))
+            except ValueError:
+                stamp = i in self._table.clocks
+                what = "a time of day such as 10:20:30.001 (up to 9 decimals)" if stamp else "a number"
                 raise LogError(
-                    f"{self.path}, line {number}: column {brief(name)} must be a number, got {came}"
-                    f"{_hint(field, divided=len(fields) > len(self._table.names))}"
-                )
-            if name == self.commanded and i not in stamps:
-                self._last = float(row[-1])
-        return tuple(row)
-
-
-def bounded_lines(path: Path, file: IO[str]) -> Iterator[str]:
-    """Iterate over the lines of an open file; LogError for one that is too long."""
-    for i, line in enumerate(iter(partial(file.readline, _LINE_MAX), ""), 1):
-        if len(line) == _LINE_MAX:
-            raise LogError(f"{path}, line {i}: has {_LINE_MAX} characters or more; is the file a log?")
-        yield line
+                    f"{self.path}, line {number}: column {brief(name)} must be {what}, got "
+                    f"{brief(field) if field else 'nothing'}{'' if stamp else _hint(field)}"
+                ) from None
+        return row
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
@@ -279,13 +256,20 @@ def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]
     return own, twins
 
 
+def _number(text: str) -> float:
+    """Return a number with a decimal point; ValueError if it is none, or an underscore is one of its digits."""
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
 def is_number(text: str) -> bool:
-    """Return whether a field is a number with a decimal point; an underscore is not one of its digits."""
+    """Return whether a field is a number with a decimal point."""
     try:
-        float(text)
+        _number(text)
     except ValueError:
         return False
-    return "_" not in text
+    return True
 
 
 def decimal_points(text: str) -> str:
@@ -313,19 +297,10 @@ def _encoding(head: bytes) -> str:
     return "utf-8-sig"
 
 
-def _hint(field: str, *, divided: bool) -> str:
+def _hint(field: str) -> str:
     if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
-    if stamp_kind(field) and divided:
-        return "; the line has more fields than names: put timestamps with blanks or commas between quotation marks"
-    if stamp_kind(field):
-        return "; a column of times has timestamps with the time of day in all lines, or in none; --t names another"
-    if ":" in field and is_number(decimal_points(field.rsplit(":", 1)[1])):
-        return (
-            "; write times of day as hh:mm:ss with up to 9 decimals or as seconds, or remove the column and give T_s "
-            "(--T_s)"
-        )
-    return ""
+    return "; write times of day as hh:mm:ss with up to 9 decimals, or as seconds" if ":" in field else ""
 
 
 # Table
@@ -356,7 +331,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
                     tables[names] = (n + end - start, first)
             for n, table in tables.values():
                 # That blanks divide a timestamp makes no column
-                divided = delimiter is None and any(date is not None for date in table.clocks.values())
+                divided = delimiter is None and bool(table.clocks)
                 score = (n, width - divided)
                 if best is None or score > best[0]:
                     best = (score, table)
@@ -401,26 +376,13 @@ def _with_names(
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
     comma = delimiter != "," and any("," in text for row in fields for text in row if is_number(decimal_points(text)))
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
-    return _Table(names, stated, delimiter, comma, header, rows[start][0], _clocks(kinds))
+    clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
+    return _Table(names, stated, delimiter, comma, header, rows[start][0], clocks)
 
 
 def _best_names(above: Sequence[tuple[int, list[str]]]) -> tuple[int, list[str]]:
-    """Return line and names, of the two rows above the numbers that with more known ones, or both where one repeats.
-
-    Above names that occur several times, the row above says of what: ``X axis,,Y axis,`` over ``cmd,act,cmd,act``.
-    """
-    (number, names), *others = above
-    if not others or len(others[0][1]) != len(names):
-        return number, names
-    upper = others[0][1]
-    groups, group = [], ""
-    for text in upper:
-        group = text or group
-        groups.append(group)
-    joined = [f"{group} {name}".strip() for group, name in zip(groups, names, strict=True)]
-    if len({*names}) < len(names) and len({*joined}) == len(joined) and n_known(upper) <= n_known(joined):
-        return number, joined
-    return others[0] if n_known(upper) > n_known(names) else (number, names)
+    """Return line and names, of the two rows above the numbers that with more known ones."""
+    return max(above[:2], key=lambda row: n_known(row[1]) if len(row[1]) == len(above[0][1]) else -1)
 
 
 def _are_row_names(cells: Sequence[str]) -> bool:
@@ -438,23 +400,13 @@ def _kind(cells: Sequence[str]) -> str:
     return kind if 2 * n > len(cells) else ""
 
 
-def _clocks(kinds: Sequence[str]) -> dict[int, int | None]:
-    """Return the columns with a time of day, each with the column beside it that holds the dates."""
-    clocks: dict[int, int | None] = {}
-    for i, kind in enumerate(kinds):
-        beside = [j for j in (i - 1, i + 1) if kind == "time" and 0 <= j < len(kinds) and kinds[j] == "date"]
-        if "time" in kind:
-            clocks[i] = beside[0] if beside else None
-    return clocks
-
-
 def _first_line(lines: Sequence[tuple[int, str]]) -> _Table | None:
     known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
     if not known:
         return None
     number, line = known[0]
     delimiter = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, delimiter), {}, delimiter, False, number, number + 1, {})
+    return _Table(_names(line, delimiter), {}, delimiter, False, number, number + 1, set())
 
 
 def _names(line: str, delimiter: str | None) -> list[str]:

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import LogError, brief
+from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import ArraysSource
-from .text import bounded_lines, decimal_points, is_number
+from .text import decimal_points, is_number
 
 __all__ = ["TwinCatSource"]
 
@@ -57,7 +57,7 @@ class TwinCatSource(ArraysSource):
             head = file.read(16).removeprefix(_BOM)
         self._mark = head[len(_NAME) : len(_NAME) + 1].decode("latin-1")
         with path.open(encoding="utf-8-sig", errors="replace") as file:
-            lines = [line.rstrip("\r\n") for line in bounded_lines(path, file)]
+            lines = [line.rstrip("\r\n") for line in file]
         rows = [(number, line.split(self._mark)) for number, line in enumerate(lines[:_HEAD_LINES], 1)]
         block = next((i for i, (_, row) in enumerate(rows) if i and row[0] == _NAME), None)
         if block is None:
@@ -149,12 +149,13 @@ class TwinCatSource(ArraysSource):
         is_time = field in {place.time for place in self._places.values()}
         ticks = is_time and self._ticks
         end = next((i for i in reversed(range(len(self._lines))) if self._row_cell(i, field)), -1) + 1
-        kind = np.dtype(np.int64 if ticks else np.float64)
         try:
-            mark, lines = self._mark, self._lines[:end]
-            values = np.loadtxt(lines, kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
-        except (ValueError, OverflowError):
-            values = np.array([self._number(i, field, name, ticks=ticks) for i in range(end)], kind)
+            kind, mark = np.int64 if ticks else np.float64, self._mark
+            values = np.loadtxt(self._lines[:end], kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
+        except (ValueError, OverflowError) as error:
+            raise LogError(
+                f"{self.path}, below line {self._first - 1}: column {brief(name)} must be numbers: {first_line(error)}"
+            ) from error
         if ticks:
             return np.asarray((values - self._origin) * _TICK, dtype=np.float64)
         return np.asarray(values * _MS if is_time else values, dtype=np.float64)
@@ -162,11 +163,3 @@ class TwinCatSource(ArraysSource):
     def _row_cell(self, i: int, field: int) -> str:
         row = self._lines[i].split(self._mark)
         return row[field].strip() if field < len(row) else ""
-
-    def _number(self, i: int, field: int, name: str, *, ticks: bool) -> float:
-        """Return the number in a field of a line; LogError if it is none."""
-        cell = self._row_cell(i, field)
-        if not (cell.isdigit() and len(cell) < 19 if ticks else is_number(cell)):
-            what, came = "a whole number" if ticks else "a number", brief(cell) if cell else "nothing"
-            raise LogError(f"{self.path}, line {self._first + i}: column {brief(name)} must be {what}, got {came}")
-        return int(cell) if ticks else float(cell)

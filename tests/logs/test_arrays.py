@@ -1,4 +1,4 @@
-"""Arrays: NumPy's ``.npz``, MATLAB's ``.mat``, Parquet; what they declare is compared with their size."""
+"""Arrays: NumPy's ``.npz``, MATLAB's ``.mat``, Parquet."""
 
 from __future__ import annotations
 
@@ -42,10 +42,9 @@ def with_member(path: Path, header: str, values: bytes = bytes(400)) -> Path:
         (HEADER.replace("'shape'", "'shale'"), "is truncated, damaged or not an array: "),
         (HEADER.replace("(50,)", "(" * 3000 + ")" * 3000), "is truncated, damaged or not an array: "),
         (HEADER.replace("'<f8'", "'<f7'"), "is truncated, damaged or not an array: "),
-        (HEADER.replace("'<f8'", "'|O'"), "must be numbers, got object"),
+        (HEADER.replace("'<f8'", "'|O'"), "is truncated, damaged or not an array: ValueError: Object arrays"),
         (HEADER.replace("'<f8'", "[('a', '<f8')]"), "must be numbers, got .*'a'"),
-        (HEADER.replace("(50,)", "(51,)"), "is truncated: 408 bytes were expected, got 400"),
-        (HEADER.replace("(50,)", "(10_000_000_000,)"), "is truncated: 80000000000 bytes were expected, got 400"),
+        (HEADER.replace("(50,)", "(51,)"), "is truncated, damaged or not an array: "),
     ],
 )
 def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> None:
@@ -57,15 +56,6 @@ def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> No
 def test_datetimes_of_numpy(tmp_path: Path) -> None:
     path = write(tmp_path / "log.npz", columns() | {"t": np.datetime64("2026-03-05T10:20:30", "ns") + np.arange(50)})
     with pytest.raises(LogError, match=r"column 't' must be numbers, got datetime64\[ns\]; save \(t - t\[0\]\)"):
-        read_log(path)
-
-
-def test_zeros_that_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ten megabytes of zeros in ten kilobytes."""
-    monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)
-    header = HEADER.replace("(50,)", "(1_250_000,)")
-    path = with_member(tmp_path / "log.npz", header, bytes(10_000_000))
-    with pytest.raises(LogError, match=r"has 10000000 bytes of values in a file of \d{5}: is truncated, damaged or"):
         read_log(path)
 
 
@@ -172,11 +162,3 @@ def test_durations_and_times_of_day(name: str) -> None:
     log = read_log(CASES / f"{name}.parquet")
     assert log.T_s == 1e-3
     np.testing.assert_allclose(log.t, 1e-3 * np.arange(6000), atol=1e-9)
-
-
-def test_a_parquet_that_fills_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Megabytes in a few kilobytes, as a value that repeats is written once."""
-    monkeypatch.setattr("hybridsep.logs.source._SMALL", 1 << 20)
-    pq.write_table(pa.table({name: np.zeros(500_000) for name in ("t", "x_d", "x")}), tmp_path / "log")
-    with pytest.raises(LogError, match=r"has 12000000 bytes of values in a file of \d{4,5}: "):
-        read_log(tmp_path / "log")

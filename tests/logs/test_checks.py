@@ -149,10 +149,6 @@ def held(x: Array) -> Array:
     return np.where((np.arange(len(x)) >= 950) & (np.arange(len(x)) < 1010), x[950], x)
 
 
-def jump(log: Log) -> Array:
-    return np.where(np.arange(len(log.t)) < 1500, 0.0, 2 * np.ptp(log.x_d))
-
-
 NOTES: dict[str, Callable[[Log], Log]] = {
     "missing samples": lambda log: replace(log, x_meas=np.where(np.arange(len(log.t)) == 700, np.nan, log.x_meas)),
     "rate": lambda log: replace(log, t=log.t + 0.1 * log.T_s * np.sin(np.arange(len(log.t)))),
@@ -162,7 +158,6 @@ NOTES: dict[str, Callable[[Log], Log]] = {
     "stuck samples": lambda log: replace(log, x_meas=held(log.x_meas)),
     "outliers": lambda log: replace(log, x_meas=log.x_meas + 0.1 * (np.arange(len(log.t)) == 500)),
     "clipped": lambda log: replace(log, x_meas=np.minimum(log.x_meas, 0.8 * float(log.x_meas.max()))),
-    "jumps": lambda log: replace(log, x_d=log.x_d + jump(log), x_meas=log.x_meas + jump(log)),
 }
 
 
@@ -194,13 +189,6 @@ def test_large_outliers_are_noted_and_do_not_hide_the_axis() -> None:
 def test_numbers_without_bounds_are_checked() -> None:
     log = moves()
     assert check(replace(log, x_meas=1e300 * log.x_meas))[0].refused
-
-
-def test_rows_that_are_lost_between_even_times_are_noted() -> None:
-    log = sines()
-    keep = np.delete(np.arange(3000), np.arange(100, 3000, 150))
-    assert "lost rows" in names(log_of(log.x_d[keep], log.x_meas[keep]), refused=False)
-    assert "lost rows" not in names(log, refused=False)
 
 
 # Any log

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from log_files import capture, columns
 from places import RECORDINGS
-from recorders import halscope_csv, halscope_pairs, trace_xml, twincat_csv
+from recorders import halscope_csv, trace_xml, twincat_csv
 
 from hybridsep.base.errors import LogError
 from hybridsep.logs.columns import channels
@@ -75,13 +75,12 @@ def test_the_bits_of_a_nan_are_no_value(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ('<rec time="0.005000"', '<rec time="0.0009"', r"time of rec must increase, got 0.0009 s after 0.004"),
-        ('<rec time="0.005000"', '<rec time="x"', "time of rec must be a number, got 'x'"),
-        ('"0.005000" f1="', '"0.005000" f1="1,0', "f1 of rec at time 0.005000 must be a number, got .1,0"),
-        ('interval="0.001000"', 'interval="0"', "dataSignal must have an interval above 0 s and a number of points"),
-        ('Count="400"', 'Count="1e18"', "dataSignal must have an interval above 0 s and a number of points"),
-        ('id="f1"', 'id=""', "dataSignal must have an id and a name"),
-        ("<traceSession", "<!DOCTYPE a [<!ENTITY b 'c'>]><traceSession", "a document type is not read"),
+        ('<rec time="0.005000"', '<rec time="0.0009"', r"time, which increases, .*: time 0.0009 s after 0.004"),
+        ('<rec time="0.005000"', '<rec time="x"', "could not convert string to float: 'x'"),
+        ('"0.005000" f1="', '"0.005000" f1="1,0', "could not convert string to float: '1,0"),
+        ('interval="0.001000"', 'interval="0"', "dataSignal must have .* an interval above 0 s"),
+        ('Count="400"', 'Count="inf"', "dataSignal must have id, name, datapointCount and"),
+        ('id="f1"', "", "dataSignal must have id, name, .*: KeyError: 'id'"),
         ("</traceData>", "", r"is truncated, damaged or not XML: mismatched tag: line \d+"),
     ],
 )
@@ -90,13 +89,6 @@ def test_damaged_traces(tmp_path: Path, before: str, after: str, message: str) -
     assert before in text
     with pytest.raises(LogError, match=message):
         read_log(trace(tmp_path / "log", text.replace(before, after, 1)))
-
-
-def test_a_trace_that_fills_the_memory(tmp_path: Path) -> None:
-    """Values are held between records: an interval of 10 ns makes 40 million of 0.4 s."""
-    text = trace_xml(SIGNALS).replace('interval="0.001000"', 'interval="1e-8"').replace('Count="400"', 'Count="1e9"')
-    with pytest.raises(LogError, match=r"has 957600024 bytes of values in a file of \d+: "):
-        read_log(trace(tmp_path / "log", text))
 
 
 def test_a_trace_without_signals(tmp_path: Path) -> None:
@@ -148,8 +140,8 @@ def test_slow_channels_that_are_filled(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("\n5,0\t", "\n5.5.5\t", r"line 17: column 'time' must be a number, got '5\.5\.5'"),
-        (f"\n5,0\t{str(X_D[5]).replace('.', ',')}", "\n5,0\t", "line 17: column 'x_d' must be a number, got nothing"),
+        ("\n5,0\t", "\n5.5.5\t", r"below line 11: column 'time' must be numbers: could not convert .*'5\.5\.5'"),
+        (f"\n5,0\t{str(X_D[5]).replace('.', ',')}", "\n5,0\t", "column 'x_d' must be numbers: could not convert .*''"),
         ("\nName\tx_d", "\n" * 500 + "Name\tx_d", "a row of the channels' names was expected below the head, got none"),
         ("Name\tx_d\tName\tx", "Name\tx_d\tx\ty\tz\tv", r"line 12: a column of times before each channel, .* expected"),
     ],
@@ -235,10 +227,8 @@ JOINTS = {
 }
 
 
-@pytest.mark.parametrize("old", [False, True])
-def test_joints_of_halscope(tmp_path: Path, old: bool) -> None:
-    text = halscope_pairs(JOINTS, 500_000, comma=True) if old else halscope_csv(JOINTS, 500_000)
-    (tmp_path / "log").write_text(text)
+def test_joints_of_halscope(tmp_path: Path) -> None:
+    (tmp_path / "log").write_text(halscope_csv(JOINTS, 500_000))
     log = read_log(tmp_path / "log", unit="mm")
     np.testing.assert_allclose(log.x_meas, 1e-3 * HAL["x"], rtol=1e-15)
     assert (log.T_s, len(log.t)) == (5e-4, 50)
@@ -252,29 +242,18 @@ def test_joints_of_halscope(tmp_path: Path, old: bool) -> None:
     np.testing.assert_allclose(read_log(tmp_path / "log", columns=names, unit="mm").x_meas, 2e-3 * HAL["x"], rtol=1e-15)
 
 
-def test_channels_of_halscope_that_are_off(tmp_path: Path) -> None:
-    data = {"x_d": HAL["x_d"], "x": HAL["x"], "(null)": 0 * HAL["x"]}
-    (tmp_path / "log").write_text(halscope_pairs(data))
-    assert [one.name for one in channels(open_source(tmp_path / "log"))] == ["x_d", "x", "t"]
-
-
 @pytest.mark.parametrize(
-    ("old", "change", "message"),
+    ("before", "after", "message"),
     [
-        (False, ("period is 1000000", "period is 0"), "line 1: the sampling period must be a positive number of ns"),
-        (True, ("x_d", "y", 3), r"line 5: values of 'x_d', 'x' in turn were expected, got 'y "),
-        (True, ("+0.9", "+0.9.", 1), r"line \d+: column 'x' must be a number, got '\+0\.9\.|names and values in turn"),
-        (False, ("x_d;x\n", "x_d;x;y\n"), r"line 5: 3 columns were expected as in line 2, got 2"),
+        ("period is 1000000", "period is 0", "line 1: the sampling period must be a positive number of ns"),
+        ("x_d;x\n", "x_d;x;y\n", r"line 5: 3 columns were expected as in line 2, got 2"),
+        ("# ", "", r"is halscope's file of LinuxCNC before 2\.9, which is not read; import pandas"),
     ],
 )
-def test_damaged_halscope(tmp_path: Path, old: bool, change: tuple[Any, ...], message: str) -> None:
-    data = {"x_d": 0 * HAL["x_d"], "x": 0 * HAL["x"] + (0.9 if old else 0.0)}
-    text = halscope_pairs(data) if old else halscope_csv(data)
-    before, after, *which = change
-    at = -1
-    for _ in range(which[0] if which else 1):
-        at = text.index(before, at + 1)
-    (tmp_path / "log").write_text(text[:at] + after + text[at + len(before) :])
+def test_damaged_halscope(tmp_path: Path, before: str, after: str, message: str) -> None:
+    text = halscope_csv({"x_d": 0 * HAL["x_d"], "x": 0 * HAL["x"]})
+    assert before in text
+    (tmp_path / "log").write_text(text.replace(before, after, 1))
     with pytest.raises(LogError, match=message):
         read_log(tmp_path / "log")
 
@@ -314,13 +293,13 @@ def rows_of(content: dict[str, Any], block: int) -> list[Any]:
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda c: c["Header"].update(CycleTimeMs=0), "Header.CycleTimeMs must be a number of milliseconds above 0"),
-        (lambda c: c["Header"].update(SignalListHFData={}), "Header.SignalListHFData must be a list, got dict"),
-        (lambda c: signals_of(c)[2].pop("Axis"), r"Header\.SignalListHFData\[2\] must have a Name and an Axis, got "),
-        (lambda c: rows_of(c, 0).insert(3, [1.0]), r"Payload\[0\]\.HFData\[3\] must have 5 values, one a signal"),
-        (lambda c: rows_of(c, 3)[4].__setitem__(1, "1"), r"Payload\[3\]\.HFData\[4\]\[1\] must be a number, got '1'"),
-        (lambda c: c["Payload"][3].update(HFData=None), r"Payload\[3\]\.HFData must be a list, got NoneType"),
-        (lambda c: rows_of(c, 0)[0].__setitem__(0, 10**400), "a value is no floating-point number"),
+        (lambda c: c["Header"].update(CycleTimeMs=0), "time 't' must increase, it never does"),
+        (lambda c: c["Header"].update(SignalListHFData=7), "must have Header.CycleTimeMs, the Name and Axis of each"),
+        (lambda c: signals_of(c)[2].pop("Axis"), "the Name and Axis of each .*: KeyError: 'Axis'"),
+        (lambda c: rows_of(c, 0).insert(3, [1.0]), "rows of as many numbers in each HFData of Payload: ValueError"),
+        (lambda c: rows_of(c, 3)[4].__setitem__(1, "a"), "ValueError: could not convert string to float: 'a'"),
+        (lambda c: c["Payload"][3].update(HFData=None), "each HFData of Payload: TypeError"),
+        (lambda c: rows_of(c, 0)[0].__setitem__(0, 10**400), "each HFData of Payload: OverflowError"),
         (lambda c: rows_of(c, 0)[1].__setitem__(3, math.nan), r"sample 2 .* 'DES_POS\|4' must be finite, got nan"),
     ],
 )

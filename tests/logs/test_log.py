@@ -114,7 +114,6 @@ def time_at(i: int, value: float, n: int = 25_000) -> Array:
     ("t", "message"),
     [
         (time_at(7, np.nan), r"sample 8 \(the first is 1\): column 't' must be finite, got nan"),
-        (time_at(7, 1e20), r"sample 8 .*: time 't' must be within ±1e\+19, got 1e\+20"),
         (np.zeros(50), r"log.npz: time 't' must increase, it never does"),
         (np.array([0.0, 5e-324, 1e-323, 1.5e-323]), "time 't' must be "),
         (np.array([-1e308, 0.0, 1e308]), "time 't' must be "),

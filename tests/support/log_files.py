@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorders import halscope_csv, halscope_pairs, trace_xml, twincat_csv, write_parquet
+from recorders import halscope_csv, trace_xml, twincat_csv, write_parquet
 from scipy import io
 
 __all__ = ["EVERY_FORMAT", "FORMATS", "Columns", "capture", "columns", "write", "write_csv"]
@@ -74,7 +74,6 @@ _RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
     ".xml": lambda path, data: path.write_text(trace_xml(_traced(data), kind="none")),
     ".scope": lambda path, data: path.write_text(twincat_csv(_rated(data))),
     ".hal": lambda path, data: path.write_text(halscope_csv(_positions(data))),
-    ".halpairs": lambda path, data: path.write_text(halscope_pairs(_positions(data))),
 }
 """Writers of recorders' formats."""
 

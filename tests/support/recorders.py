@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from hybridsep.base.signals import Array
 
-__all__ = ["halscope_csv", "halscope_pairs", "trace_xml", "twincat_csv", "write_parquet"]
+__all__ = ["halscope_csv", "trace_xml", "twincat_csv", "write_parquet"]
 
 Rated = Mapping[str, tuple[float, Array]]
 """Sampling interval, s, and values by column."""
@@ -32,17 +32,6 @@ def halscope_csv(data: Mapping[str, Any], period_ns: int = 1_000_000) -> str:
     lines += ["# Position: " + ";".join(["0.500000"] * len(data)), "# Scale: " + ";".join(["0"] * len(data))]
     lines += [";".join(repr(float(x)) for x in row) for row in zip(*data.values(), strict=True)]
     return "\n".join(lines) + "\n"
-
-
-def halscope_pairs(data: Mapping[str, Any], period_ns: int = 1_000_000, *, comma: bool = False) -> str:
-    """Return halscope's older file, which has one line of what lies behind the samples, in a locale's decimals."""
-    rows = [*zip(*data.values(), strict=True), [0.0] * len(data)]
-
-    def number(x: float) -> str:
-        return f"{float(x):+.17g}".replace(".", "," if comma else ".")
-
-    lines = ["".join(f"{name} {number(x)} " for name, x in zip(data, row, strict=True)) for row in rows]
-    return f"Sampling period is {period_ns} ns \n\n" + "\n".join(lines)
 
 
 def trace_xml(signals: Mapping[str, tuple[float, float, Array]], kind: str = "posn") -> str:
