@@ -1,25 +1,22 @@
-"""Files of a fit: machine file, what was learned, commands to try with, FMUs with their origin, and their times."""
+"""Files of a fit: machine file, what was learned, commands to try with, FMUs, and the times of their steps."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
 from ..base.files import COMMANDS, written_text
 from ..base.signals import Array
-from ..base.version import __version__
 from ..cosim.adapters import FmuController
 from ..fmi.archive import build_fmu
 from ..fmi.compile import has_native
 from ..fmi.flavours import FLAVOURS
 from ..fmi.spec import fmu_name
-from ..logs.log import Log
 from ..machines.machine import Machine
 
 __all__ = [
@@ -27,7 +24,6 @@ __all__ = [
     "StepTimes",
     "build_fmus",
     "fit_files",
-    "origin_of",
     "sha256_of",
     "step_times",
     "write_commands",
@@ -111,34 +107,14 @@ def write_commands(path: Path, x_d: Array, T_s: float, unit: str) -> None:
         file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate(x_d.tolist()))
 
 
-def build_fmus(
-    machine: Machine, files: Mapping[str, Path], origin: Mapping[str, Any], progress: Callable[[float], object]
-) -> None:
-    """Build the FMUs among :func:`fit_files`, trained, with what they say of their origin."""
+def build_fmus(machine: Machine, files: Mapping[str, Path], progress: Callable[[float], object]) -> None:
+    """Build the FMUs among :func:`fit_files`, trained."""
     flavours = _flavours()
     for i, flavour in enumerate(flavours):
         progress(i / len(flavours))
         for what in _MODELS:
             if path := files.get(f"{flavour} {what}FMU"):
-                given: dict[str, Any] = {"weights": files["trained predictor"], "origin": origin}
-                build_fmu(machine, path.stem, path.parent, flavour, **given)
-
-
-def origin_of(machine: Machine, logs: Sequence[Log], identification: Any, judged: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what FMUs say of their origin: logs with their hashes, settings, figures of the fit."""
-    return {
-        "tool": f"hybridsep {__version__}",
-        "log": [
-            {"file": log.path.name, "sha256": sha256_of(log.path), "samples": len(log.t), "T_s": log.T_s}
-            for log in logs
-        ],
-        "change": [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks],
-        "machine": {"name": machine.name, "unit": machine.unit},
-        "identification": {"structure": identification.structure, "offset": identification.offset},
-        "settings": machine.predictor_settings.to_fmi(),
-        "trained": {"share": 0.5},
-        "judged": {name: "unknown" if value is None else value for name, value in judged.items()},
-    }
+                build_fmu(machine, path.stem, path.parent, flavour, weights=files["trained predictor"])
 
 
 def sha256_of(path: Path) -> str:

@@ -30,7 +30,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, recommendation
-from .build import Built, build_fmus, fit_files, origin_of, sha256_of, step_times, write_commands
+from .build import Built, build_fmus, fit_files, sha256_of, step_times, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, settings_for, window_scores
 from .compensation import COMPENSATE, LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
@@ -203,10 +203,8 @@ class Fit:
         with written_whole(files["trained predictor"]) as state:
             state.write(self.trained)
         built = Built(files)
-        judged = plain(replayed.judgement())
         if fmus:
-            origin = origin_of(self.machine, self.logs, self.identification, judged)
-            build_fmus(self.machine, files, origin, lambda done: progress("build the FMUs", 0.6 * done))
+            build_fmus(self.machine, files, lambda done: progress("build the FMUs", 0.6 * done))
             progress("time the FMU's steps", 0.6)
             try:
                 first = replayed.recordings[0]

@@ -11,7 +11,6 @@ import shlex
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -45,7 +44,6 @@ def build_fmu(
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
     fmi: str = FMI_VERSIONS[0],
-    origin: Mapping[str, Any] | None = None,
     windows: bool = True,
     embed_weights: bool = False,
 ) -> Path:
@@ -71,8 +69,6 @@ def build_fmu(
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
     fmi : {"2", "3"}
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
-    origin : mapping, optional
-        What the FMU was made from, plain values: the FMU carries it as meta data (SRMD, SSP Traceability).
     windows : bool
         Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
     embed_weights : bool
@@ -118,7 +114,6 @@ def build_fmu(
             fmi=fmi,
             samples=samples,
             trained=trained,
-            origin=origin,
             windows=windows,
         )
         if flavour == "native":

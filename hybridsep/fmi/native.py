@@ -31,7 +31,6 @@ from .description import (
     model_description,
     terminals_and_icons,
 )
-from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .flavours import FMI_VERSIONS
 from .pages import compile_note, documentation, icon
 from .reference import reference_run
@@ -104,10 +103,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     else:
         content["modelDescription.xml"] = model_description(spec, guid, tool)
     content |= reference
-    if spec.origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
     compiled = libraries(table.kind, targets or default_targets())
-    content[MANIFEST_FILE] = manifest(content)
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 
 

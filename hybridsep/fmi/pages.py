@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 
 from .description import fmi3_variables
-from .extras import AGREEMENT, RELATED_FOLDER
+from .reference import AGREEMENT
 from .spec import FmuSpec
 from .variables import Variable
 
@@ -22,19 +22,6 @@ _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
 
 _PLAIN_NAMES = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_PREFIX"}
 """Option with which the standard's headers give the FMI functions their plain names, by the version of FMI."""
-
-_REFERENCE_NOTE = """\
-The reference experiment of {name}, in extra/org.fmi-standard.fmi-ls-ref:
-
-fmi-ls-manifest.xml   the files with their roles (FMI-LS-REF 1.0.0-beta.1)
-reference.exp         times, inputs and outputs (MA-HS-Experiments, the Modelica Association's format)
-{inputs}{name}_ref.csv   outputs at every communication point
-{name}_ref.opt   the times again, as FMI's cross-check had them
-
-It is a smoke test: set nothing but the inputs, step by the stated step size, and compare the outputs. They agree within
-1e-{digits:02} m (of flags and numbers of windows: exactly), far below the tolerance of 1e-4 that is stated for tools.
-With other steps inputs are read at other times, and the outputs are others.
-"""
 
 _SOURCES = {
     "ReferenceTrajectory": (
@@ -75,7 +62,7 @@ def documentation(
     needs, dependencies : str
         Requirements of the FMU: one sentence, and in detail, the text of ``externalDependencies.txt``.
     reference : collection of str
-        Files of its reference experiment; empty if it has none.
+        Files of its reference run; empty if it has none.
     limits, sources : str
         Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
     """
@@ -85,11 +72,14 @@ def documentation(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
     )
-    has_inputs = model != "ReferenceTrajectory"
-    table_of_inputs = f'<a href="../{RELATED_FOLDER}/{name}_in.csv">{name}_in.csv</a>'
-    origin = "this FMU" if spec.flavour == "native" else "its native twin"
-    run = {"folder": RELATED_FOLDER, "origin": origin, "inputs": f", fed with {table_of_inputs}" * has_inputs}
-    digits = AGREEMENT.get(model, 11)
+    run = {
+        "name": name,
+        "digits": AGREEMENT.get(model, 11),
+        "origin": "this FMU" if spec.flavour == "native" else "its native twin",
+        "inputs": "",
+    }
+    if model != "ReferenceTrajectory":
+        run["inputs"] = f', fed with <a href="reference/{name}_in.csv">{name}_in.csv</a>'
     named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
     page = filled(
@@ -101,20 +91,15 @@ def documentation(
         partner=partner,
         command=command,
         rows=rows,
-        reference=filled("reference", name=name, digits=digits, **run) if reference else "",
+        reference=filled("reference", **run) if reference else "",
         limits=limits,
         compiling=sources,
         sources="\n".join(f"<li>{html.escape(source)}</li>" for source in named),
     )
-    content = {
+    return {
         "documentation/index.html": f"{page}\n".encode(),
         "documentation/externalDependencies.txt": dependencies.encode(),
     }
-    if reference:
-        given = f"{name}_in.csv   inputs at every communication point\n" if has_inputs else ""
-        text = _REFERENCE_NOTE.format(name=name, inputs=given, digits=digits)
-        content["documentation/fmi-ls-ref.txt"] = text.encode()
-    return content
 
 
 def compile_note(name: str, fmi: str) -> str:

@@ -21,7 +21,6 @@ from ..base.errors import FmuError
 from ..base.files import data_folder
 from ..base.version import __version__
 from .description import model_description
-from .extras import MANIFEST_FILE, RESOURCE_DATA_FILE, manifest, resource_data
 from .pages import documentation, filled, icon
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
@@ -89,11 +88,7 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
     ).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
     content["modelDescription.xml"] = model_description(spec, guid, tool)
-    content |= reference
-    if spec.origin is not None:
-        content[RESOURCE_DATA_FILE] = resource_data(spec, guid)
-    content[MANIFEST_FILE] = manifest(content)
-    return content
+    return content | reference
 
 
 def _resources(model: str) -> dict[str, bytes]:

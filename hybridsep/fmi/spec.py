@@ -54,8 +54,6 @@ class FmuSpec:
         Trajectory 3 of a ReferenceTrajectory.
     trained : HybridPredictor or None
         With which a HybridPredictor or SepCompensator starts warm.
-    origin : mapping or None
-        What the FMU was made from, plain values.
     """
 
     machine: Machine
@@ -66,7 +64,6 @@ class FmuSpec:
     stop_time: float
     samples: Array | None = None
     trained: HybridPredictor | None = None
-    origin: Mapping[str, Any] | None = None
 
     @classmethod
     def of(
@@ -78,7 +75,6 @@ class FmuSpec:
         fmi: str = FMI_VERSIONS[0],
         samples: ArrayLike | None = None,
         trained: HybridPredictor | None = None,
-        origin: Mapping[str, Any] | None = None,
         windows: bool = True,
         rest: float = 0.0,
     ) -> FmuSpec:
@@ -97,7 +93,7 @@ class FmuSpec:
         name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
         table = table_of(machine, model, name, **built_in, warm=trained is not None, windows=windows, rest=rest)
         title, end = _title(machine, model), _stop_time(machine, table, played)
-        return cls(machine, table, flavour, fmi, title, end, played, trained, origin)
+        return cls(machine, table, flavour, fmi, title, end, played, trained)
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:

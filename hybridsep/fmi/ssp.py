@@ -1,7 +1,7 @@
 """Documents of a system: ``SystemStructure.ssd`` and parameter sets, SSP 1.0 or 2.0, which has FMI 3.0's types.
 
 Enumerations are in neither: libcosim ends the process where it meets one. The FMUs' own start values hold for them.
-The system has no ``ssd:SystemGeometry``, which is optional: OMSimulator refuses a file with one.
+There is no geometry, which is optional: tools place components themselves, and OMSimulator refuses one of a system.
 """
 
 from __future__ import annotations
@@ -39,9 +39,6 @@ _NAMESPACES = {
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
     "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
-_HEIGHT, _WIDTH, _GAP = 30.0, 30.0, 20.0
-"""Size of a component in the picture and the space between two, in its own units."""
-
 Connection = tuple[str, str, str, str]
 """Component and output, component and input."""
 
@@ -104,10 +101,11 @@ def system_structure(
     root.set("generationTool", f"hybridsep {__version__}")
     system = _add(root, "ssd:System", name=name)
     elements, wires = _add(system, "ssd:Elements"), _add(system, "ssd:Connections")
-    for i, component in enumerate(components):
-        _add_component(elements, component, i, sets[component.name])
+    for component in components:
+        _add_component(elements, component, sets[component.name])
     for connection in connections:
-        _add_connection(wires, components, connection)
+        places = zip(("startElement", "startConnector", "endElement", "endConnector"), connection, strict=True)
+        _add(wires, "ssd:Connection", **dict(places))
     master = {"description": "oms-ma", "stepSize": T_s, "absoluteTolerance": 1e-4, "relativeTolerance": 1e-4}
     _add(_add(_omsimulator(system), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)
     connectors = [variable for component in components for variable in component.connectors]
@@ -166,55 +164,15 @@ def _unit(variable: Variable) -> dict[str, str]:
     return {} if variable.unit in (None, "1") else {"unit": str(variable.unit)}
 
 
-def _corner(i: int) -> tuple[float, float]:
-    """Return the lower left corner of the i-th component."""
-    return _GAP + i * (_WIDTH + _GAP), _GAP
-
-
-def _places(component: Component) -> dict[str, tuple[float, float]]:
-    """Return where connectors are on their component, inputs on the left, 0 … 1 from its lower left corner."""
-    places: dict[str, tuple[float, float]] = {}
-    for x, causality in ((0.0, "input"), (1.0, "output")):
-        names = [variable.name for variable in component.connectors if variable.causality == causality]
-        places |= {name: (x, 1.0 - (k + 1) / (len(names) + 1)) for k, name in enumerate(names)}
-    return places
-
-
-def _add_component(parent: ET.Element, component: Component, i: int, parameters: str) -> None:
+def _add_component(parent: ET.Element, component: Component, parameters: str) -> None:
     attributes = {"type": "application/x-fmu-sharedlibrary", "source": f"resources/{component.fmu}"}
     element = _add(parent, "ssd:Component", name=component.name, **attributes, implementation="CoSimulation")
-    connectors, places = _add(element, "ssd:Connectors"), _places(component)
+    connectors = _add(element, "ssd:Connectors")
     for variable in component.connectors:
         connector = _add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
         _add(connector, f"ssc:{variable.kind}", **_unit(variable))
-        x, y = places[variable.name]
-        _add(connector, "ssd:ConnectorGeometry", x=x, y=round(y, 4))
-    x, y = _corner(i)
-    _add(element, "ssd:ElementGeometry", x1=x, y1=y, x2=x + _WIDTH, y2=y + _HEIGHT)
     binding = {"type": "application/x-ssp-parameter-set", "source": f"resources/{parameters}"}
     _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", **binding)
-
-
-def _add_connection(parent: ET.Element, components: Sequence[Component], connection: Connection) -> None:
-    """Add a connection, drawn with right angles: from left to right between two components, back below them."""
-    source, output, sink, name = connection
-    index = {component.name: i for i, component in enumerate(components)}
-    (x1, y1), (x2, y2) = (
-        (_corner(i)[0] + px * _WIDTH, _corner(i)[1] + py * _HEIGHT)
-        for i, (px, py) in (
-            (index[source], _places(components[index[source]])[output]),
-            (index[sink], _places(components[index[sink]])[name]),
-        )
-    )
-    if index[sink] > index[source]:
-        middle = (x1 + x2) / 2
-        points = [(middle, y1), (middle, y2)]
-    else:
-        right, left, below = x1 + _GAP / 4, x2 - _GAP / 4, _GAP / 2
-        points = [(right, y1), (right, below), (left, below), (left, y2)]
-    wire = {"startElement": source, "startConnector": output, "endElement": sink, "endConnector": name}
-    xs, ys = (" ".join(str(round(point[axis], 3)) for point in points) for axis in (0, 1))
-    _add(_add(parent, "ssd:Connection", **wire), "ssd:ConnectionGeometry", pointsX=xs, pointsY=ys)
 
 
 def _add_units(parent: ET.Element, variables: Iterable[Variable]) -> None:

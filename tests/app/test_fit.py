@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import zipfile
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,10 +17,9 @@ from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import FmuError, ParameterError
 from hybridsep.cosim.adapters import FmuController
 from hybridsep.fitting import build
-from hybridsep.fitting.build import Built, StepTimes, fit_files, sha256_of
+from hybridsep.fitting.build import Built, StepTimes, fit_files
 from hybridsep.fitting.fit import Fit, fit
 from hybridsep.fitting.replay import replay, split_log
-from hybridsep.fmi.extras import RESOURCE_DATA_FILE
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.machine import machine_name
 
@@ -81,25 +77,6 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(built: Built, log: Pa
                 ahead = float(x_d[min(k, len(x_d) - 1)])
                 controller.step(k, ahead, float(x[k - NP]) if k >= NP else float(x_d[0]))
         np.testing.assert_allclose(x_h[NP:], np.concatenate(expected), rtol=0, atol=1e-9)
-
-
-def test_the_fmus_name_the_log_the_settings_and_the_figures(
-    fitted: Fit, built: Built, log: Path, tmp_path: Path
-) -> None:
-    """By SRMD of SSP Traceability, so that whoever gets an FMU alone can find the log that it is from."""
-    results = json.loads(built.files["results"].read_text(encoding="utf-8"))
-    for path in built.fmus:
-        with zipfile.ZipFile(path) as archive:
-            root = ElementTree.fromstring(archive.read(RESOURCE_DATA_FILE))
-        entries = {entry.get("keyword"): entry.text for entry in root.iter() if entry.get("keyword")}
-        assert entries["log.1.file"] == "axis.csv"
-        assert entries["log.1.sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
-        assert entries["log.1.samples"] == str(N)
-        settings = fitted.machine.predictor_settings
-        assert [entries[f"settings.{name}"] for name in ("Np", "p", "q")] == [str(NP), str(settings.p), str(settings.q)]
-        assert float(entries["judged.rms_h"] or "nan") == results["judged"]["rms_h"]
-        assert entries["judged.best"] == results["judged"]["best"]
-    assert sha256_of(tmp_path / "gone.csv") == "unknown"
 
 
 @pytest.mark.slow

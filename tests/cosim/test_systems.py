@@ -7,7 +7,6 @@ import subprocess
 import sys
 import zipfile
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -78,18 +77,6 @@ def test_the_structure_is_that_of_the_fmus(archive: Path, tmp_path: Path) -> Non
             assert value.get("unit") == variables[name].unit
 
 
-def test_the_picture_is_tidy(archive: Path) -> None:
-    """Components stand side by side, and wires meet no component."""
-    root = etree.fromstring(content(archive)["SystemStructure.ssd"])
-    boxes = [[float(box.get(key)) for key in ("x1", "x2", "y1", "y2")] for box in root.iter(f"{SSD}ElementGeometry")]
-    assert all(left[1] < right[0] for left, right in pairwise(boxes))
-    wires = list(root.iter(f"{SSD}ConnectionGeometry"))
-    assert len(wires) == 3
-    for wire in wires:
-        for x, y in zip(map(float, wire.get("pointsX").split()), map(float, wire.get("pointsY").split()), strict=True):
-            assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
-
-
 @pytest.mark.parametrize("compensate", [None, "hybrid"])
 def test_every_fmu_starts_where_the_trajectory_does(tmp_path: Path, compensate: str | None) -> None:
     """Its start values alone do, in a tool that carries nothing before the first step."""
@@ -137,9 +124,7 @@ def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
     tags = [element.tag.removeprefix(SSD) for element in system]
     assert tags == ["Elements", "Connections", "Annotations"]
     for component in system.iter(f"{SSD}Component"):
-        assert {part.tag.removeprefix(SSD) for part in component} == {
-            *("Connectors", "ElementGeometry", "ParameterBindings")
-        }
+        assert {part.tag.removeprefix(SSD) for part in component} == {"Connectors", "ParameterBindings"}
     for annotated, told in ((system, "FixedStepMaster"), (experiment, None)):
         (information,) = annotated.find(f"{SSD}Annotations").iter(f"{OMS}SimulationInformation")
         assert [child.tag.removeprefix(OMS) for child in information] == ([told] if told else [])

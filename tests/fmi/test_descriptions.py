@@ -19,7 +19,7 @@ from hybridsep.base.files import data_folder
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.description import TERMINALS
-from hybridsep.fmi.extras import RELATED_FOLDER
+from hybridsep.fmi.reference import REFERENCE_FOLDER
 from hybridsep.fmi.spec import fmu_names, table_of
 from hybridsep.machines.machine import Machine, load_machine
 
@@ -209,7 +209,7 @@ def test_a_trajectory_declares_what_it_plays(tmp_path: Path, samples: list[float
     assert (trajectory.min, trajectory.max) == ("0", str(played - 1))
     with zipfile.ZipFile(path) as archive:
         page = archive.read("documentation/index.html").decode()
-        rows = archive.read(f"{RELATED_FOLDER}/{name}_ref.csv").decode().splitlines()
+        rows = archive.read(f"{REFERENCE_FOLDER}/{name}_ref.csv").decode().splitlines()
     assert f"<td>0 … {played - 1}</td>" in page
     assert ("samples with which" in page) == (samples is not None)
     for number in range(5):

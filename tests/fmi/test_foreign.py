@@ -1,6 +1,6 @@
 """Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed; of nights and releases.
 
-Each FMU's reference experiment is played by tests/c/host.c; FMUs and host are compiled by the ``ziglang`` wheel.
+Each FMU's reference run is played by tests/c/host.c; FMUs and host are compiled by the ``ziglang`` wheel.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from places import ROOT
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.signals import Array
 from hybridsep.fmi.compile import TARGETS
-from hybridsep.fmi.extras import RELATED_FOLDER
+from hybridsep.fmi.reference import REFERENCE_FOLDER
 
 pytestmark = [pytest.mark.nightly, pytest.mark.release]
 
@@ -42,7 +42,7 @@ TOLERANCE = 1e-12  # m
 
 @pytest.fixture(scope="module")
 def play(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, str], Array]]:
-    """Return a function that gives the outputs of an FMU's reference experiment on a target, (n, n_outputs)."""
+    """Return a function that gives the outputs of an FMU's reference run on a target, (n, n_outputs)."""
     out, machine = tmp_path_factory.mktemp("foreign"), load_machine("spring_mass_damper")
     wine = os.environ | {"WINEPREFIX": str(out / "wine"), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
     for model in MODELS:
@@ -65,7 +65,7 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, st
             ]
             for causality in ("input", "output")
         }
-        given, signals = folder / RELATED_FOLDER / f"{model}_in.csv", folder / "signals.bin"
+        given, signals = folder / REFERENCE_FOLDER / f"{model}_in.csv", folder / "signals.bin"
         rows = np.loadtxt(given, delimiter=",", skiprows=1)[:, 1:] if given.exists() else np.zeros((600, 1))
         rows.astype("<f8").tofile(signals)
         uri = f"file:///{absolute}{folder / 'resources'}".replace("////", "///")
