@@ -63,7 +63,7 @@ class ReleaseHook(BuildHookInterface[Any]):
             with self._lively(f"libraries of the native FMUs for {', '.join(targets) or 'no platform'}"):
                 paths = library_paths(
                     [(kind, target) for target in targets for kind in KINDS],
-                    lambda library: self.app.display_info(f"{library[0]} for {library[1]}"),
+                    lambda library, _done: self.app.display_info(f"{library[0]} for {library[1]}"),
                 )
         except Exception as error:  # whatever it is, the library without them is better than none
             self.app.display_warning(f"no libraries of the native FMUs, whose Python flavour remains: {error}")

@@ -68,7 +68,7 @@ def build(
     The same machine gives the same bytes.
     """
     from ..fmi.archive import build_fmu
-    from ..fmi.compile import default_targets, expanded, library_paths, missing
+    from ..fmi.compile import default_targets, expanded, library_paths
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..fmi.spec import table_of
     from ..machines.machine import load_machine, machine_path
@@ -101,15 +101,13 @@ def build(
         if flavour == "native":
             kinds = dict.fromkeys(table_of(axis, model, name).kind for name, model in models.items())
             needed = [(kind, one) for one in expanded(target or default_targets()) for kind in kinds]
-            made = iter(range(1, (n := len(missing(needed))) + 1))
-            advance(f"compile {n} libraries", 0.0)
-            library_paths(needed, lambda one: advance(f"compiled {one[0]} for {one[1]}", next(made) / n))
+            library_paths(needed, lambda one, done: advance(f"compiled {one[0]} for {one[1]}", done))
         for i, (name, model) in enumerate(models.items()):
             advance(name, i / len(models))
             given = {"targets": target or None, "fmi": fmi, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
         if controller is not None:
-            paths.append(write_configuration(out, paths))
+            paths.append(write_configuration(out, fmi))
         advance("done", 1.0)
     print_built(paths)
 

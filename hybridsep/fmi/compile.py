@@ -20,7 +20,7 @@ import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -44,7 +44,6 @@ __all__ = [
     "Library",
     "check_available",
     "chosen_targets",
-    "compiled",
     "compiler_for",
     "default_targets",
     "expanded",
@@ -53,7 +52,6 @@ __all__ = [
     "kept",
     "libraries",
     "library_paths",
-    "missing",
     "placed",
     "ready_targets",
     "universal",
@@ -115,6 +113,10 @@ _FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
 
 TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)
 """Allowed targets."""
+
+
+Library = tuple[str, str]
+"""A kind and a platform, a key of :data:`TARGETS`."""
 
 
 @dataclass(frozen=True)
@@ -203,89 +205,38 @@ def compiler_for(target: str) -> Compiler:
     raise FmuError("no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang")
 
 
-def compiled(
-    jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
-) -> Iterator[tuple[tuple[str, str], bytes]]:
-    """Compile and link ``all.c`` into stripped shared libraries, as many at a time as there are processors.
-
-    Parameters
-    ----------
-    jobs : mapping
-        (name of the library, key of :data:`TARGETS`) → its compiler, and its sources by file name.
-
-    Yields
-    ------
-    (tuple, bytes)
-        Each key and its library, in their order.
-
-    Raises
-    ------
-    FmuError
-        If a compiler refuses.
-    """
-    with TemporaryDirectory() as place, ThreadPoolExecutor(os.cpu_count()) as pool:
-
-        def compile_one(name: str, target: str) -> bytes:
-            compiler, sources = jobs[name, target]
-            folder = Path(place) / name / target
-            with named_errors(folder):
-                folder.mkdir(parents=True)
-                for file, text in sources.items():
-                    (folder / file).write_bytes(text)
-            # dladdr is no part of POSIX
-            flags = [*FLAGS, "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
-            output = f"{name}{TARGETS[target].suffix}"
-            command = [*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags]
-            done = subprocess.run(
-                command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace", check=False
-            )
-            if done.returncode != 0:
-                said = f"{' '.join(command)}\n{done.stderr.strip()}"
-                raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
-            return (folder / output).read_bytes()
-
-        running = {key: pool.submit(compile_one, *key) for key in jobs}
-        try:
-            for key, future in running.items():
-                yield key, future.result()
-        finally:  # after a failure or Ctrl-C no other one begins
-            pool.shutdown(cancel_futures=True)
+def _compiled(folder: Path, library: Library, compiler: Compiler) -> bytes:
+    """Return the stripped shared library of ``all.c``, compiled and linked in a folder; FmuError if it is refused."""
+    (kind, target), folder = library, folder.joinpath(*library)
+    with named_errors(folder):
+        folder.mkdir(parents=True)
+        for file, text in _sources(kind).items():
+            (folder / file).write_bytes(text)
+    # dladdr is no part of POSIX
+    flags = [*FLAGS, "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
+    output = f"{kind}{TARGETS[target].suffix}"
+    command = [*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags]
+    done = subprocess.run(
+        command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace", check=False
+    )
+    if done.returncode != 0:
+        said = f"{' '.join(command)}\n{done.stderr.strip()}"
+        raise FmuError(f"{kind} cannot be compiled for {TARGETS[target].triple}: {said}")
+    return (folder / output).read_bytes()
 
 
 _UNIVERSAL = 0xCAFEBABE
-_MACHO_64 = 0xFEEDFACF
 _ALIGNMENT = 14  # 16 KiB, the page of Apple's ARM processors; x86 has 4 KiB
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:
-    """Return the universal file of some 64-bit Mach-O libraries.
-
-    Parameters
-    ----------
-    libraries : sequence of bytes
-        One for each processor.
-
-    Raises
-    ------
-    FmuError
-        If one is no 64-bit Mach-O file, or two are for the same processor.
-    """
-    processors = []
-    for library in libraries:
-        magic, cpu, subtype = struct.unpack_from("<3I", library.ljust(12, b"\0"))
-        if magic != _MACHO_64:
-            raise FmuError(
-                f"a universal file is made of 64-bit Mach-O libraries, got one that begins with {library[:4]!r}"
-            )
-        processors.append((cpu, subtype))
-    if len(set(processors)) < len(processors):
-        raise FmuError(f"a universal file has one library for each processor, got {processors}")
+    """Return the universal file of 64-bit Mach-O libraries, one for each processor."""
     page = 1 << _ALIGNMENT
     header = struct.pack(">2I", _UNIVERSAL, len(libraries))
     body = b""
-    for library, (cpu, subtype) in zip(libraries, processors, strict=True):
-        offset = page + len(body)
-        header += struct.pack(">5I", cpu, subtype, offset, len(library), _ALIGNMENT)
+    for library in libraries:
+        _, cpu, subtype = struct.unpack_from("<3I", library)
+        header += struct.pack(">5I", cpu, subtype, page + len(body), len(library), _ALIGNMENT)
         body += library.ljust(-(-len(library) // page) * page, b"\0")
     return header.ljust(page, b"\0") + body
 
@@ -293,9 +244,6 @@ def universal(libraries: Sequence[bytes]) -> bytes:
 _SHIPPED = Path(__file__).resolve().parents[1] / "_data" / "binaries"
 _KEPT_VERSIONS = 4
 """Versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each."""
-
-Library = tuple[str, str]
-"""A kind and a platform, a key of :data:`hybridsep.fmi.compile.TARGETS`."""
 
 
 def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
@@ -318,38 +266,42 @@ def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
 
 
 def library_paths(
-    wanted: Sequence[Library], on_library: Callable[[Library], object] = lambda _wanted: None
+    wanted: Iterable[Library], on_library: Callable[[Library, float], object] = lambda _library, _done: None
 ) -> dict[Library, Path]:
-    """Return the files of libraries; missing ones are compiled, and each is kept as soon as it is there.
+    """Return the files of libraries; missing ones are compiled, as many at a time as there are processors.
 
     Parameters
     ----------
-    wanted : sequence of pairs
+    wanted : iterable of pairs
     on_library : callable, optional
-        Called with each library that had to be compiled, when it is there.
+        Called with each library that had to be compiled, when it is there and kept, and with the fraction done.
 
     Raises
     ------
     FmuError
         As :func:`libraries`.
     """
-    compilers = {target: compiler_for(target) for _, target in missing(wanted)}
-    jobs = {(kind, target): (compilers[target], _sources(kind)) for kind, target in missing(wanted)}
-
-    for library, content in compiled(jobs):
-        place = _place(compilers[library[1]].name, library)
-        with written_whole(place) as file:
-            file.write(content)
-        on_library(library)
-    if jobs:
+    paths = {library: kept(library) for library in wanted}
+    compilers = {library: compiler_for(library[1]) for library, path in paths.items() if path is None}
+    paths |= {library: _place(compiler.name, library) for library, compiler in compilers.items()}
+    places = {library: path for library, path in paths.items() if path is not None}
+    with TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as pool:
+        running = {
+            library: pool.submit(_compiled, Path(folder), library, compiler)
+            for library, compiler in compilers.items()
+            if not places[library].is_file()
+        }
+        try:
+            for i, (library, compiled) in enumerate(running.items(), start=1):
+                content = compiled.result()
+                with written_whole(places[library]) as file:
+                    file.write(content)
+                on_library(library, i / len(running))
+        finally:  # after a failure or Ctrl-C no other one begins
+            pool.shutdown(cancel_futures=True)
+    if running:
         _forget_old_versions()
-    return {library: kept(library) or _place(compiler_for(library[1]).name, library) for library in wanted}
-
-
-def missing(wanted: Iterable[Library]) -> list[Library]:
-    """Return the libraries that have to be compiled; FmuError where no compiler is there for one."""
-    absent = [library for library in wanted if kept(library) is None]
-    return [one for one in absent if not _place(compiler_for(one[1]).name, one).is_file()]
+    return places
 
 
 def kept(library: Library) -> Path | None:

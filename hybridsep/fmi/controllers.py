@@ -14,14 +14,13 @@ there stands in an XML file of the form of its ``CustomFMU.xml``, which it finds
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree
-from zipfile import ZipFile
 
 from ..base.errors import ParameterError
-from ..base.files import data_folder, written_whole
+from ..base.files import data_folder, written_text
 from ..base.version import __version__
 from ..machines.machine import Machine, check_drive_limits
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
@@ -134,38 +133,22 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
         if name in numbers
     ]
     modes = [f"    {{{mode.f_n!r}, {mode.zeta!r}, {mode.alpha!r}, {mode.beta!r}}}," for mode in machine.model.modes]
-    kind, name, guard = "compensator" if compensates else "predictor", machine.name, f"HSEP_AXIS_{machine.name}_H"
-    lines = [
-        f"/* Axis of hybridsep {__version__}: {name}, its {kind}, for hsep.h.",
-        " *",
-        " *     hsep_parameters parameters;",
-        f" *     {name}_parameters(&parameters);",
-        f" *     hsep_{kind}_init(block, &parameters, start, {name}_weights, {name}_weights_size);",
-        " */",
-        f"#ifndef {guard}",
-        f"#define {guard}",
-        "",
-        '#include "hsep.h"',
-        "",
-        "/* f_n, Hz; zeta; alpha, 1/s^2; beta, 1/s */",
-        f"static const hsep_mode {name}_modes[] = {{",
-        *modes,
-        "};",
-        "",
-        *_weights(name, trained),
-        "",
-        "/* Fill in its settings and modes. */",
-        f"static inline void {name}_parameters(hsep_parameters *parameters)",
-        "{",
-        "    hsep_defaults(parameters);",
-        *settings,
-        f"    parameters->n_modes = {len(modes)};",
-        f"    parameters->modes = {name}_modes;",
-        "}",
-        "",
-        "#endif",
-    ]
-    return "".join(f"{line}\n" for line in lines)
+    name = machine.name
+    return _filled(
+        "axis.h",
+        version=__version__,
+        name=name,
+        kind="compensator" if compensates else "predictor",
+        modes="\n".join(modes),
+        weights="\n".join(_weights(name, trained)),
+        settings="\n".join(settings),
+        n_modes=len(modes),
+    )
+
+
+def _filled(template: str, **values: object) -> str:
+    text = (Path(__file__).parent / "templates" / template).read_text(encoding="utf-8")
+    return Template(text).substitute(values)
 
 
 def _weights(name: str, trained: HybridPredictor | None) -> list[str]:
@@ -195,46 +178,14 @@ CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"
 DEFINITIONS = ("HSEP_NO_FILES", "HSEP_NO_STDIO")
 """Macros of the compilation: the runtime opens no files, and has printf in part only."""
 
-_ALL = "all.c"
 
+def write_configuration(out: Path, fmi: str) -> Path:
+    """Write the configuration for native FMUs of a version of FMI beside them, into a folder; return its path.
 
-def write_configuration(out: Path, archives: Iterable[Path]) -> Path:
-    """Write the configuration for some archives beside them; return its path.
-
-    Parameters
-    ----------
-    out : Path
-        Folder; exists.
-    archives : iterable of Path
-        Native FMUs. ``all.c`` includes all their other sources, which are excluded from the build one by one.
+    ``all.c`` includes all their other sources, which are excluded from the build one by one.
     """
-    path = out / CONFIGURATION_FILE
-    with written_whole(path) as file:
-        file.write(_configuration(_included_sources(archives)))
-    return path
-
-
-def _included_sources(archives: Iterable[Path]) -> list[str]:
-    names: set[str] = set()
-    for archive in archives:
-        with ZipFile(archive) as opened:
-            names |= {name.removeprefix("sources/") for name in opened.namelist() if name.startswith("sources/")}
-    return sorted(name for name in names if name.endswith(".c") and name != _ALL)
-
-
-def _configuration(excluded: Iterable[str]) -> bytes:
-    root = ElementTree.Element("CustomConfigurations")
-    root.set("xmlns:xsi", "http://www.w3.org/2001/XMLSchema-instance")
-    root.set("xsi:noNamespaceSchemaLocation", "CustomFmu.xsd")
-    tool = ElementTree.SubElement(root, "FmuConfiguration")
-    for name, text in (
-        ("ToolName", f"hybridsep {__version__}"),  # the generationTool of modelDescription.xml
-        ("AdditionalInclude", "$(ProjectDir);$(ProjectDir)sources;"),
-        ("PreprocessorDefinitions", ";".join(DEFINITIONS)),
-        ("ExcludedFromBuild", ";".join(excluded)),
-        ("CodeReplacements", ""),
-    ):
-        ElementTree.SubElement(tool, name).text = text
-    ElementTree.indent(root)
-    content: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-    return content
+    excluded = sorted(name for name in c_sources((fmi,)) if name.endswith(".c") and name != "all.c")
+    values = {"definitions": ";".join(DEFINITIONS), "excluded": ";".join(excluded)}
+    with written_text(out / CONFIGURATION_FILE) as file:  # the tool is the generationTool of modelDescription.xml
+        file.write(_filled("CustomFMU.xml", tool=f"hybridsep {__version__}", **values))
+    return out / CONFIGURATION_FILE

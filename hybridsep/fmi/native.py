@@ -27,7 +27,6 @@ from .description import (
     ICON_FILE,
     TERMINALS_FILE,
     build_description,
-    fmi3_description,
     model_description,
     terminals_and_icons,
 )
@@ -97,11 +96,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
-    tool = f"hybridsep {__version__}"
-    if fmi == "3":
-        content["modelDescription.xml"] = fmi3_description(spec, guid, tool)
-    else:
-        content["modelDescription.xml"] = model_description(spec, guid, tool)
+    content["modelDescription.xml"] = model_description(spec, guid, f"hybridsep {__version__}")
     content |= reference
     compiled = libraries(table.kind, targets or default_targets())
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from pathlib import Path
 from string import Template
 
-from .description import fmi3_variables
+from .description import described_variables
 from .reference import AGREEMENT
 from .spec import FmuSpec
 from .variables import Variable
@@ -67,7 +68,10 @@ def documentation(
         Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
     """
     model, name = spec.table.model, spec.table.name
-    table = spec.table.shown if spec.fmi == "2" else [each.shown for each in fmi3_variables(spec.table)]
+    table = [
+        one if size is None else replace(one, kind=f"{one.kind}[{size}]")
+        for one, size in described_variables(spec.table, spec.fmi)
+    ]
     rows = "\n".join(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()

@@ -21,7 +21,7 @@ from ..base.version import __version__
 from ..fmi import native
 from ..machines.machine import Machine
 from .archive import archived
-from .description import fmi3_variables, unit_elements
+from .description import described_variables, document, unit_elements
 from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
@@ -155,9 +155,7 @@ def _add(parent: ET.Element, name: str, /, **attributes: object) -> ET.Element:
 def _document(root: ET.Element) -> bytes:
     for child in [child for child in root if not len(child) and not child.attrib]:
         root.remove(child)
-    ET.indent(root)
-    document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return document + b"\n"
+    return document(root)
 
 
 def _unit(variable: Variable) -> dict[str, str]:
@@ -258,7 +256,8 @@ def build_system(
         spec = FmuSpec.of(machine, kind, fmi=fmi, samples=played, trained=trained, windows=False, rest=rest)
         name = spec.table.name
         content[f"resources/{name}.fmu"] = archived(native.files(spec, targets=targets))
-        components.append(Component(part, f"{name}.fmu", _variables(spec)))
+        scalars = [variable for variable, size in described_variables(spec.table, spec.fmi) if size is None]
+        components.append(Component(part, f"{name}.fmu", tuple(scalars)))
         sets[part] = f"{machine.name}_{part}.ssv"
         content[f"resources/{sets[part]}"] = _parameter_set(components[-1], ssp)
     connections: list[Connection] = [
@@ -274,10 +273,3 @@ def build_system(
         file.write(archived({"SystemStructure.ssd": structure, **content}))
     progress("done", 1.0)
     return Path(path)
-
-
-def _variables(spec: FmuSpec) -> tuple[Variable, ...]:
-    """Return an FMU's variables, of FMI 3.0 the scalar ones."""
-    if spec.fmi == FMI_VERSIONS[0]:
-        return spec.table.shown
-    return tuple(each.variable for each in fmi3_variables(spec.table) if each.size is None)

@@ -45,7 +45,6 @@ AVERAGING_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name i
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_parameters()
 """Parameters of a SepCompensator besides its predictor's."""
 
-_HOLD = "running RMS of hold since t_init: x_pb plus the last residual measured before the window"
 _REJECTED = "measurements that were missing or not plausible, with averaging; counted window by window"
 _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
@@ -133,6 +132,16 @@ def _position(name: str, causality: str, description: str, *, display_unit: str 
     return Variable(name, "Real", causality, description=description, **more)
 
 
+_RUNNING_ERRORS = [
+    _position(name, "output", f"running RMS of {what}", display_unit="um")
+    for name, what in (
+        ("rms_pb", "x_meas - x_pb since t_init"),
+        ("rms_h", "x_meas - x_h since t_init"),
+        ("rms_hold", "hold since t_init: x_pb plus the last residual measured before the window"),
+    )
+]
+
+
 def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | None = None) -> Variable:
     return Variable(
         label or parameter.name,
@@ -193,15 +202,7 @@ def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
 
 
 def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of the HybridPredictor.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Start values of ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``t_init``, ``input_hold``, ``dead_time``.
-    modes : sequence of mappings
-        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
-    """
+    """Return the table of the HybridPredictor."""
     ahead = ("x_d_ahead",)
     window = range(1, int(parameters["Np"]) + 1)
     table = [
@@ -215,9 +216,7 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
         _position("x_h_std", "output", "standard deviation of x_meas - x_h, now; 0: not known", display_unit="um"),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
-        _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
-        _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
-        _position("rms_hold", "output", _HOLD, display_unit="um"),
+        *_RUNNING_ERRORS,
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
     ]
@@ -235,16 +234,7 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
 
 
 def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of the SepCompensator.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Start values of the predictor's parameters and of ``preview``, ``spacing``, ``jerk_weight``, ``v_max``,
-        ``a_max``, ``j_max``, ``change_max``, ``following_error_max``, ``compensate``, ``measurement_timeout``.
-    modes : sequence of mappings
-        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
-    """
+    """Return the table of the SepCompensator."""
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
     model = ("t_init", "compensate", "averaging")
@@ -287,9 +277,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
             item_meanings=(*_COMPENSATE.meanings, "none: the change of the command fades until a reset"),
         ),
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
-        _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
-        _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
-        _position("rms_hold", "output", _HOLD, display_unit="um"),
+        *_RUNNING_ERRORS,
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
         Variable("no_measurement", "Boolean", "output", "discrete", _NO_MEASUREMENT),
@@ -301,16 +289,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
 
 
 def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of a FeedDrive: with ``modes`` of the stage, without of eq. (13).
-
-    Parameters
-    ----------
-    parameters : mapping
-        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``,
-        ``v_friction``, ``T_s``, ``dead_time``, ``input_hold``; and of ``noise_std`` and ``seed``.
-    modes : sequence of mappings
-        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode.
-    """
+    """Return the table of a FeedDrive: with ``modes`` of the stage, without of eq. (13)."""
     velocity = Variable(
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
@@ -337,15 +316,7 @@ def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[st
 
 
 def _trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of the ReferenceTrajectory, which has no modes.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Start values of ``trajectory`` and ``T_s``.
-    modes : sequence of mappings
-        Empty.
-    """
+    """Return the table of the ReferenceTrajectory, which has no modes."""
     meaning = "commanded position at t; wire it to x_d_ahead"
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
@@ -360,7 +331,7 @@ _MODELS: Mapping[str, Callable[[Mapping[str, Value], Sequence[Mapping[str, float
     "FeedDrive": _plant_variables,
     "ReferenceTrajectory": _trajectory_variables,
 }
-"""The table of each model, from its parameters' start values and its modes."""
+"""The table of each model, from its parameters' start values and its modes (``f_n``, ``zeta``, ``alpha``, ``beta``)."""
 
 INTERPOLATED: dict[str, tuple[str, ...]] = {
     "HybridPredictor": ("x_d_ahead", "x_meas"),
@@ -432,17 +403,10 @@ class FmuTable:
 
     def as_json(self) -> dict[str, object]:
         """Return plain values; unit, windows and rest where they are not the usual ones."""
-        content: dict[str, object] = {
-            "model": self.model,
-            "name": self.name,
-            "parameters": dict(self.parameters),
-            "modes": list(self.modes),
-        }
-        if not self.windows:
-            content["windows"] = False
-        if self.rest != 0.0:
-            content["rest"] = self.rest
-        return {**content, "unit": self.unit} if self.is_angular else content
+        content = {"model": self.model, "name": self.name, "parameters": dict(self.parameters)}
+        usual = {"unit": "m", "windows": True, "rest": 0.0}
+        more = {name: own for name, one in usual.items() if (own := getattr(self, name)) != one}
+        return {**content, "modes": list(self.modes), **more}
 
     @property
     def kind(self) -> str:

@@ -238,10 +238,6 @@ def test_universal_files() -> None:
     parts = [struct.unpack_from(">5I", joined, 8 + 20 * i) for i in range(count)]
     assert [joined[offset : offset + size] for _, _, offset, size, _ in parts] == [intel, arm]
     assert all(offset % (1 << power) == 0 for _, _, offset, _, power in parts)
-    with pytest.raises(FmuError, match="one library for each processor"):
-        universal([intel, intel])
-    with pytest.raises(FmuError, match="64-bit Mach-O"):
-        universal([b"MZ"])
 
 
 @pytest.mark.slow

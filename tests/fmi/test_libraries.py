@@ -129,10 +129,10 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
     monkeypatch.setattr(module, "compiler_for", lambda target: compiler)
     wanted = [(kind, target) for target in ALL_TARGETS[:3] for kind in ("FeedDrive", "StageDrive")]
     began: list[tuple[str, str]] = []
-    paths = library_paths(wanted, began.append)
+    paths = library_paths(wanted, lambda library, _done: began.append(library))
     assert began == [library for library in wanted if library not in [("FeedDrive", t) for t in ALL_TARGETS[:2]]]
     assert all(path.is_relative_to(without / "kept") for library, path in paths.items() if library in began)
-    assert library_paths(wanted, began.append) == paths
+    assert library_paths(wanted, lambda library, _done: began.append(library)) == paths
     assert len(began) == 4
 
 
@@ -142,7 +142,7 @@ def test_a_library_is_kept_where_a_later_one_is_interrupted(without: Path, monke
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     wanted = [("FeedDrive", target) for target in ALL_TARGETS[:3]]
 
-    def interrupt_at_the_second(library: tuple[str, str]) -> None:
+    def interrupt_at_the_second(library: tuple[str, str], _done: float) -> None:
         if library == wanted[1]:
             raise KeyboardInterrupt
 
