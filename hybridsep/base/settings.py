@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+from dataclasses import MISSING, Field, asdict, dataclass, fields, replace
+from functools import cache
 from typing import Any, ClassVar, TypeVar
 
 from .errors import ParameterError, brief
@@ -39,7 +40,7 @@ _SettingsType = TypeVar("_SettingsType", bound="Settings")
 
 @dataclass(frozen=True)
 class Settings:
-    """Group of parameters, validated on construction.
+    """Group of parameters, validated on construction; what is declared of each ends the docstring of its class.
 
     Raises
     ------
@@ -52,6 +53,11 @@ class Settings:
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ()
     """Fields that are no entries of these settings' own section of a machine file."""
+
+    def __init_subclass__(cls) -> None:
+        declared = {name: one.metadata["parameter"] for name, one in vars(cls).items() if isinstance(one, Field)}
+        lines = [f"{name} : {one.kind.__name__}\n        {one.help}." for name, one in declared.items()]
+        cls.__doc__ = "\n    ".join([f"{(cls.__doc__ or '').rstrip()}\n\n    Attributes", "----------", *lines])
 
     def __post_init__(self) -> None:
         problems = []
@@ -68,15 +74,11 @@ class Settings:
             raise ParameterError("; ".join(problems))
 
     @classmethod
+    @cache  # every settings object asks for them when it is checked
     def parameters(cls) -> dict[str, Parameter]:
         """Return the parameters by the names of their fields."""
-        if cls not in _DECLARED:
-            _DECLARED[cls] = {
-                field.name: replace(field.metadata["parameter"], name=field.metadata["parameter"].name or field.name)
-                for field in fields(cls)
-                if "parameter" in field.metadata
-            }
-        return dict(_DECLARED[cls])
+        declared = {one.name: one.metadata["parameter"] for one in fields(cls) if "parameter" in one.metadata}
+        return {name: replace(one, name=one.name or name) for name, one in declared.items()}
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
@@ -140,45 +142,14 @@ class Settings:
         return None
 
 
-_DECLARED: dict[type[Settings], dict[str, Parameter]] = {}
-"""What :meth:`Settings.parameters` has made: every settings object asks for them when it is checked."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class PredictorSettings(Settings):
     """Parameters of the hybrid predictor, eqs. (3) to (6).
 
-    Attributes
-    ----------
-    Np : int
-        Samples in a look-ahead window.
-    p, q : int
-        Lags of ``e_pb`` and of ``x_pb`` in φ, ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``.
-    lam : float
-        λ of eq. (6), m²; ``lambda`` in FMUs and machine files.
-    T_s : float
-        Sampling interval, s.
-    t_init : float
-        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published. −1: automatic, :attr:`warm_up`.
-    input_hold : {"zoh", "foh"}
-        Zero-order or first-order hold of ``x_d`` in the physics model.
-    averaging : bool
-        Whether the residual model is :class:`~hybridsep.predict.averaging.model.AveragedModel`; else it is the paper's.
-    effect, noise_std : float
-        With averaging: prior standard deviation of the effect of a feature, and standard deviation of the measurement
-        noise, m; 0: from the residuals.
-    forgetting : float
-        With averaging: time constant with which samples lose their weight, s; 0: never.
-    period : float
-        With averaging: period of a disturbance that repeats with the position, m, as of cogging or a screw's pitch; 0:
-        none.
-    recall : int
-        With averaging: samples of the commands and residuals that are remembered, so that a motion that repeats is
-        predicted by what was measured then; 0: none.
-    measurement_delay : int
-        Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
-        A compensator's predictor needs averaging for it. −1: it comes a sample early, as under a sequential
-        co-simulation master, and is held for one sample.
+    ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``; ``lam`` is λ of eq. (6), ``lambda`` in FMUs and machine files. With ``averaging``
+    the residual model is :class:`~hybridsep.predict.averaging.model.AveragedModel`, else the paper's. What arrives
+    at ``k`` is ``x(k − measurement_delay)``: a compensator's predictor needs averaging for it, and a position that
+    comes early, −1, is held for one sample.
     """
 
     AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period", "recall")
@@ -297,13 +268,7 @@ class PredictorSettings(Settings):
 
 @dataclass(frozen=True)
 class Limits(Settings):
-    """Kinematic limits.
-
-    Attributes
-    ----------
-    velocity, acceleration, jerk : float
-        m/s, m/s² and m/s³; ``v_max``, ``a_max`` and ``j_max`` in FMUs.
-    """
+    """Kinematic limits; ``v_max``, ``a_max`` and ``j_max`` in FMUs."""
 
     velocity: float = real(
         *(0.1, 1e-9, 1e4, "m/s", "largest velocity of the modified command"),
@@ -327,30 +292,12 @@ class Limits(Settings):
 class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 
-    Attributes
-    ----------
-    preview : int, optional
-        Samples planned ahead, at least ``Np + 4·spacing + 3``; ``2·Np`` or 200, whichever is more, if left out.
-    spacing : int, optional
-        Samples between knots, a divisor of ``Np``: it sets the bandwidth of the change of the command.
-    jerk_weight : float
-        Weight of the sum of squares of the change's third differences, relative to the sum of squares of the tracking
-        error.
-    limits : Limits, optional
-        The drive's limits, which the differences of ``x_dm`` keep; none if left out.
-    change_max : float, optional
-        Bound on the magnitude of the change, m; none if None. About twice the servo error without compensation: hybrid
-        plans that ask for far more end for the run (:func:`~hybridsep.compensate.newton.runs_away`).
-    following_error_max : float
-        Measured following error above which, for three samples in a row, the compensator trips, m; 0: none. About 1.3
-        times the largest one without compensation (:class:`~hybridsep.online.monitor.Monitor`).
-    no_reversal : bool
-        Whether the velocity of ``x_dm`` keeps the sign of the velocity of ``x_d``: where it turns, friction changes its
-        sign. It has no effect without ``limits``. Plans of a model with ``averaging`` follow the friction and may turn.
-    compensate : {"off", "physics", "hybrid"}
-        Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
-    measurement_timeout : float
-        Time without a measurement after which the change of the command fades, until one comes again, s; 0: never.
+    ``preview`` is ``2·Np`` or 200, whichever is more, if left out, and ``spacing`` 2, or 1 where that does not divide
+    ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; ``no_reversal`` has no effect
+    without them, and plans of a model with ``averaging`` follow the friction and may turn. ``change_max``, None for no
+    bound, is about twice the servo error without compensation: hybrid plans that ask for far more end for the run
+    (:func:`~hybridsep.compensate.newton.runs_away`); ``following_error_max`` about 1.3 times the largest one
+    (:class:`~hybridsep.online.monitor.Monitor`).
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")

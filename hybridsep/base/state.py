@@ -22,7 +22,6 @@ from .errors import ParameterError, SignalError, StateError
 from .signals import PREDICTION_MAX, Array
 
 __all__ = [
-    "COUNT_MAX",
     "FIXED",
     "VERSION",
     "Leaf",
@@ -42,8 +41,6 @@ MAGIC = b"HSEP"
 VERSION = 1
 _PREFIX = struct.Struct("<4sII")
 _CRC = struct.Struct("<I")
-_LENGTH_MAX = 2**31 - 1
-"""Largest dimension of an array, so that the product with a zero dimension stays a valid shape."""
 
 
 def pack(
@@ -78,48 +75,34 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
         raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
         raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
-    body = _PREFIX.size + length
+    body = memoryview(blob)[_PREFIX.size + length : -_CRC.size]
+    arrays: dict[str, Array] = {}
+    parts: dict[str, bytes] = {}
+    offset = 0
     try:
-        header = json.loads(blob[_PREFIX.size : body])
+        header = json.loads(blob[_PREFIX.size : _PREFIX.size + length])
         found, meta = header["kind"], header["meta"]
-        if type(meta) is not dict:
-            raise TypeError("meta must be a table")
-        arrays, parts = _cut(memoryview(blob)[body : -_CRC.size], header)
-    except RecursionError:
-        raise StateError("the saved state has a header that cannot be read: it is nested too deeply") from None
-    except (KeyError, TypeError, ValueError) as error:
+        if type(meta) is not dict or min((n for _, shape in header["arrays"] for n in shape), default=0) < 0:
+            raise TypeError("meta must be a table, and no length below 0")
+        for name, shape in header["arrays"]:
+            count = math.prod(shape)
+            arrays[str(name)] = np.frombuffer(body, "<f8", count, offset).reshape(shape).astype(np.float64)
+            offset += 8 * count
+        for name, count in header["parts"]:
+            parts[str(name)] = bytes(body[offset : offset + count])
+            offset += count
+        if offset != len(body):
+            raise ValueError(f"{len(body) - offset} bytes are left over")
+    except (ArithmeticError, KeyError, RecursionError, TypeError, ValueError) as error:
         raise StateError(f"the saved state has a header that cannot be read: {error}") from error
     if found != kind:
         raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {found!r:.40}")
     return meta, arrays, parts
 
 
-def _cut(body: memoryview, header: Any) -> tuple[dict[str, Array], dict[str, bytes]]:
-    """Split the body into arrays and parts, with no byte left over; TypeError or ValueError otherwise."""
-    arrays, parts, offset = {}, {}, 0
-    for name, shape in header["arrays"]:
-        lengths = [_length(n, _LENGTH_MAX) for n in shape]
-        count = _length(math.prod(lengths), (len(body) - offset) // 8)
-        arrays[str(name)] = np.frombuffer(body, "<f8", count, offset).reshape(lengths).astype(np.float64)
-        offset += 8 * count
-    for name, count in header["parts"]:
-        end = offset + _length(count, len(body) - offset)
-        parts[str(name)], offset = bytes(body[offset:end]), end
-    if offset != len(body):
-        raise ValueError(f"{len(body) - offset} bytes are left over")
-    return arrays, parts
-
-
-def _length(n: Any, most: int) -> int:
-    """Return a length from a header, validated."""
-    if type(n) is not int or not 0 <= n <= most:
-        raise ValueError(f"a length must be a whole number, 0 … {most}")
-    return n
-
-
 Value = TypeVar("Value")
 
-COUNT_MAX = 2**53
+_COUNT_MAX = 2**53
 """Largest whole number in a state: the last up to which doubles count exactly."""
 
 
@@ -127,17 +110,8 @@ COUNT_MAX = 2**53
 class Saved:
     """Content of a blob, from :func:`hybridsep.base.state.unpack`.
 
-    Every method raises StateError if the field is missing, of another type or out of its range.
-
-    Attributes
-    ----------
-    kind : str
-        For messages.
-    meta : mapping
-        Scalars.
-    arrays : mapping
-    parts : mapping
-        Nested blobs.
+    Every method raises StateError if the field is missing, of another type or out of its range. ``kind`` is for
+    messages, ``meta`` are scalars, ``parts`` nested blobs.
     """
 
     kind: str
@@ -161,7 +135,7 @@ class Saved:
         """Return a scalar of any type, which the caller checks."""
         return self._found(self.meta, name)
 
-    def whole(self, name: str, most: int = COUNT_MAX) -> int:
+    def whole(self, name: str, most: int = _COUNT_MAX) -> int:
         """Return a whole number from 0 to ``most``."""
         value = self.field(name)
         if type(value) is not int or not 0 <= value <= most:
@@ -205,8 +179,8 @@ class Saved:
 
     def numbers(self, name: str, count: int) -> list[float]:
         """Return a list of finite numbers."""
-        values = self.field(name)
-        if type(values) is not list or len(values) != count:
+        values = self._typed(name, list, f"{count} numbers")
+        if len(values) != count:
             raise self.error(f"{name} must be {count} numbers")
         return [Saved(self.kind, {name: value}, {}, {}).real(name) for value in values]
 
@@ -286,11 +260,7 @@ def with_numbers(like: Record, numbers: Array) -> Record:
 def restored(like: Record, saved: Saved) -> Record:
     """Return the record of :func:`arrays_of`.
 
-    Parameters
-    ----------
-    like : dataclass
-        Record with the same shapes; what is fixed is taken from it.
-    saved : Saved
+    ``like`` has the same shapes; what is fixed is taken from it.
 
     Raises
     ------
@@ -308,7 +278,7 @@ def unsound(record: Any) -> str | None:
     """Return what is wrong with the numbers of a record; None if all are in range."""
     for path, value, least, most in leaves(record):
         whole = type(value) is int
-        if value is None or (whole and 0 <= value <= COUNT_MAX):
+        if value is None or (whole and 0 <= value <= _COUNT_MAX):
             continue
         if whole or not (np.greater_equal(value, least) & np.less_equal(value, most)).all():  # NaN too
             return f"{path} must be {'a whole number' if whole else 'finite, and'} within its range"

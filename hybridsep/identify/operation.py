@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import IdentificationError
 from ..base.settings import check
-from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from ..logs.checks import runs_against, starts_in_motion
 from ..logs.units import DisplayUnits, shown_in
 from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
@@ -20,7 +18,7 @@ from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motio
 from .search import fit_near
 from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
-from .uncertainty import delay_finding, estimates
+from .uncertainty import estimates
 
 __all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "TOO_LITTLE", "identify_operation", "unit_gain_model"]
 
@@ -30,17 +28,11 @@ SAMPLES_MIN = 100
 WEAK = 3.0
 """Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
 
-OPPOSED = -0.7
-"""Correlation of commanded and measured motion below which one of them may have the wrong sign."""
-
 LITTLE_MOTION = 0.25
 """Share of samples in motion below which more of it is asked for."""
 
 TOO_LITTLE = "too little motion in"
 """Beginning of the finding that a part of a log tells no dynamics."""
-
-GAIN_RANGE = (0.1, 10.0)
-"""Static gains outside of which a unit is probably wrong."""
 
 Progress = Callable[[str, float], object]
 
@@ -94,8 +86,7 @@ def identify_operation(
         If ``T_s`` is out of its range.
     """
     T_s, shown = check("T_s", T_s), shown or shown_in(unit)
-    given = [(x_d, x) for x_d, x in recordings]
-    segments = as_segments(given)
+    segments = as_segments(recordings)
     if reason := _hindrance(segments):
         raise IdentificationError(f"{part} cannot determine a model, because {reason}")
     structures = [
@@ -109,7 +100,7 @@ def identify_operation(
     fit = fit_near(segments, T_s, chosen.fit)
     findings = []
     if _is_weak(fit, segments, T_s):
-        fit = _at_rest(segments, T_s)
+        fit = fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
         spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
         findings.append(
             f"{TOO_LITTLE} {part} to learn the dynamics from: the commanded position moves by {spread} "
@@ -117,14 +108,10 @@ def identify_operation(
             "taken"
         )
     parameters, n_effective = estimates(fit, segments, T_s, unit)
-    findings += _findings(
-        *(fit, chosen, segments, parameters[0].std, n_effective, shown, part),
-        [np.asarray(x_d, dtype=np.float64) for x_d, _ in given],
-    )
-    findings += delay_finding(fit, segments, T_s)
+    findings += _findings(fit, chosen, segments, parameters[0].std, n_effective, shown, part)
     progress("identified", 1.0)
     return IdentifiedModel(
-        model=_modal(fit, T_s),
+        model=ModalModel(fit.structure.modes(fit.theta, fit.linear, T_s), fit.delay.samples),
         input_hold=fit.delay.input_hold,
         T_s=T_s,
         unit=unit,
@@ -166,16 +153,6 @@ def _hindrance(segments: Sequence[Segment]) -> str:
             f"too many measured positions are missing: {n_fitted} are left in the part that is fitted to, {n_judging} "
             "in the test part"
         )
-    u = np.concatenate([u - u.mean() for u, _ in measured])
-    y = np.concatenate([y - y.mean() for _, y in measured])
-    correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
-    longest = max(segments, key=lambda segment: float(np.ptp(segment.u)))
-    # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
-    if correlation < OPPOSED and runs_against(longest.u, longest.y):
-        return (
-            f"the measured position moves against the commanded one (correlation {correlation:.2f}); reverse the sign "
-            "of one of them"
-        )
     return ""
 
 
@@ -196,15 +173,6 @@ def _spread(segments: Sequence[Segment]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([(s.u - s.u.mean()) ** 2 for s in segments]))))
 
 
-def _at_rest(segments: Sequence[Segment], T_s: float) -> Fit:
-    """Return the gain of 1 without dead time."""
-    return fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
-
-
-def _modal(fit: Fit, T_s: float) -> ModalModel:
-    return ModalModel(fit.structure.modes(fit.theta, fit.linear, T_s), fit.delay.samples)
-
-
 def _alternative(candidate: Candidate, chosen: Candidate) -> Alternative:
     fit, objection = candidate.fit, candidate.objection
     if not objection and candidate is not chosen and candidate.slow_parts:
@@ -220,7 +188,6 @@ def _findings(
     n_effective: float,
     shown: DisplayUnits,
     part: str,
-    commands: Sequence[Array],
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
     findings = []
@@ -228,22 +195,13 @@ def _findings(
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
     if moving < LITTLE_MOTION:
         findings.append(f"the command moves in {100 * moving:.0f} % of the samples of {part}")
-    # Judged on the recordings, not on the pieces that are fitted to: the liveliest pieces of a long recording always
-    # start in motion.
-    started = [starts_in_motion(x_d) for x_d in commands]
-    if started[0]:
-        findings.append("the recording starts in motion: the state at its start was estimated")
-    elif any(started):
-        findings.append("a piece behind a gap starts in motion: the state at its start was estimated")
     if n_effective < 0.2 * n:
         findings.append(
             f"the residual is not white (friction and the like): {n} samples tell as much as {n_effective:.0f} "
             "independent ones, which the standard deviations take into account"
         )
     gain = float(fit.structure.gains(fit.linear)[0].sum())
-    if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
-        findings.append(f"the static gain is {gain:.4g}: are both positions in the same unit?")
-    elif not fit.structure.unit_gain:
+    if not fit.structure.unit_gain:
         findings.append(f"the static gain is {_as_known(gain, gain_std)} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(

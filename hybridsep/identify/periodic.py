@@ -77,7 +77,7 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     power = lombscargle(s, rest, 2.0 * np.pi * lines)
     peak, width = float(lines[np.argmax(power)]), 1.0 / (_OVERSAMPLED * travel)
     best = minimize_scalar(
-        lambda line: _squares(np.column_stack((known, _waves(s, line))), e),
+        lambda line: float(np.sum(_without(np.column_stack((known, _waves(s, line))), e) ** 2)),
         bounds=(max(lowest, peak - 3.0 * width), peak + 3.0 * width),
         method="bounded",
         options={"xatol": 1e-4 * width},
@@ -114,20 +114,11 @@ def _waves(s: Array, line: float) -> Array:
     return np.column_stack((np.sin(angle), np.cos(angle)))
 
 
-def _squares(columns: Array, e: Array) -> float:
-    """Return the sum of squares that columns leave of a signal."""
-    left = _without(columns, e)
-    return float(left @ left)
-
-
 def _without(known: Array, signal: Array) -> Array:
     return np.asarray(signal - known @ np.linalg.lstsq(known, signal, rcond=None)[0])
 
 
 def _rounded(value: float, within: float) -> float:
     """Return the number of fewest digits within a distance of a value."""
-    for digits in range(1, 17):
-        rounded = float(f"{value:.{digits - 1}e}")
-        if abs(rounded - value) <= within:
-            return rounded
-    return value
+    candidates = (float(f"{value:.{digits}e}") for digits in range(17))
+    return next((one for one in candidates if abs(one - value) <= within), value)

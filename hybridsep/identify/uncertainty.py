@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.signals import Array, Indices
+from ..base.signals import Array
 from .output_error import Fit, Segment, affine, delayed, without
 from .structure import free_responses, responses, sections_of
 
-__all__ = ["Estimate", "delay_finding", "estimates", "full_covariance", "total_delay"]
+__all__ = ["Estimate", "estimates"]
 
 BATCHES = 30
 """Batches of the residual: enough for a variance, and each long beside a servo's memory."""
@@ -48,17 +48,13 @@ class Estimate:
 def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m") -> tuple[tuple[Estimate, ...], float]:
     """Return the parameters with their standard deviations, and the number of samples that tell as much as white ones.
 
-    Parameters
-    ----------
-    fit : Fit
-        Fitted to the segments.
-    segments : sequence of Segment
-    T_s : float, s
-    unit : {"m", "rad"}
-        Unit of the positions.
+    The fit is one to the segments; ``unit``, m or rad, is the positions'.
     """
-    jacobian, residual, scale = _scaled(fit, segments, T_s)
-    edges = _batches(residual)
+    jacobian, residual = _jacobian(fit, segments, T_s)
+    scale = np.linalg.norm(jacobian, axis=0)  # columns of unit norm
+    scale[scale == 0] = 1.0
+    jacobian = jacobian / scale
+    edges = np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
     scores = np.add.reduceat(jacobian * residual[:, None], edges)
     given_delay = [i for i in range(jacobian.shape[1]) if i != jacobian.shape[1] - 2]
     covariance = np.zeros((len(scale), len(scale)))
@@ -68,32 +64,6 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m"
     white = float(residual @ residual)
     n_effective = len(residual) * min(1.0, white / max(float(sums @ sums), 1e-300))
     return _named(fit, covariance / np.outer(scale, scale), T_s, unit), n_effective
-
-
-def full_covariance(fit: Fit, segments: Sequence[Segment], T_s: float) -> Array:
-    """Return the covariance of θ, linear parameters, dead time in samples and offset, all of them free.
-
-    Parameters
-    ----------
-    fit, segments, T_s
-        As for :func:`estimates`.
-    """
-    jacobian, residual, scale = _scaled(fit, segments, T_s)
-    scores = np.add.reduceat(jacobian * residual[:, None], _batches(residual))
-    return _sandwich(jacobian, scores) / np.outer(scale, scale)
-
-
-def _scaled(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array, Array, Array]:
-    """Return the Jacobian with columns of unit norm, the residual, and the norms."""
-    jacobian, residual = _jacobian(fit, segments, T_s)
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0] = 1.0
-    return jacobian / scale, residual, scale
-
-
-def _batches(residual: Array) -> Indices:
-    """Return the first sample of each batch."""
-    return np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
 
 
 def _sandwich(jacobian: Array, scores: Array) -> Array:
@@ -155,13 +125,10 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
 
 
 def _names(fit: Fit) -> list[tuple[str, str]]:
-    names = [("gain", "1")]
+    names, units = [("gain", "1")], {"f_n": "Hz", "zeta": "1", "alpha": "1/s2", "beta": "1/s"}
     for i in range(fit.structure.n_modes):
-        names += [(f"mode[{i + 1}].{name}", unit) for name, unit in _MODE]
+        names += [(f"mode[{i + 1}].{name}", unit) for name, unit in units.items()]
     return names + [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
-
-
-_MODE = (("f_n", "Hz"), ("zeta", "1"), ("alpha", "1/s2"), ("beta", "1/s"))
 
 
 def _physical(fit: Fit, theta: Array, linear: Array, T_s: float) -> Array:
@@ -182,47 +149,3 @@ def _differences(function: Callable[[Array], Array], point: Array) -> Array:
     return np.column_stack(
         [(function(point + step) - function(point - step)) / (2 * step.sum()) for step in np.diag(steps)]
     )
-
-
-APART = 0.5
-"""Deviation of the whole delay, relative to the dead time's, below which lag and dead time cannot be told apart."""
-
-
-def total_delay(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Estimate, float]:
-    """Return the delay behind a constant velocity, ``−G'(0)/G(0)``, and the dead time's deviation, both in s.
-
-    Parameters
-    ----------
-    fit : Fit
-        Fitted to the segments.
-    segments : sequence of Segment
-    T_s : float, s
-    """
-    covariance = full_covariance(fit, segments, T_s)[:-1, :-1]  # the offset delays nothing
-    n_theta = len(fit.theta)
-    point = np.concatenate((fit.theta, fit.linear, [fit.delay.halves / 2]))
-
-    def delay(parameters: Array) -> float:
-        modes = fit.structure.modes(parameters[:n_theta], parameters[n_theta:-1], T_s)
-        gain = sum(mode.alpha / mode.omega**2 for mode in modes)
-        # G(s) = Σ (α + β s)/(ω² + 2ζω s + …) = Σ α/ω² − s Σ (2ζα/ω³ − β/ω²) + …
-        lag = sum(2 * mode.zeta * mode.alpha / mode.omega**3 - mode.beta / mode.omega**2 for mode in modes)
-        return float(lag / gain + parameters[-1] * T_s)
-
-    slope = _differences(lambda parameters: np.array([delay(parameters)]), point)[0]
-    variance = float(slope @ covariance @ slope)
-    found = Estimate("delay", delay(point), float(np.sqrt(max(variance, 0.0))), "s")
-    return found, float(T_s * np.sqrt(max(covariance[-1, -1], 0.0)))
-
-
-def delay_finding(fit: Fit, segments: Sequence[Segment], T_s: float) -> list[str]:
-    """Return the finding that lag and dead time cannot be told apart, if they cannot."""
-    if fit.structure.order == 0:
-        return []
-    delay, std = total_delay(fit, segments, T_s)
-    if std < T_s or delay.std > APART * std:
-        return []
-    return [
-        f"lag and dead time cannot be told apart (dead time ± {std / T_s:.2g} samples, the others' deviations are "
-        f"those with it as chosen); together they delay by {1e3 * delay.value:.4g} ± {1e3 * delay.std:.2g} ms"
-    ]

@@ -34,7 +34,6 @@ __all__ = [
     "following",
     "noise_std",
     "resolution",
-    "runs_against",
     "starts_in_motion",
 ]
 
@@ -274,14 +273,6 @@ def following(u: Array, x: Array) -> Following:
         float(products[one] / squares[one]) * total / scale if squares[one] > 0.0 else 0.0,
         int(lags[one]),
     )
-
-
-def runs_against(x_d: Array, x: Array) -> bool:
-    """Return whether a measured position moves opposite to its command: its sign is flipped.
-
-    A correlation cannot judge it: above its bandwidth a drive's position is late by half a period.
-    """
-    return _BETTER * following(x_d, -x).left < following(x_d, x).left
 
 
 def _meaning(log: Log, x_d: Array, x: Array, given: Following) -> Iterator[Finding]:

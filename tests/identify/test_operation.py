@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
 from identification_cases import T_S, correlated, measured, moves
 from places import EMPS, ROOT
 from scipy import io
-from scipy.signal import chirp
 
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError
@@ -91,9 +89,6 @@ def test_a_recording_that_starts_in_motion_is_used() -> None:
     x = measured(SECOND, x_d, "foh", 1e-6)
     start = int(np.argmax(np.abs(np.diff(x_d)))) - 5
     found = identify_operation([(x_d[start:], x[start:])], T_S, order_max=2)
-    assert "the recording starts in motion" in " ".join(found.findings)
-    behind = identify_operation([(x_d[:start], x[:start]), (x_d[start:], x[start:])], T_S, order_max=1)
-    assert "a piece behind a gap starts in motion" in " ".join(behind.findings)
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
 
 
@@ -134,49 +129,12 @@ def test_slow_parts_that_cancel() -> None:
     assert slow_parts([Mode(f_n, zeta, gain, 0.0)]) == []
 
 
-@pytest.mark.slow
-def test_lag_and_dead_time_that_cannot_be_told_apart() -> None:
-    """A slow command tells their sum alone; the moves tell each."""
-    t = T_S * np.arange(6000)
-    slow = 5e-3 * (1 - np.cos(2 * np.pi * 0.25 * t))
-    found = identify_operation([(slow, measured(LAG, slow, "zoh", 10e-6))], T_S, order_max=1, unit_gain=True)
-    [told] = [finding for finding in found.findings if finding.startswith("lag and dead time cannot be told apart")]
-    delay, std = (float(word) for word in told.partition("together they delay by ")[2].split(" ")[0:3:2])
-    assert 0 < std < 0.1
-    assert abs(delay - 11.5) < 4 * std  # lag, three samples, half a sample of the hold
-    x_d = moves(2000)
-    clear = identify_operation([(x_d, measured(LAG, x_d, "zoh", 1e-7))], T_S, order_max=1)
-    assert "told apart" not in " ".join(clear.findings)
-
-
 def test_a_mode_that_the_log_does_not_resolve_is_not_chosen() -> None:
     """With fewer than four samples a period a replay of the log would be refused."""
     x_d = moves(2000)
     fast = ModalModel([Mode(330.0, 0.05, (660 * np.pi) ** 2)])
     found = identify_operation([(x_d, measured(fast, x_d, "foh", 1e-8))], T_S)
     assert all(mode.zeta >= 1.0 or mode.f_n <= 0.25 / T_S for mode in found.model.modes)
-
-
-@pytest.mark.slow
-def test_a_drive_beyond_its_bandwidth_has_no_wrong_sign() -> None:
-    """There it moves against its command; a correlation of -0.7 was taken for a flipped sign."""
-    t = T_S * np.arange(4000)
-    x_d = 1e-3 * chirp(t, 30.0, t[-1], 60.0, phi=-90)
-    light = ModalModel([Mode(20.0, 0.1, (40 * np.pi) ** 2)])
-    x = measured(light, x_d, "foh", 1e-7)
-    assert np.corrcoef(x_d, x)[0, 1] < -0.7
-    found = identify_operation([(x_d, x)], T_S, order_max=2)
-    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.01)
-
-
-@pytest.mark.slow
-def test_the_pieces_of_a_long_recording_are_no_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of more samples than are taken the liveliest pieces are fitted to, and those begin anywhere."""
-    monkeypatch.setattr("hybridsep.identify.operation.as_segments", partial(as_segments, samples_max=6000))
-    x_d = np.concatenate([0.01 * i + moves(2000) for i in range(4)])
-    x_d = np.concatenate((np.full(500, x_d[0]), x_d))
-    found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 1e-6))], T_S, order_max=1)
-    assert "starts in motion" not in " ".join(found.findings)
 
 
 @pytest.mark.slow
@@ -280,10 +238,9 @@ X_D = moves(1500)
     [
         (np.full(500, 0.1), X_D[:500], "commanded position does not move"),
         (X_D, np.zeros(len(X_D)), "measured position does not move"),
-        (X_D, -X_D, "reverse the sign"),
         (X_D[:60], X_D[:60], "it has 60 samples"),
     ],
-    ids=["rest", "stuck", "sign", "short"],
+    ids=["rest", "stuck", "short"],
 )
 def test_what_trains_nothing_is_refused(x_d: Array, x: Array, reason: str) -> None:
     with pytest.raises(IdentificationError, match=f"cannot determine a model, because .*{reason}"):
