@@ -19,14 +19,15 @@ import numpy as np
 
 from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops, paper_machine
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
-from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
+from hybridsep.base.metrics import largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
+from hybridsep.cosim.contour import contours_of
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import PAPER_SETTINGS, Machine, machine_from_table
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
-from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
+from hybridsep.plants.trajectory import spiral, staircase
 
 __all__ = ["Report"]
 
@@ -150,7 +151,6 @@ def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, f
 def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     """Row 3: both axes of the spiral, and the contour error of the two together."""
     report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
-    position, derivative, end = archimedean_spiral(0.030, 5.0)
     machines, commands = [paper_machine("als25010_x"), paper_machine("als25010_y")], spiral()
     found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_CASES}
     for machine, r in zip(machines, commands, strict=True):
@@ -180,9 +180,9 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
     for name, (x, y) in found.items():
-        points = [np.column_stack((a.x, b.x)) for a, b in zip(x, y, strict=True)]
-        errors = np.array([contour_error(point, position, derivative, end) for point in points])
-        report.line(f"contour error, {name}", UM * rms(errors))
+        of_x, of_y = ({str(seed): run for seed, run in enumerate(runs)} for runs in (x, y))
+        contours = contours_of(of_x, of_y).values()
+        report.line(f"contour error, {name}", UM * rms([contour.error for contour in contours]))
 
 
 def after_reversals(r: Array) -> Any:

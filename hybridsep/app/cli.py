@@ -56,7 +56,7 @@ EXAMPLES = {
     ),
     "cosim": (
         "hybridsep cosim -m my_axis/machine.toml --compensate hybrid",
-        "hybridsep cosim --trajectory moves.csv --compensate off --figure run.png",
+        "hybridsep cosim x/machine.toml y/machine.toml --path part.ngc --figure part.png",
     ),
     "system": (
         "hybridsep system -m my_axis/machine.toml --compensate hybrid",

@@ -36,6 +36,7 @@ __all__ = [
     "errors_console",
     "print_built",
     "print_channels",
+    "print_contours",
     "print_json",
     "print_judged",
     "print_run",
@@ -121,6 +122,21 @@ def _print_tracking(
     )
     if limits is not None:
         console.print(binding_words(limits))
+
+
+def print_contours(figures: Mapping[str, Mapping[str, float]], as_json: bool, title: str) -> None:
+    """Print the contour errors of each compensated run."""
+    from ..evaluate.figures import CASES
+
+    if as_json:
+        print_json(figures)
+        return
+    table = Table("contour error, µm", title=title)
+    for column in ("RMS", "99.9 %", "largest"):
+        table.add_column(column, justify="right")
+    for key, found in figures.items():
+        table.add_row(CASES[key][0], *map(shown_figure, found.values()))
+    console.print(table)
 
 
 def print_written(*paths: Path | None) -> None:

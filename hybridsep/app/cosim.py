@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import astuple
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +13,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import COMMANDS, DEFAULT_MACHINE
-from ..base.settings import PARAMETERS, check
+from ..base.settings import PARAMETERS, Limits, check
 from .options import (
     TRAJECTORIES,
     CompensateOption,
@@ -33,6 +35,13 @@ __all__ = ["cosim", "system"]
 
 
 def cosim(
+    axes: Annotated[
+        list[str] | None, typer.Argument(help="With --path, X and Y: machine files (.toml) or names.", metavar="AXIS")
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(help="Path of two axes: a G-code program (G0 to G4), or a log with the commands x and y."),
+    ] = None,
     machine: MachineOption = DEFAULT_MACHINE,
     entries: SetOption = None,
     trajectory: TrajectoryOption = None,
@@ -48,15 +57,30 @@ def cosim(
     out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(help="PNG with the errors over time: of the predictions, or with --compensate of the position."),
+        typer.Option(
+            help="PNG with the errors over time: of the predictions, with --compensate of the position, with --path "
+            "along it."
+        ),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Co-simulate a predictor or compensator FMU with a plant FMU.
 
-    Over the staircase, a spiral's axis or a trajectory in a file.
+    Over the staircase, a spiral's axis or a trajectory in a file. Or compensate both axes of a machine along a path:
+    contour errors of the true positions with no compensation, physics model, hybrid cold, and warm from such a run.
     """
+    if path is not None or axes:
+        of_one: dict[str, object] = {
+            "--machine": machine != DEFAULT_MACHINE,
+            "--trajectory": trajectory,
+            "--compensate": compensate,
+        }
+        of_one |= {"--predictor": predictor, "--plant": plant, "--weights": weights}
+        if foreign := [name for name, given in of_one.items() if given]:
+            raise ParameterError(f"{', '.join(foreign)} is for one axis; leave it out with --path")
+        _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
+        return
     from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
     from ..fmi.archive import build_here, default_flavour
@@ -98,6 +122,90 @@ def cosim(
     print_run(run, as_json, title, limits)
     if not as_json:
         print_written(out, figure)
+
+
+def _two_axes(
+    axes: Sequence[str],
+    path: Path | None,
+    entries: Sequence[str],
+    unit: str | None,
+    *,
+    out: Path | None,
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Co-simulate the compensators of X and Y along a path: off, physics, hybrid cold and warm."""
+    from ..cosim.compensated import COMPENSATED, compensate
+    from ..cosim.contour import contours_of
+    from ..cosim.run import save_columns
+    from ..fmi.archive import build_here, default_flavour
+    from ..machines.machine import load_machine, machine_path
+    from ..plants.path import read_path
+    from .console import RUNS, check_outputs, print_contours, print_written, progress_bar
+
+    if figure is not None:
+        from ..evaluate.figures import contour_figure
+
+    if path is None or len(axes) != 2:
+        raise ParameterError(
+            f"two machines and a path belong together, got {len(axes)}{'' if path else ' and none'}: "
+            "hybridsep cosim x.toml y.toml --path part.ngc; one axis alone is --machine"
+        )
+    flavour, machines = default_flavour(), [load_machine(axis, entries) for axis in axes]
+    for axis in machines:
+        _check_pair(axis, "SepCompensator", None, None, None, flavour, ())
+    delays = [f"{axis.T_s:g} s and {axis.compensator_settings.preview} samples" for axis in machines]
+    if delays[0] != delays[1]:
+        raise ParameterError(f"both axes must have one T_s and one preview, got {' and '.join(delays)}")
+    inputs = {f"machine file of {name}": machine_path(axis) for name, axis in zip("XY", axes, strict=True)}
+    check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), {"path": path, **inputs}, force=force)
+    meant = read_path(path, _path_limits(machines), machines[0].T_s, unit)
+    runs, steps = [], count()
+    with tempfile.TemporaryDirectory() as temporary, progress_bar(as_json) as advance:
+        for name, axis, command in zip("XY", machines, meant.axes, strict=True):
+            folder = Path(temporary) / name
+            runs.append(
+                compensate(
+                    axis,
+                    build_here(axis, "FeedDrive", folder, flavour),
+                    command,
+                    folder,
+                    f"{name} axis",
+                    lambda what: advance(what, next(steps) / (2 + 2 * len(COMPENSATED))),
+                    [axis.plant.seed] if axis.plant is not None else [0],
+                )[0]
+            )
+    x, y = runs
+    contours = contours_of(x, y, meant)
+    title = f"{path.name}: {machines[0].title}; {machines[1].title}"
+    if out is not None:
+        columns = {"t": x["off"].t, "x_d": meant.axes[0], "y_d": meant.axes[1]}
+        for key, contour in contours.items():
+            columns |= {f"x_{key}": x[key].x, f"y_{key}": y[key].x, f"contour_{key}": contour.error}
+        save_columns(columns, out)
+    if figure is not None:
+        contour_figure(contours, title, figure)
+    print_contours({key: contour.figures() for key, contour in contours.items()}, as_json, title)
+    if not as_json:
+        print_written(out, figure)
+
+
+def _path_limits(machines: Sequence[Machine]) -> Limits:
+    """Return the limits along a path: the lower ones of the axes, each those of its trajectories.
+
+    Where a machine has none, they leave its compensator the room within the drive's that ``fit`` leaves it.
+    """
+    from ..fitting.compensation import MARGINS
+
+    found = []
+    for axis in machines:
+        drive, _ = axis.command_limits()
+        if axis.limits is not None or drive is None:
+            found.append(astuple(axis.trajectory_limits()))
+        else:
+            found.append(tuple(most / more for most, more in zip(astuple(drive), MARGINS.tolist(), strict=True)))
+    return Limits(*map(min, *found))
 
 
 def _file(trajectory: str) -> str | None:

@@ -1,9 +1,9 @@
-"""Figures of merit of sampled signals: RMS, largest magnitude, coverage, hold, derivatives, shares, contour error."""
+"""Figures of merit of sampled signals: RMS, largest magnitude, coverage, hold, derivatives, shares."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from html import escape
 from statistics import NormalDist
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = [
     "RunningErrors",
     "batch_rms",
-    "contour_error",
     "coverage",
     "hold",
     "html_table",
@@ -36,9 +35,6 @@ __all__ = [
     "shares",
     "shown_figure",
 ]
-
-_NODES = 20_000
-"""Points of a path for the search of the nearest one, before refinement; 24 µm apart on the paper's spiral."""
 
 
 def rms(error: ArrayLike) -> float:
@@ -173,39 +169,6 @@ def peak_derivatives(x: Array, T_s: float) -> tuple[float, float, float]:
 def shares(states: NDArray[np.int64], kinds: type[IntEnum]) -> dict[str, float]:
     """Return the share of samples in each state, 0 … 1, by its name in lower case."""
     return {kind.name.lower(): float(np.mean(states == kind)) for kind in kinds}
-
-
-def contour_error(
-    points: ArrayLike, position: Callable[[Array], Array], derivative: Callable[[Array], Array], end: float
-) -> Array:
-    """Return the distance of each point to a planar path.
-
-    Parameters
-    ----------
-    points : (n, 2) array_like, m
-        Positions reached.
-    position, derivative : callable, (n,) → (n, 2)
-        The path and its derivative over a parameter from 0 to ``end``, as
-        :func:`~hybridsep.plants.trajectory.along_path` takes them.
-    end : float
-        Last value of the parameter.
-
-    Returns
-    -------
-    (n,) array, m
-    """
-    from scipy.spatial import cKDTree
-
-    reached = np.asarray(points, dtype=np.float64)
-    nodes = np.linspace(0.0, end, _NODES)
-    _, nearest = cKDTree(position(nodes)).query(reached)
-    u = nodes[nearest]
-    for _ in range(5):
-        # Gauss-Newton: the point's distance is least where it is perpendicular to the path
-        slope = derivative(u)
-        along = np.sum((reached - position(u)) * slope, axis=1) / np.sum(slope**2, axis=1)
-        u = np.clip(u + along, 0.0, end)
-    return np.asarray(np.linalg.norm(reached - position(u), axis=1))
 
 
 def shown_figure(value: float | None, unit: str = "") -> str:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.files import written_text
-from ..base.metrics import contour_error, largest, rms
-from ..base.settings import PARAMETERS
-from ..base.signals import Array
+from ..cosim.compensated import COMPENSATED, Advance, Runs, compensate, mean_summary
+from ..cosim.contour import contours_of
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
 from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
@@ -20,19 +19,11 @@ from ..evaluate.verdict import verdict_of
 from ..fmi.archive import build_here, default_flavour
 from ..fmi.spec import fmu_name
 from ..machines.machine import PAPER_SETTINGS, Machine, load_machine
-from ..plants.plant import Encoder
-from ..plants.trajectory import archimedean_spiral, spiral, staircase
+from ..plants.trajectory import spiral, staircase
 from .page import PRINTED, write_page
 
-__all__ = ["COMPENSATED", "demo", "demo_files"]
+__all__ = ["demo", "demo_files"]
 
-TRAINING_SEED = 1000
-"""Noise seed of the training run of a warm compensator; no case uses it."""
-
-COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
-"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
-
-Runs = dict[str, Run]
 Summary = dict[str, dict[str, Any]]
 
 MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
@@ -40,66 +31,6 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 
 SEEDS = 10
 """Noise seeds that a full demonstration's staircase is averaged over."""
-
-Advance = Callable[[str], object]
-"""Called with the name of each run before it."""
-
-
-def compensate(
-    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = (0,)
-) -> tuple[Runs, dict[str, Any]]:
-    """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
-
-    The FMU goes to the folder ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
-
-    Returns
-    -------
-    runs : dict
-        The first seed's, by the keys of :data:`COMPENSATED`.
-    summary : dict
-        The same keys → means over the seeds of :meth:`Run.summary`, with the spread
-        ``tracking_rms_um_std``.
-    """
-    flavour, weights = default_flavour(), out / f"{machine.name}.state"
-    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
-    advance(f"{label}, a run to learn from")
-    train(machine, command, weights)
-    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
-    runs: Runs = {}
-    summary: dict[str, Any] = {}
-    for key, choice in COMPENSATED.items():
-        advance(f"{label}, {key.replace('_', ' ')}")
-        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
-        fmu = warm if key == "hybrid_warm" else cold
-        of_seeds = [
-            cosimulate(fmu, plant, command, controller_values=values, plant_values={"seed": seed}) for seed in seeds
-        ]
-        runs[key] = of_seeds[0]
-        summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
-    return runs, summary
-
-
-def train(machine: Machine, command: Array, path: Path) -> None:
-    """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
-    assert machine.plant is not None
-    compensator = machine.new_compensator()
-    encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
-    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
-    compensator.predictor.save(path)
-
-
-def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
-    """Return the contour errors on the paper's spiral, ``(n,)``, m, of the runs of X and Y with the same key."""
-    path = archimedean_spiral(0.030, 5.0)
-    return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
-
-
-def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:
-    """Return the mean of each figure over several runs, and the standard deviation of one of them."""
-    mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
-    mean["n_samples"] = summaries[0]["n_samples"]
-    mean[f"{spread}_std"] = float(np.std([s[spread] for s in summaries]))
-    return mean
 
 
 def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
@@ -160,15 +91,11 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
     spiral_figure(axes["x"], axes["y"], out / "spiral.png")
-    errors = contour_errors(compensated["x"], compensated["y"])
-    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in COMPENSATED}
-    contour_figure(pairs, errors, "Spiral, X and Y compensated: contour error", out / "spiral_contour.png")
+    contours = contours_of(compensated["x"], compensated["y"])
+    contour_figure(contours, "Spiral, X and Y compensated", out / "spiral_contour.png")
     for case in summary.values():
-        for kind, error in errors.items():
-            case["compensation"][kind] |= {
-                "contour_rms_um": 1e6 * rms(error),
-                "contour_max_um": 1e6 * largest(error),
-            }
+        for kind, contour in contours.items():
+            case["compensation"][kind] |= contour.figures()
     return summary
 
 
@@ -230,8 +157,8 @@ def demo(
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
         ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
-        :func:`hybridsep.demo.cases.compensate` found, for the spiral's axes with the contour error of both
-        together, ``contour_rms_um`` and ``contour_max_um``.
+        :func:`hybridsep.cosim.compensated.compensate` found, for the spiral's axes with the contour error of both
+        together, :meth:`hybridsep.cosim.contour.Contour.figures`.
     """
     out = Path(out)
     seeds = SEEDS if full else 1

@@ -6,7 +6,6 @@ path, both axes together: prediction errors and contour errors.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from ..base.files import written_whole
 from ..base.metrics import rms
 from ..base.signals import Array
+from ..cosim.contour import Contour
 from ..cosim.run import Run
 from ..logs.units import DisplayUnits, shown_in
 from ..online.look_ahead import SepState
@@ -261,37 +262,75 @@ def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
     save_figure(figure, path)
 
 
-def contour_figure(
-    runs: Mapping[str, tuple[Run, Run]], errors: Mapping[str, Array], title: str, path: str | Path
-) -> None:
-    """Draw the contour error along a planar path, one panel for each compensated run, to a PNG.
+def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path) -> None:
+    """Draw runs along a planar path to a PNG: the path with the error magnified, and the error over time.
+
+    Where the path has full circles it is their radial error over the angle, as a ballbar draws it.
 
     Parameters
     ----------
-    runs : mapping
-        Keys of :data:`~hybridsep.evaluate.figures.CASES` → the runs of X and Y.
-    errors : mapping
-        The same keys → ``(n,)`` contour error, m; :func:`hybridsep.base.metrics.contour_error`.
+    contours : mapping
+        Keys of :data:`~hybridsep.evaluate.figures.CASES` → motion along the same path; four at most.
     title : str
         Heading.
     path : str or Path
         The PNG.
     """
-    rows = math.ceil(len(runs) / 2)
-    figure = Figure(figsize=(8.8, 3.8 * rows + 0.5), layout="constrained")
-    panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     figure.suptitle(title)
-    limit = 1e6 * max(float(np.percentile(error, 98)) for key, error in errors.items() if key != "off")
-    for axes, (key, (x, y)) in zip(panels.flat, runs.items(), strict=False):
-        micro = 1e6 * errors[key]
-        points = _draw_path(axes, x, y, micro, limit, size=5)
-        axes.set_title(f"{CASES[key][0]}: {rms(micro):.0f} µm RMS", fontsize=11)
-    for axes in panels[-1]:
-        axes.set_xlabel("X [mm]")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("Y [mm]")
-    figure.colorbar(points, ax=panels, label="contour error [µm]", extend="max", shrink=0.7)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.1))
+    planes = [figure.add_subplot(grid[i // 2, i % 2], aspect="equal") for i in range(len(contours))]
+    path_mm = 1e3 * next(iter(contours.values())).path.points
+    extent = max(np.ptp(path_mm.real), np.ptp(path_mm.imag))
+    worst = 1e3 * max(float(np.quantile(np.abs(one.error), 0.99)) for one in contours.values())
+    factor = float(f"{0.15 * extent / max(worst, 1e-9):.0e}")
+    for plane, (key, one) in zip(planes, contours.items(), strict=True):
+        label, color = CASES[key]
+        drawn = 1e3 * (one.nearest + factor * (one.reached - one.nearest))
+        drawn[np.flatnonzero(np.abs(np.diff(drawn)) > 0.2 * extent)] = (
+            np.nan
+        )  # the nearest point has gone round a corner
+        plane.plot(path_mm.real, path_mm.imag, color="black", linewidth=0.6)
+        plane.plot(drawn.real, drawn.imag, color=color, linewidth=0.8)
+        found = one.figures()
+        words = f"RMS {found['contour_rms_um']:.1f}, largest {found['contour_max_um']:.0f} µm"
+        plane.set_title(f"{label}: {words}", fontsize=9)
+        for part, set_range in ((path_mm.real, plane.set_xlim), (path_mm.imag, plane.set_ylim)):
+            set_range(part.min() - 0.2 * extent, part.max() + 0.2 * extent)
+        plane.tick_params(labelsize=8)
+    planes[0].set_ylabel(f"Y [mm], error × {factor:g}")
+    planes[-1].set_xlabel("X [mm]")
+    best = min(contours, key=lambda key: rms(contours[key].error))
+    _draw_errors(figure, grid[0, 2], contours, "")
+    _draw_errors(figure, grid[1, 2], {best: contours[best]}, f", {CASES[best][0]}")
     save_figure(figure, path)
+
+
+def _draw_errors(figure: Figure, place: SubplotSpec, contours: Mapping[str, Contour], whose: str) -> None:
+    """Draw contour errors over time, µm, or where the path has full circles radial errors over the angle."""
+    path = next(iter(contours.values())).path
+    if np.isnan(path.centre).all():
+        axes = figure.add_subplot(place, xlabel="time [s]", ylabel="[µm]")
+        for key, one in contours.items():
+            draw_line(axes, one.T_s * np.arange(len(one.error)), 1e6 * one.error, 0.8, color=CASES[key][1])
+        finish_panels([axes])
+        title = f"contour error{whose}"
+    else:
+        axes = figure.add_subplot(place, projection="polar")
+        commanded = path.points - path.centre
+        peak = 1e-3
+        for key, one in contours.items():
+            radial = 1e6 * (np.abs(one.reached - path.centre) - np.abs(commanded))
+            axes.plot(np.angle(commanded), radial, color=CASES[key][1], linewidth=0.7)
+            peak = max(peak, float(np.nanmax(np.abs(radial))))
+        axes.plot(np.linspace(0.0, 2 * np.pi, 361), np.zeros(361), color="black", linewidth=0.6)
+        ring = float(f"{0.6 * peak:.0e}")
+        axes.set_ylim(-1.6 * peak, 1.05 * peak)
+        axes.set_yticks((-ring, ring), ("", ""))
+        axes.set_xticks(np.arange(0.0, 2 * np.pi, np.pi / 2))
+        title = f"radial error{whose}; rings at ±{ring:g} µm"
+    axes.tick_params(labelsize=8)
+    axes.set_title(title, fontsize=9)
 
 
 def _draw_path(axes: Axes, x: Run, y: Run, error: Array, limit: float, *, size: float) -> PathCollection:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -147,6 +148,49 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     short = write_rows(tmp_path / "short.csv", commanded()[:400], commanded()[:400])
     sizes = [word for entry in ("Np=25", "p=20", "q=3") for word in ("--set", f"compensator.{entry}")]
     assert hybridsep("cosim", "--compensate", "physics", *sizes, "--trajectory", short)[0] == 0
+
+
+@pytest.mark.slow
+def test_cosim_of_two_axes_along_a_path(hybridsep: Run, tmp_path: Path) -> None:
+    """A machine without [limits] moves within 1/1.25, 1/2 and 1/5 of the drive's."""
+    text = (data_folder("models") / "als25010_y.toml").read_text(encoding="utf-8")
+    y, path, out = (tmp_path / name for name in ("y.toml", "part.ngc", "run.npz"))
+    y.write_text(re.sub(r"\[limits\](.|\n)*(?=\[drive_limits\])", "", text), encoding="utf-8")
+    path.write_text("F9000 G1 X20\nF600 G3 X20 I-0.5", encoding="utf-8")
+    status, printed, _ = hybridsep("cosim", "als25010_x", y, "--path", path, "--out", out, "--json")
+    assert status == 0
+    figures = json.loads(printed)
+    rms = [figures[key]["contour_rms_um"] for key in ("off", "physics", "hybrid_cold", "hybrid_warm")]
+    assert rms == sorted(rms, reverse=True)
+    with np.load(out) as run:
+        assert np.max(np.abs(run["contour_off"])) * 1e6 == pytest.approx(figures["off"]["contour_max_um"])
+        assert np.max(np.diff(run["x_d"])) / 1e-3 == pytest.approx(0.08, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("als25010_x", "--path", "part.ngc"), "two machines and a path belong together, got 1:"),
+        (("als25010_x", "als25010_y"), "got 2 and none"),
+        (
+            ("als25010_x", "als25010_y", "--path", "part.ngc", "-m", "emps", "--compensate", "off"),
+            "--machine, --compensate",
+        ),
+        (("als25010_x", "emps", "--path", "part.ngc"), "machine emps has no plant"),
+        (("als25010_x", "als25010_y", "--path", "part.ngc", "--figure", "part.ngc"), "--figure must end in .png"),
+    ],
+)
+def test_what_two_axes_do_not_take(hybridsep: Run, arguments: tuple[str, ...], said: str) -> None:
+    status, _, err = hybridsep("cosim", *arguments)
+    assert (status, said in err) == (2, True), err
+
+
+def test_two_axes_are_delayed_alike(hybridsep: Run, tmp_path: Path) -> None:
+    text = (data_folder("models") / "als25010_y.toml").read_text(encoding="utf-8")
+    y = tmp_path / "y.toml"
+    y.write_text(text.replace("[compensator] ", "[compensator]\npreview = 150 #"), encoding="utf-8")
+    status, _, err = hybridsep("cosim", "als25010_x", y, "--path", "part.ngc")
+    assert (status, "one preview, got 0.001 s and 200 samples and 0.001 s and 150 samples" in err) == (2, True), err
 
 
 @pytest.mark.slow

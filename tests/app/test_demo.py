@@ -19,8 +19,9 @@ from rich.console import Console
 from benchmarks.pictures import RECORD, demonstrated
 from hybridsep.app import console, start
 from hybridsep.base.metrics import shown_figure
+from hybridsep.cosim.compensated import COMPENSATED
 from hybridsep.demo import cases
-from hybridsep.demo.cases import COMPENSATED, demo, demo_files
+from hybridsep.demo.cases import demo, demo_files
 from hybridsep.plants.trajectory import spiral
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")

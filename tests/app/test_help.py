@@ -13,12 +13,11 @@ from staircase_data import commanded, measured
 from hybridsep import load_machine
 from hybridsep.app.cli import EXAMPLES
 from hybridsep.machines.text import machine_text
-from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 
 
 @pytest.fixture(scope="module")
 def axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the examples name: a log, moves, machine files, a trained predictor."""
+    """A folder with what the examples name: a log, a program, machine files, a trained predictor."""
     folder = tmp_path_factory.mktemp("examples")
     part = np.r_[:400, 999:1399]  # a move in each half
     write_rows(folder / "my_axis.csv", commanded()[part], measured(0)[part])
@@ -33,9 +32,7 @@ def axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
         predictor.predict(x_d[begin : begin + 50])
         predictor.update(x[begin : begin + 50])
     predictor.save(folder / "my_axis" / "trained.state")
-    moves = rest_to_rest([0.0, 0.01], PAPER_LIMITS)
-    rows = np.column_stack((np.arange(len(moves)) * 1e-3, moves))
-    np.savetxt(folder / "moves.csv", rows, delimiter=",", header="t,x_d", comments="", fmt="%.9g")
+    (folder / "part.ngc").write_text("F1200 G2 X0 Y0 I1\n", encoding="utf-8")
     return folder
 
 

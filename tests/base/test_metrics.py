@@ -11,7 +11,6 @@ import pytest
 from hybridsep.base.metrics import (
     RunningErrors,
     batch_rms,
-    contour_error,
     coverage,
     hold,
     largest,
@@ -23,7 +22,6 @@ from hybridsep.base.metrics import (
     shares,
 )
 from hybridsep.base.signals import Array
-from hybridsep.plants.trajectory import archimedean_spiral
 
 
 def test_rms_and_largest() -> None:
@@ -98,13 +96,3 @@ def test_shares_have_the_names_of_the_states() -> None:
         ON = 1
 
     assert shares(np.array([0, 1, 1, 1]), State) == {"off": 0.25, "on": 0.75}
-
-
-def test_contour_error_is_the_distance_to_the_path() -> None:
-    position, derivative, end = archimedean_spiral(0.03, 5.0)
-    u = np.linspace(1.0, end - 1.0, 301)
-    slope = derivative(u)
-    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
-    distance = 1e-4 * np.sin(7 * u)
-    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
-    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)

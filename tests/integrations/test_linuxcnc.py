@@ -24,7 +24,6 @@ from command_line import Run
 from places import ROOT
 
 from hybridsep import load_machine
-from hybridsep.base.metrics import rms
 from hybridsep.predict.predictor import HybridPredictor
 
 SIMULATION = ROOT / "integrations" / "linuxcnc" / "simulation"
@@ -146,7 +145,7 @@ def installed(place: Path) -> Iterator[Path]:
 @IN_LINUXCNC
 def test_the_contour_of_a_circle_is_compensated(installed: Path) -> None:
     samples = contour.run_cases("circle", installed, USER)
-    errors = {case: rms(one.contour_errors()) for case, one in samples.items()}
+    errors = {case: one.contour().figures()["contour_rms_um"] for case, one in samples.items()}
     assert errors["hybrid warm"] <= 0.3 * errors["off"]
     assert errors["hybrid warm"] < errors["physics"] < errors["off"]
     assert all(one.n_lost == 0 for one in samples.values())

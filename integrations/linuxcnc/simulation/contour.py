@@ -21,8 +21,10 @@ from pathlib import Path
 import numpy as np
 from sampled_columns import AXES, COLUMNS
 
-from hybridsep.base.metrics import largest, rms
 from hybridsep.base.signals import Array
+from hybridsep.cosim.contour import Contour
+from hybridsep.evaluate.figures import contour_figure
+from hybridsep.plants.path import PlanarPath
 
 HERE = Path(__file__).resolve().parent
 CASES: dict[str, dict[str, int] | None] = {
@@ -33,9 +35,6 @@ CASES: dict[str, dict[str, int] | None] = {
     "hybrid warm": {},
 }
 """Cases by name, with the entries of machine.ini's [HSEP] that they change; None: without the component."""
-
-REACH = 80
-"""Samples to either side among which the nearest part of the path is looked for."""
 
 
 @dataclass(frozen=True)
@@ -70,41 +69,35 @@ class Samples:
             for name in ("out", "delayed", "fb", "pos", "state")
         }
         moving = np.flatnonzero(np.abs(np.diff(pairs["delayed"], axis=0)).sum(axis=1) > 0.0)
-        part = slice(moving[0], moving[-1] + REACH)
+        part = slice(moving[0], moving[-1] + 80)
         n_lost = int(table[-1, 0] - table[0, 0]) + 1 - len(table)
         late = columns["overruns"][part]
         return cls(**{name: pair[part] for name, pair in pairs.items()}, n_lost=n_lost, n_late=int(late[-1] - late[0]))
 
-    def contour_errors(self) -> Array:
-        """Return the distance of each true position to the commanded path, ``(n,)``, mm."""
-        n = len(self.pos)
-        least = np.full(n, np.inf)
-        for shift in range(-REACH, REACH):
-            at = np.clip(np.arange(n) + shift, 0, n - 2)
-            begin, along = self.delayed[at], self.delayed[at + 1] - self.delayed[at]
-            length = np.maximum(np.sum(along**2, axis=1), 1e-30)
-            share = np.clip(np.sum((self.pos - begin) * along, axis=1) / length, 0.0, 1.0)
-            least = np.minimum(least, np.linalg.norm(self.pos - begin - share[:, None] * along, axis=1))
-        return least
+    def contour(self) -> Contour:
+        """Return the true positions along the commanded path."""
+        commanded, reached = (1e-3 * (pair @ np.array([1.0, 1.0j])) for pair in (self.delayed, self.pos))
+        return Contour.of(PlanarPath.of(commanded), reached, 1e-3)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the programs, print the table and draw the errors."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("programs", nargs="*", default=["circle", "spiral", "pocket"])
-    parser.add_argument("--out", type=Path, required=True, help="folder for logs, machine files and the figure")
+    parser.add_argument("--out", type=Path, required=True, help="folder for logs, machine files and figures")
     parser.add_argument("--user", help="ordinary user that LinuxCNC runs as, for root")
     given = parser.parse_args(arguments)
     given.out.mkdir(parents=True, exist_ok=True)
     install(given.out)
-    print("| contour error, µm: RMS (largest) | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
-    found: dict[str, dict[str, Array]] = {}
+    print("| contour error, µm: RMS (99.9 %, largest) | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
     late: dict[str, list[str]] = {}
     for program in given.programs:
         samples = run_cases(program, given.out, given.user)
-        found[program] = {case: one.contour_errors() for case, one in samples.items()}
-        cells = [f"{1e3 * rms(error):.1f} ({1e3 * largest(error):.0f})" for error in found[program].values()]
+        contours = {case: one.contour() for case, one in samples.items()}
+        cells = ["{:.1f} ({:.0f}, {:.0f})".format(*one.figures().values()) for one in contours.values()]
         print(f"| {program} | " + " | ".join(cells) + " |", flush=True)
+        drawn = {case.replace(" ", "_"): one for case, one in contours.items() if case != "without"}
+        contour_figure(drawn, f"{program}.ngc in LinuxCNC", given.out / f"{program}.png")
         late[program] = [f"{one.n_late} of {len(one.pos)}" for one in samples.values()]
         lost = sum(one.n_lost for one in samples.values())
         if lost:
@@ -112,7 +105,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print("\n| periods that began late | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
     for program, cells in late.items():
         print(f"| {program} | " + " | ".join(cells) + " |")
-    draw(found, given.out / "contour.png")
 
 
 def install(out: Path) -> None:
@@ -181,22 +173,6 @@ def hybridsep(*arguments: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(f"hybridsep {' '.join(arguments)}: {done.stderr}")
-
-
-def draw(found: Mapping[str, Mapping[str, Array]], path: Path) -> None:
-    """Draw the contour errors of each program over time."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, plots = pyplot.subplots(len(found), figsize=(9.0, 2.6 * len(found)), squeeze=False, layout="constrained")
-    for plot, (program, errors) in zip(plots[:, 0], found.items(), strict=True):
-        for case, error in errors.items():
-            plot.plot(1e-3 * np.arange(len(error)), 1e3 * error, lw=0.8, label=f"{case}: {1e3 * rms(error):.1f} µm RMS")
-        plot.set(title=program, ylabel="contour error [µm]", xlabel="time [s]")
-        plot.legend(loc="upper right", fontsize="small")
-    figure.savefig(path, dpi=130)
 
 
 if __name__ == "__main__":

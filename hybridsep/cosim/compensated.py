@@ -1,0 +1,81 @@
+"""Runs of a machine's compensator against its plant, FMU against FMU: none, physics, hybrid cold and warm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.settings import PARAMETERS
+from ..base.signals import Array
+from ..fmi.archive import build_here, default_flavour
+from ..machines.machine import Machine
+from ..plants.plant import Encoder
+from .loop import cosimulate
+from .run import Run
+
+__all__ = ["COMPENSATED", "Advance", "Runs", "compensate", "mean_summary"]
+
+TRAINING_SEED = 1000
+"""Noise seed of the training run of a warm compensator; no case uses it."""
+
+COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
+"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
+
+Runs = dict[str, Run]
+
+Advance = Callable[[str], object]
+"""Called with the name of each run before it."""
+
+
+def compensate(
+    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = (0,)
+) -> tuple[Runs, dict[str, Any]]:
+    """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
+
+    The FMU goes to the folder ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
+
+    Returns
+    -------
+    runs : dict
+        The first seed's, by the keys of :data:`COMPENSATED`.
+    summary : dict
+        The same keys → means over the seeds of :meth:`Run.summary`, with the spread
+        ``tracking_rms_um_std``.
+    """
+    flavour, weights = default_flavour(), out / f"{machine.name}.state"
+    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
+    advance(f"{label}, a run to learn from")
+    train(machine, command, weights)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
+    runs: Runs = {}
+    summary: dict[str, Any] = {}
+    for key, choice in COMPENSATED.items():
+        advance(f"{label}, {key.replace('_', ' ')}")
+        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
+        fmu = warm if key == "hybrid_warm" else cold
+        of_seeds = [
+            cosimulate(fmu, plant, command, controller_values=values, plant_values={"seed": seed}) for seed in seeds
+        ]
+        runs[key] = of_seeds[0]
+        summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
+    return runs, summary
+
+
+def train(machine: Machine, command: Array, path: Path) -> None:
+    """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
+    assert machine.plant is not None
+    compensator = machine.new_compensator()
+    encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
+    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
+    compensator.predictor.save(path)
+
+
+def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:
+    """Return the mean of each figure over several runs, and the standard deviation of one of them."""
+    mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
+    mean["n_samples"] = summaries[0]["n_samples"]
+    mean[f"{spread}_std"] = float(np.std([s[spread] for s in summaries]))
+    return mean
