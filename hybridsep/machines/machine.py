@@ -105,14 +105,11 @@ class Machine(Section):
             raise ParameterError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ParameterError("a plant of kind stage needs [[physics.mode]] entries")
-        if isinstance(self.plant, FeedDriveSection | StageSection):
-            kind = self.plant.kind
-            if self.unit != "m":
-                raise ParameterError(f"a machine with a plant of kind {kind} must have unit = 'm': it is a linear axis")
-            if self.physics.dead_time:
-                raise ParameterError(
-                    f"a machine with a plant of kind {kind} must have physics.dead_time = 0: it has none"
-                )
+        linear = isinstance(self.plant, FeedDriveSection | StageSection)
+        if linear and (self.unit != "m" or self.physics.dead_time):
+            raise ParameterError(
+                "a machine with a plant of kind feed_drive or stage must have unit = 'm' and physics.dead_time = 0"
+            )
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
@@ -381,11 +378,10 @@ def check_interval(name: str, T_s: float, axis: Machine) -> None:
     """Raise ParameterError if a file's sampling interval is not the machine's."""
     if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
         return
-    hint = "resample the file or correct T_s"
-    for factor, unit in ((1e3, "ms"), (1e6, "µs")):
-        if abs(T_s / axis.T_s / factor - 1) < 0.01:
-            hint = f"is its time in {unit}? It must be in seconds"
-    raise ParameterError(f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
+    raise ParameterError(
+        f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample the file, say "
+        "its unit of time in the column's name, or correct T_s"
+    )
 
 
 def check_unit(name: str, log: Log, axis: Machine) -> None:
@@ -397,13 +393,9 @@ def check_unit(name: str, log: Log, axis: Machine) -> None:
         )
 
 
-_COMPRESSED = (".gz", ".bz2", ".xz", ".zip")
-"""Endings behind that of the format."""
-
-
 def machine_name(path: Path, axis: str | None = None) -> str:
     """Return a machine's name from the names of a log and of the axis that is read from it."""
-    stem = path.with_suffix("") if path.suffix.lower() in _COMPRESSED else path
+    stem = path.with_suffix("") if path.suffix.lower() == ".gz" else path
     name = re.sub(r"[^A-Za-z0-9]+", "_", f"{stem.stem} {axis or ''}").strip("_")
     name = name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
     if not re.fullmatch(NAME_PATTERN, name):
@@ -430,12 +422,7 @@ PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {
 
 
 def paper_machine(name: str) -> Machine:
-    """Return a bundled machine whose predictor has the paper's settings.
-
-    Parameters
-    ----------
-    name : str
-        Of :data:`PAPER_SETTINGS`.
+    """Return one of the machines of :data:`PAPER_SETTINGS`, whose predictor has the paper's settings.
 
     Raises
     ------

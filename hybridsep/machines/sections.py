@@ -45,9 +45,6 @@ _LINE = re.compile("[^\x00-\x1f\x7f\ufffe\uffff]+")
 
 _LINE_WORDS = "one line of printable text that XML 1.0 allows"
 
-_PLACE_MAX = 60
-"""Largest length of an entry's name in a message; the known ones are shorter."""
-
 _DECLARED = {**PARAMETERS, **Limits.parameters()}
 """Parameters by the names of their entries; a drive's and a trajectory's limits have the range of the compensator's."""
 
@@ -104,7 +101,7 @@ def read_section(kind: type[_S], table: Any, place: str, problems: list[str]) ->
         where = f"{place}.{name}" if place else name
         if table.get(name) is not None:
             values[name] = one.metadata["read"](table[name], where, problems)
-            given[name] = _plain(values[name])
+            given[name] = _plain(values[name], one.metadata.get("settings"))
         elif one.default is MISSING and one.default_factory is MISSING:
             problems.append(f"{where} is missing")
     if len(problems) > before:
@@ -122,19 +119,17 @@ def _refuse_unknown(table: Mapping[str, Any], known: Mapping[str, Any], place: s
     for name in table:
         if name not in known:
             where = f"{place}.{name}" if place else str(name)
-            where = where if len(where) <= _PLACE_MAX and where.isprintable() else brief(where)
+            where = where if len(where) <= 60 and where.isprintable() else brief(where)
             problems.append(f"{where} is not an entry of a machine file; check its spelling")
 
 
-def _plain(value: Any) -> Any:
-    """Return what a section has as plain values."""
+def _plain(value: Any, settings: Mapping[str, tuple[str, Parameter]] | None = None) -> Any:
+    """Return what a section has as plain values, settings by the names of their entries."""
+    if settings is not None:
+        return {entry: value[name] for entry, (name, _) in settings.items() if name in value}
     if isinstance(value, Section):
         return dict(value.table)
-    if isinstance(value, _Settings):
-        return value.table
-    if isinstance(value, tuple):
-        return [_plain(one) for one in value]
-    return value
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value
 
 
 # Entries -----------------------------------------------------------------------------------------------------------
@@ -176,10 +171,8 @@ def _is_line(value: Any) -> bool:
 
 def name_entry() -> Any:
     """Declare the entry of a machine's name."""
-    return _text_entry(
-        lambda value: isinstance(value, str) and re.fullmatch(NAME_PATTERN, value) is not None,
-        "a letter, then at most 99 letters, digits and _",
-    )
+    what = "a letter, then at most 99 letters, digits and _"
+    return _text_entry(lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)), what)
 
 
 def line_entry(default: Any = MISSING) -> Any:
@@ -191,12 +184,9 @@ def lines_entry() -> Any:
     """Declare an entry that is a list of lines, none by default."""
 
     def read(value: Any, place: str, problems: list[str]) -> Any:
-        if not isinstance(value, list | tuple) or not value:
-            problems.append(f"{place} must be a list of lines of text, got {brief(value)}")
+        if not isinstance(value, list | tuple) or not value or not all(map(_is_line, value)):
+            problems.append(f"{place} must be a list, each entry {_LINE_WORDS}, got {brief(value)}")
             return ()
-        for i, line in enumerate(value, 1):
-            if not _is_line(line):
-                problems.append(f"{place}[{i}] must be {_LINE_WORDS}, got {brief(line)}")
         return tuple(value)
 
     return _entry(read, ())
@@ -232,19 +222,12 @@ def _modes_entry() -> Any:
     return _entry(read, (), sections=(ModeSection,))
 
 
-class _Settings(dict[str, Any]):
-    """Settings that were given, by the names of their fields; ``table`` by their entries."""
-
-    table: dict[str, Any]
-
-
 def _settings_entry(known: Mapping[str, Parameter], check: Callable[[dict[str, Any]], object]) -> Any:
     """Declare an entry that is a section of settings: field → value, of those that are given."""
     by_entry = {parameter.name: (name, parameter) for name, parameter in known.items()}
 
     def read(value: Any, place: str, problems: list[str]) -> Any:
-        found = _Settings()
-        found.table = {}
+        found: dict[str, Any] = {}
         if not isinstance(value, Mapping):
             problems.append(f"{place} must be a table, got {brief(value)}")
             return found
@@ -252,9 +235,7 @@ def _settings_entry(known: Mapping[str, Parameter], check: Callable[[dict[str, A
         _refuse_unknown(value, by_entry, place, problems)
         for entry, (name, parameter) in by_entry.items():
             if value.get(entry) is not None:
-                found[name] = found.table[entry] = _checked(
-                    parameter, value[entry], entry, f"{place}.{entry}", problems
-                )
+                found[name] = _checked(parameter, value[entry], entry, f"{place}.{entry}", problems)
         if len(problems) == before:
             try:
                 check(found)

@@ -22,7 +22,7 @@ from .discrete import BLOCK_MAX, DiscreteModel
 if TYPE_CHECKING:
     import control
 
-__all__ = ["ModalModel", "Mode", "modes_of"]
+__all__ = ["ModalModel", "Mode"]
 
 MODES_MAX = 100
 """Largest number of modes; the discrete model's tables grow with its square."""
@@ -136,7 +136,7 @@ class ModalModel:
             If the system is of another kind, discrete, zero, not finite, improper or unstable, has several channels,
             or has repeated modes.
         """
-        return cls([Mode(*numbers) for numbers in modes_of(system)], dead_time)
+        return cls(_modes_of(system), dead_time)
 
     @property
     def dc_gain(self) -> float:
@@ -212,33 +212,6 @@ class ModalModel:
         )
         return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)
 
-    def to_control(self, T_s: float | None = None, input_hold: str = "zoh") -> control.StateSpace:
-        """Return a python-control system: continuous without ``T_s``, otherwise discrete with the dead time in it.
-
-        Raises
-        ------
-        ModelError
-            If a continuous system is asked for and there is a dead time, which has no rational form.
-        """
-        import control
-
-        if T_s is None:
-            if self.dead_time:
-                raise ModelError(
-                    f"a dead time of {self.dead_time} samples has no continuous rational form; "
-                    "give T_s for a discrete one"
-                )
-            A, b, c = self.state_space()
-            return control.ss(A, b[:, None], c[None, :], [[0.0]])
-        discrete = self.discretise(T_s, input_hold, block=1)
-        system = control.ss(discrete.A, discrete.b[:, None], discrete.c[None, :], [[discrete.d]], T_s)
-        if self.dead_time:
-            # x_d delayed by d samples: a shift register in front.
-            d = self.dead_time
-            register = control.ss(np.eye(d, k=-1), np.eye(d, 1), np.eye(1, d, k=d - 1), [[0.0]], T_s)
-            system = control.series(register, system)
-        return system
-
 
 REPEATED = 1e-3
 """Relative distance below which two poles count as repeated: rounding splits a fivefold one by 7e-4."""
@@ -246,10 +219,8 @@ REPEATED = 1e-3
 _REPEATED_MODES = "G_pb has repeated modes, which a sum of modes as in eq. (15) cannot express; separate them slightly"
 
 
-def modes_of(
-    system: control.TransferFunction | control.StateSpace,
-) -> list[tuple[float, float, float, float]]:
-    """Return ``(f_n, zeta, alpha, beta)`` of each mode; see :meth:`hybridsep.ModalModel.from_control`."""
+def _modes_of(system: control.TransferFunction | control.StateSpace) -> list[Mode]:
+    """Return the modes of a system, as :meth:`ModalModel.from_control` describes."""
     import control
 
     if not isinstance(system, control.TransferFunction | control.StateSpace):
@@ -258,12 +229,16 @@ def modes_of(
         raise ModelError(f"G_pb must have one input and one output, got {system.ninputs} and {system.noutputs}")
     if system.isdtime(strict=True):
         raise ModelError("G_pb must be continuous, got a discrete system; convert it (for example with d2c) first")
-    _require_finite(system)
+    of_states = isinstance(system, control.StateSpace)
+    parts = [system.A, system.B, system.C, system.D] if of_states else [system.num[0][0], system.den[0][0]]
+    if not all(np.isfinite(part).all() for part in parts):
+        raise ModelError("G_pb must have finite coefficients, got NaN or infinity among them")
     tf = control.tf(system)
-    numerator = np.trim_zeros(np.atleast_1d(np.asarray(tf.num[0][0], dtype=float)), "f")
-    denominator = np.trim_zeros(np.atleast_1d(np.asarray(tf.den[0][0], dtype=float)), "f")
-    if isinstance(system, control.StateSpace):
-        numerator = _without_rounding(numerator, system, len(denominator))
+    numerator, denominator = (
+        np.trim_zeros(np.atleast_1d(np.asarray(part[0][0], dtype=float)), "f") for part in (tf.num, tf.den)
+    )
+    if of_states and not np.any(system.D) and len(numerator) >= len(denominator):
+        numerator = np.trim_zeros(numerator[1:], "f")  # a leading coefficient that is there by rounding
     if len(numerator) >= len(denominator):
         raise ModelError(
             "G_pb must be strictly proper, got a numerator of degree "
@@ -275,32 +250,23 @@ def modes_of(
     unstable = poles[poles.real >= 0]
     if unstable.size:
         raise ModelError(f"G_pb must be stable, got a pole at {unstable[0]:.6g} rad/s")
-
     # Frequencies normalised by their geometric mean keep the coefficients at a similar magnitude
-    scale = float(np.exp(np.mean(np.log(np.abs(poles)))))
+    magnitudes = np.abs(poles)
+    scale = float(np.exp(np.mean(np.log(magnitudes))))
     numerator = numerator / denominator[0] * scale ** (np.arange(len(numerator))[::-1] - len(poles) * 1.0)
     quadratics, numerator = _quadratics(poles / scale, numerator)
     numbers = _partial_fractions(quadratics, numerator)
-    modes = [
-        (
-            float(np.sqrt(quadratic[2]) * scale / (2 * np.pi)),
-            float(quadratic[1] / (2 * np.sqrt(quadratic[2]))),
-            float(alpha * scale**2),
-            float(beta * scale),
-        )
-        for quadratic, (alpha, beta) in zip(quadratics, numbers, strict=True)
-    ]
-    _require_faithful(modes, tf, np.abs(poles))
+    modes = []
+    for (_, damping, stiffness), (alpha, beta) in zip(quadratics, numbers, strict=True):
+        omega = float(np.sqrt(stiffness))
+        modes.append(Mode(omega * scale / (2 * np.pi), damping / (2 * omega), alpha * scale**2, beta * scale))
+    # As for a pole of high multiplicity, the modes may be others
+    omegas = np.geomspace(0.1 * magnitudes.min(), 10 * magnitudes.max(), 100)
+    expected = np.polyval(tf.num[0][0], 1j * omegas) / np.polyval(tf.den[0][0], 1j * omegas)
+    difference = ModalModel(modes).frequency_response(omegas) - expected
+    if not np.max(np.abs(difference)) < 1e-6 * np.max(np.abs(expected)):
+        raise ModelError(_REPEATED_MODES)
     return modes
-
-
-def _without_rounding(numerator: Array, system: control.StateSpace, length: int) -> Array:
-    """Drop the leading coefficient that a strictly proper state space has only by rounding."""
-    if np.any(system.D):
-        return numerator
-    padded = np.concatenate((np.zeros(max(0, length - len(numerator))), numerator))
-    padded[0] = 0.0
-    return np.trim_zeros(padded, "f")
 
 
 def _quadratics(poles: NDArray[np.complex128], numerator: Array) -> tuple[list[Array], Array]:
@@ -321,47 +287,12 @@ def _quadratics(poles: NDArray[np.complex128], numerator: Array) -> tuple[list[A
 def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
     """Solve ``N(s) = Σ_i (α_i + β_i s) Π_{j≠i} D_j(s)`` for the rows ``(α_i, β_i)``."""
     m = len(quadratics)
-    _require_distinct(quadratics)
-    columns = []
-    for i in range(m):
-        rest = reduce(np.polymul, quadratics[:i] + quadratics[i + 1 :], np.array([1.0]))
-        columns += [_padded(rest, 2 * m), _padded(np.polymul(rest, [1.0, 0.0]), 2 * m)]
-    solution: Array = np.linalg.solve(np.array(columns).T, _padded(numerator, 2 * m))
-    return solution.reshape(m, 2)
-
-
-def _require_distinct(quadratics: list[Array]) -> None:
-    """Raise ModelError for a pole in two factors; ``np.roots`` splits a k-fold pole by about ``ε^(1/k)``."""
     for others, some in combinations(map(np.roots, quadratics), 2):
         if np.any(np.abs(some[:, None] - others[None, :]) < REPEATED * np.abs(others)):
             raise ModelError(_REPEATED_MODES)
-
-
-def _require_faithful(
-    modes: list[tuple[float, float, float, float]], tf: control.TransferFunction, magnitudes: Array
-) -> None:
-    """Raise ModelError if the modes' frequency response is not the system's, as for a pole of high multiplicity."""
-    s = 1j * np.geomspace(0.1 * magnitudes.min(), 10 * magnitudes.max(), 100)
-    G = np.zeros(len(s), dtype=np.complex128)
-    for f_n, zeta, alpha, beta in modes:
-        omega = 2 * np.pi * f_n
-        G += (alpha + beta * s) / (s**2 + 2 * zeta * omega * s + omega**2)
-    expected = np.polyval(tf.num[0][0], s) / np.polyval(tf.den[0][0], s)
-    if not np.max(np.abs(G - expected)) < 1e-6 * np.max(np.abs(expected)):
-        raise ModelError(_REPEATED_MODES)
-
-
-def _require_finite(system: control.TransferFunction | control.StateSpace) -> None:
-    """Raise ModelError if a coefficient is NaN or infinite."""
-    import control
-
-    if isinstance(system, control.StateSpace):
-        parts = [system.A, system.B, system.C, system.D]
-    else:
-        parts = [system.num[0][0], system.den[0][0]]
-    if not all(np.isfinite(part).all() for part in parts):
-        raise ModelError("G_pb must have finite coefficients, got NaN or infinity among them")
-
-
-def _padded(polynomial: Array, length: int) -> Array:
-    return np.concatenate((np.zeros(length - len(polynomial)), polynomial))
+    columns = []
+    for i in range(m):
+        rest = reduce(np.polymul, quadratics[:i] + quadratics[i + 1 :], np.array([1.0]))
+        columns += [np.pad(one, (2 * m - len(one), 0)) for one in (rest, np.append(rest, 0.0))]
+    solution: Array = np.linalg.solve(np.array(columns).T, np.pad(numerator, (2 * m - len(numerator), 0)))
+    return solution.reshape(m, 2)

@@ -34,6 +34,9 @@ __all__ = [
 
 Curve = Callable[[Array], Array]
 
+_PANELS = 2000
+"""Panels of a path, over which its length is integrated."""
+
 SAMPLES_MAX = 2_000_000
 """Largest number of samples of a generated trajectory: over half an hour at 1 kHz."""
 
@@ -156,23 +159,10 @@ def spiral(
 def read_trajectory(
     path: str | Path, *, column: str = "x_d", unit: str | None = None, T_s: float | None = None
 ) -> tuple[Array, float]:
-    """Read a commanded position from a file.
+    """Return a commanded position, (n,), m, or rad where the unit is an angle, and its sampling interval, s, of a file.
 
-    Parameters
-    ----------
-    path : str or Path
-        A file with a time column ``t`` and the command, in any format of :func:`hybridsep.logs.log.read_log`.
-    column : str
-        The command's name in the file.
-    unit : str, optional
-        Unit of the command; from the column's name, or m, if left out.
-    T_s : float, optional
-        Sampling interval, s, for a file without a time column.
-
-    Returns
-    -------
-    x_d : (n,) array, m, or rad where the unit is an angle
-    T_s : float, s
+    ``column`` is the command's name there; ``unit`` and ``T_s`` are as of :func:`hybridsep.logs.log.read_log`, which
+    reads it.
 
     Raises
     ------
@@ -219,7 +209,8 @@ def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T
     (n, d) array, m
         Positions at ``k·T_s``; the arc length is inverted to 1e-12 of the total.
     """
-    nodes, arc = _arc_length(derivative, end)
+    nodes = np.linspace(0.0, end, _PANELS + 1)
+    arc = np.concatenate(([0.0], np.cumsum(_panel_lengths(derivative, nodes[:-1], nodes[1:]))))  # up to each node
     s = rest_to_rest([0.0, arc[-1]], limits, T_s)
     u = np.interp(s, arc, nodes)
     # Newton iteration on s(u) = s_k, with Gauss-Legendre quadrature from the panel's left end.
@@ -257,9 +248,3 @@ def _panel_lengths(derivative: Curve, left: Array, right: Array, order: int = 8)
     half = (right - left) / 2
     u = ((left + right) / 2)[:, None] + half[:, None] * x
     return np.asarray(half * (_speed(derivative, u.ravel()).reshape(u.shape) @ w))
-
-
-def _arc_length(derivative: Curve, end: float, panels: int = 2000) -> tuple[Array, Array]:
-    """Return the panels' nodes and the arc length up to each."""
-    nodes = np.linspace(0.0, end, panels + 1)
-    return nodes, np.concatenate(([0.0], np.cumsum(_panel_lengths(derivative, nodes[:-1], nodes[1:]))))

@@ -9,7 +9,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from modal_cases import CASES, CRITICAL, HOLDS, LIGHT, OVER, TS, UNDER, command, transfer_function
+from modal_cases import CASES, CRITICAL, LIGHT, OVER, TS, UNDER, transfer_function
 
 from hybridsep.base.errors import ModelError, ParameterError
 from hybridsep.model.discrete import DiscreteModel
@@ -34,7 +34,6 @@ def test_frequency_response_is_that_of_python_control(model: ModalModel) -> None
     omega = 2 * np.pi * np.geomspace(0.1, 400.0, 60)
     expected = np.asarray(control.tf(*transfer_function(model)).frequency_response(omega, squeeze=True).complex)
     np.testing.assert_allclose(model.frequency_response(omega), expected, rtol=1e-11)
-    np.testing.assert_allclose(np.asarray(model.to_control()(1j * omega)), expected, rtol=1e-11)
 
 
 def test_frequency_response_keeps_its_shape_and_delays() -> None:
@@ -72,7 +71,8 @@ def assert_same_modes(actual: ModalModel, expected: ModalModel, rtol: float) -> 
 )
 @pytest.mark.parametrize("kind", ["state space", "transfer function"])
 def test_round_trip_through_python_control(model: ModalModel, rtol: float, kind: str) -> None:
-    system = ModalModel(model.modes).to_control()
+    A, b, c = model.state_space()
+    system = control.ss(A, b[:, None], c[None, :], [[0.0]])
     back = ModalModel.from_control(system if kind == "state space" else control.tf(system), model.dead_time)
     assert back.dead_time == model.dead_time
     assert_same_modes(back, model, rtol)
@@ -96,19 +96,6 @@ def test_real_poles_in_any_number(zeros: list[float], poles: list[complex]) -> N
     assert len(model.modes) == (len(poles) + 1) // 2
     omega = 2 * np.pi * np.geomspace(0.05, 200.0, 40)
     np.testing.assert_allclose(model.frequency_response(omega), np.asarray(system(1j * omega)), rtol=1e-6)
-
-
-@pytest.mark.parametrize("hold", HOLDS)
-@pytest.mark.parametrize("dead_time", [0, 1, 6])
-def test_discrete_python_control_system_answers_the_same(dead_time: int, hold: str) -> None:
-    model = ModalModel([UNDER, OVER], dead_time)
-    system = model.to_control(TS, hold)
-    assert system.dt == TS
-    x_d = command(300)
-    discrete = model.discretise(TS, hold)
-    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
-    answer = control.forced_response(system, np.arange(300) * TS, x_d)
-    np.testing.assert_allclose(answer.outputs, x_pb, rtol=0, atol=1e-14)
 
 
 UNSTABLE = control.tf([1.0], [1.0, -1.0, 3.0])
@@ -160,8 +147,3 @@ def test_models_out_of_range(make: Callable[[], object], message: str) -> None:
     with pytest.raises(ParameterError) as caught:
         make()
     assert str(caught.value) == message
-
-
-def test_a_dead_time_has_no_continuous_form() -> None:
-    with pytest.raises(ModelError, match=r"^a dead time of 3 samples has no continuous rational form; give T_s for"):
-        ModalModel([UNDER], 3).to_control()
