@@ -28,27 +28,13 @@ _SPLIT = 134217729.0  # 2^27 + 1, splits a double into two halves (Veltkamp 1968
 
 
 class SampleClock(NamedTuple):
-    """Time in samples since the start.
+    """Time in samples since the start."""
 
-    Attributes
-    ----------
-    T_s : float
-        Sampling interval, s.
-    k : int
-        Index of the last instant reached.
-    since : float
-        Time since that instant, s, ≥ 0; 0 where it is at the communication point.
-    carry : float
-        Accumulated rounding error of ``since``, s.
-    end : float
-        End of the last step in the importer's time, s.
-    """
-
-    T_s: float
-    k: int
-    since: float
-    carry: float
-    end: float
+    T_s: float  # sampling interval, s
+    k: int  # index of the last instant reached
+    since: float  # time since that instant, s, ≥ 0; 0 where it is at the communication point
+    carry: float  # accumulated rounding error of ``since``, s
+    end: float  # end of the last step in the importer's time, s
 
     @classmethod
     def begin(cls, start: float, T_s: float) -> SampleClock:
@@ -120,27 +106,13 @@ class SampleClock(NamedTuple):
 
 
 class ClockStep(NamedTuple):
-    """One communication step, in samples.
+    """One communication step, in samples."""
 
-    Attributes
-    ----------
-    after : SampleClock
-        Clock at the end of the step.
-    n_samples : int
-        Samples executed in the step.
-    n_latched : int
-        Instants at which inputs are latched in the step.
-    first : float
-        Time from the start of the step to the first of them, s.
-    moved : float
-        Time by which the last instant lay before the step's end, where it was taken, s; below 0 behind it.
-    """
-
-    after: SampleClock
-    n_samples: int
-    n_latched: int
-    first: float
-    moved: float
+    after: SampleClock  # clock at the end of the step
+    n_samples: int  # samples executed in the step
+    n_latched: int  # instants at which inputs are latched in the step
+    first: float  # time from the start of the step to the first of them, s
+    moved: float  # time by which the last instant lay before the step's end, where it was taken, s; below 0 behind it
 
     @property
     def warning(self) -> str:
@@ -164,12 +136,7 @@ def check_step_size(h: float) -> None:
 def check_communication_point(t: float, end: float, tolerance: float) -> None:
     """Raise FmuError if a step begins at ``t`` and the last one ended at ``end``, s, unless rounding tells them apart.
 
-    Parameters
-    ----------
-    t, end : float
-        In the importer's time, s.
-    tolerance : float
-        Largest difference that may be rounding, s; where doubles are coarser, a few of their spacings.
+    ``tolerance``, s, is the largest difference that may be rounding, or a few spacings of doubles, if they are coarser.
     """
     if not (math.isfinite(t) and abs(t - end) <= max(tolerance, _resolution(t))):
         raise FmuError(f"the communication point must be {end!r} s, where the last step ended, got {t!r} s")

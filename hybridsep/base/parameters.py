@@ -14,52 +14,23 @@ __all__ = ["Parameter", "choice", "flag", "real", "whole"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One scalar parameter.
+    """One scalar parameter."""
 
-    Attributes
-    ----------
-    name : str
-        Name in the FMU and in messages.
-    kind : type
-        ``int``, ``float``, ``bool``, or ``str`` for one of ``choices``.
-    unit : str
-        SI unit in FMI's notation; ``"1"`` for a number.
-    description : str
-        One line.
-    default : int, float, bool, str or None
-        Value where none is given.
-    minimum, maximum : float
-        Closed bounds of the value in the FMU.
-    display_unit : str or None
-        Unit in which tools show it.
-    nonzero : float
-        Smallest non-zero magnitude, where 0 turns a feature off; 0 if there is none.
-    automatic : float or None
-        Value out of the range that stands for an automatic choice.
-    choices : tuple of str
-        Items in the order of their values in the FMU, where it is an Enumeration.
-    meanings : tuple of str
-        What each item means, in the same order.
-    learned : bool
-        Whether weights learned with one value are invalid for another: it shapes the features or the factor.
-    tunable : bool
-        Whether it may change in a run.
-    """
-
-    name: str
-    kind: type
-    unit: str
-    description: str
-    default: Any
-    minimum: float
+    name: str  # name in the FMU and in messages
+    kind: type  # ``int``, ``float``, ``bool``, or ``str`` for one of ``choices``
+    unit: str  # SI unit in FMI's notation; ``"1"`` for a number
+    description: str  # one line
+    default: Any  # value where none is given
+    minimum: float  # closed bounds, maximum too, of the value in the FMU
     maximum: float
-    display_unit: str | None = None
-    nonzero: float = 0.0
-    automatic: float | None = None
-    choices: tuple[str, ...] = ()
-    meanings: tuple[str, ...] = ()
+    display_unit: str | None = None  # unit in which tools show it
+    nonzero: float = 0.0  # smallest non-zero magnitude, where 0 turns a feature off; 0 if there is none
+    automatic: float | None = None  # value out of the range that stands for an automatic choice
+    choices: tuple[str, ...] = ()  # items in the order of their values in the FMU, where it is an Enumeration
+    meanings: tuple[str, ...] = ()  # what each item means, in the same order
+    # whether weights learned with one value are invalid for another: it shapes the features or the factor
     learned: bool = False
-    tunable: bool = False
+    tunable: bool = False  # whether it may change in a run
 
     @property
     def range_text(self) -> str:
@@ -83,14 +54,7 @@ class Parameter:
         return in_range or number == self.automatic
 
     def checked(self, value: Any, label: str | None = None) -> Any:
-        """Return a value in the parameter's type.
-
-        Parameters
-        ----------
-        value : Any
-            Value given; of a choice its name.
-        label : str, optional
-            Name to use in the message, for example ``"mode[2].zeta"``.
+        """Return a value, of a choice its name, in the parameter's type; ``label`` is its name in the message.
 
         Raises
         ------

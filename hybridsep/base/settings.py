@@ -87,12 +87,7 @@ class Settings:
 
     @classmethod
     def from_fmi(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
-        """Return the settings from the values of an FMU's variables.
-
-        Parameters
-        ----------
-        values : mapping
-            By variable name; others are ignored, missing ones have their defaults.
+        """Return the settings from the values of an FMU's variables by name; missing ones have their defaults.
 
         Raises
         ------
@@ -453,16 +448,7 @@ DRIVE_LIMIT_ENTRIES = {
 
 
 def check(name: str, value: Any, *, label: str | None = None) -> Any:
-    """Return ``value`` in the type of a parameter of :data:`PARAMETERS`.
-
-    Parameters
-    ----------
-    name : str
-        Name in FMUs.
-    value : Any
-        Value given.
-    label : str, optional
-        Name to use in the message, for example ``"mode[2].zeta"``.
+    """Return ``value`` in the type of a parameter, by its name in FMUs; ``label`` is its name in messages.
 
     Raises
     ------

@@ -15,23 +15,13 @@ __all__ = ["Alternative", "IdentifiedModel", "machine_of"]
 
 @dataclass(frozen=True)
 class Alternative:
-    """Structure that was tried.
-
-    Attributes
-    ----------
-    name : str
-    n_parameters : int
-    rms_fitted, rms_held_out : float
-        Error of the simulated position on the part that was fitted to and on the later one, m.
-    objection : str
-        Why it was not chosen whatever its error; empty if there is none.
-    """
+    """Structure that was tried."""
 
     name: str
     n_parameters: int
-    rms_fitted: float
-    rms_held_out: float
-    objection: str
+    rms_fitted: float  # error of the simulated position on the part that was fitted to, m
+    rms_held_out: float  # and on the later one, m
+    objection: str  # why it was not chosen whatever its error; empty if there is none
 
 
 @dataclass(frozen=True)

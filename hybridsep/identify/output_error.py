@@ -39,19 +39,11 @@ PIECE = 6_000
 
 @dataclass(frozen=True)
 class Segment:
-    """Consecutive samples, relative to the first command.
+    """Consecutive samples, relative to the first command."""
 
-    Attributes
-    ----------
-    u, y : (n,) array, m
-        Commanded and measured positions; ``y`` is NaN where it is missing.
-    stop : int
-        Samples before this one are fitted to.
-    """
-
-    u: Array
-    y: Array
-    stop: int
+    u: Array  # (n,), m: commanded positions
+    y: Array  # (n,), m: measured positions, NaN where missing
+    stop: int  # samples before this one are fitted to
 
     @property
     def motion(self) -> Array:
@@ -126,13 +118,7 @@ EDGE = 0.01
 
 @dataclass(frozen=True, order=True)
 class Delay:
-    """Dead time in half samples: a zero-order hold delays by half a sample beside a first-order one.
-
-    Attributes
-    ----------
-    halves : int
-        Even ones are whole samples with a first-order hold.
-    """
+    """Dead time in half samples, even ones whole with a first-order hold: a zero-order hold delays by half a sample."""
 
     halves: int
 
@@ -149,34 +135,16 @@ class Delay:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted structure.
-
-    Attributes
-    ----------
-    structure : Structure
-    delay : Delay
-    theta : (order,) array
-        Nonlinear parameters.
-    linear : (n_linear,) array
-        Linear parameters.
-    offset : float
-        Mean of the segments' offsets, m.
-    rms : float
-        Root mean square of the residual, m.
-    slowest : float
-        Lower bound of the natural frequencies, rad/s.
-    at_bound : bool
-        Whether a nonlinear parameter is at the end of its range.
-    """
+    """Fitted structure."""
 
     structure: Structure
     delay: Delay
-    theta: Array
-    linear: Array
-    offset: float
-    rms: float
-    slowest: float
-    at_bound: bool
+    theta: Array  # (order,), nonlinear parameters
+    linear: Array  # (n_linear,), linear parameters
+    offset: float  # mean of the segments' offsets, m
+    rms: float  # root mean square of the residual, m
+    slowest: float  # lower bound of the natural frequencies, rad/s
+    at_bound: bool  # whether a nonlinear parameter is at the end of its range
 
 
 class _Problem:
@@ -240,20 +208,9 @@ def fit_structure(
     slowest: float,
     rows_max: int = ROWS_MAX,
 ) -> Fit:
-    """Return the best fit from several starts.
+    """Return the best fit from several starts, nonlinear parameters ``(order,)`` each.
 
-    Parameters
-    ----------
-    segments : sequence of Segment
-    T_s : float, s
-    structure : Structure
-    delay : Delay
-    starts : sequence of (order,) array
-        Nonlinear parameters to start from.
-    slowest : float
-        Lower bound of the natural frequencies, rad/s.
-    rows_max : int
-        Residuals that take part, about.
+    ``slowest``, rad/s, bounds the natural frequencies from below; about ``rows_max`` residuals take part.
     """
     problem = _Problem(segments, T_s, structure, delay, rows_max)
     low, high = structure.bounds(T_s, slowest)

@@ -45,13 +45,7 @@ _RESOLVED = 0.02
 def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_s: float, input_hold: str) -> float:
     """Return the period, m, with which a model's residual repeats; 0 without strong evidence of one.
 
-    Parameters
-    ----------
-    pieces : iterable of two (n,) arrays, m
-        Commanded and measured positions, NaN where missing.
-    model : ModalModel
-    T_s : float, s
-    input_hold : {"zoh", "foh"}
+    ``pieces`` are commanded and measured positions, ``(n,)`` each, m, NaN where missing.
     """
     discrete = model.discretise(T_s, input_hold)
     found = []

@@ -17,16 +17,7 @@ DEAD_TIME_MAX = 0.25
 
 
 def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:
-    """Return the fit of a structure over poles and dead time.
-
-    Parameters
-    ----------
-    segments : sequence of Segment
-    T_s : float, s
-    structure : Structure
-    known : mapping
-        Fits of simpler structures, which give the starts.
-    """
+    """Return the fit of a structure over poles and dead time; ``known`` fits of simpler ones give the starts."""
     longest = min(DEAD_TIME_MAX / T_s, max(segment.stop for segment in segments) / 4)
     limit = int(2 * longest)
     cache: dict[int, Fit] = {}

@@ -28,10 +28,6 @@ def slow_parts(modes: Sequence[Mode]) -> list[float]:
     """Return the frequencies, Hz, of the slow parts that are nearly cancelled, by each other or by zeros.
 
     The parts are the partial fractions of eq. (15): the modes, an over-damped mode as its two real poles.
-
-    Parameters
-    ----------
-    modes : sequence of Mode
     """
     parts = sorted(part for mode in modes for part in _parts(mode))
     frequencies = [f for f, _, _ in parts]
@@ -100,20 +96,11 @@ LAGS = 20
 
 @dataclass(frozen=True)
 class Candidate:
-    """Structure with its fit to the first part and its error on the later one.
-
-    Attributes
-    ----------
-    fit : Fit
-    held_out : (n,) array, m
-        Measured minus simulated position on the later part, the common offset removed.
-    objection : str
-        Why it cannot be chosen, in words; empty if it can.
-    """
+    """Structure with its fit to the first part and its error on the later one."""
 
     fit: Fit
-    held_out: Array
-    objection: str
+    held_out: Array  # (n,), m: measured minus simulated position on the later part, the common offset removed
+    objection: str  # why it cannot be chosen, in words; empty if it can
 
     @property
     def structure(self) -> Structure:
@@ -140,15 +127,8 @@ def compare_structures(
 ) -> list[Candidate]:
     """Return the candidates, simplest first, fitted to the first part of the motion and judged on the later one.
 
-    Higher orders are left out once two of them have brought no smaller error, or the residual is white.
-
-    Parameters
-    ----------
-    segments : sequence of Segment
-    T_s : float, s
-    structures : sequence of Structure
-    progress : callable, optional
-        Called with a message and the fraction done.
+    Higher orders are left out once two of them have brought no smaller error, or the residual is white; ``progress`` is
+    called with a message and the fraction done.
     """
     split = motion_split(segments, 1.0 - HELD_OUT)
     n_fitted = sum(segment.stop for segment in split)

@@ -45,23 +45,12 @@ class Structure:
 
     Its nonlinear parameters are ``log ω_i, log ζ_i`` of each mode, then ``log 1/τ`` of the lag; its linear ones the
     static gain of each mode and of the lag, and ``β_i/ω_i`` of each mode with a zero.
-
-    Attributes
-    ----------
-    n_modes : int
-        Second-order modes.
-    lag : bool
-        Whether there is a first-order lag as well.
-    zero : bool
-        Whether the modes have a ``β``.
-    unit_gain : bool
-        Whether the static gain is 1, not estimated.
     """
 
-    n_modes: int
-    lag: bool = False
-    zero: bool = False
-    unit_gain: bool = True
+    n_modes: int  # second-order modes
+    lag: bool = False  # whether there is a first-order lag as well
+    zero: bool = False  # whether the modes have a ``β``
+    unit_gain: bool = True  # whether the static gain is 1, not estimated
 
     @property
     def order(self) -> int:
@@ -108,14 +97,8 @@ class Structure:
     def modes(self, theta: Array, linear: Array, T_s: float) -> list[Mode]:
         """Return the modes of eq. (15).
 
-        Parameters
-        ----------
-        theta : (order,) array
-            Nonlinear parameters.
-        linear : (n_linear,) array
-            Static gains, the first one left out if they sum to 1, then ``β_i/ω_i``.
-        T_s : float
-            Sampling interval, s.
+        ``theta``, ``(order,)``, are the nonlinear parameters, ``linear``, ``(n_linear,)``, the static gains, the
+        first one left out if they sum to 1, then ``β_i/ω_i``.
         """
         gains, betas = self.gains(linear)
         if self.order == 0:
@@ -138,15 +121,7 @@ class Structure:
 
 
 def lag_mode(tau: float, gain: float = 1.0) -> Mode:
-    """Return ``gain/(τ s + 1)`` as a mode: ``(1/τ² + s/τ)/(s + 1/τ)²``, whose zero cancels one of its two poles.
-
-    Parameters
-    ----------
-    tau : float
-        Time constant, s.
-    gain : float
-        Static gain.
-    """
+    """Return ``gain/(τ s + 1)``, τ in s, as a mode: ``(1/τ² + s/τ)/(s + 1/τ)²``, whose zero cancels a pole."""
     return Mode(f_n=1 / (2 * np.pi * tau), zeta=1.0, alpha=gain / tau**2, beta=gain / tau)
 
 
@@ -209,15 +184,8 @@ def sections_of(structure: Structure, theta: Array, T_s: float, input_hold: str)
 def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Array:
     """Return the responses whose weighted sum is the position, ``(n, n_columns)``, m.
 
-    First the responses of modes and lag, with a static gain of 1, then the responses of the modes' zeros.
-
-    Parameters
-    ----------
-    structure : Structure
-    sections : sequence of Section
-        From :func:`sections_of`.
-    u : (n,) array, m
-        Command after the dead time, 0 before.
+    First the responses of modes and lag, with a static gain of 1, then the responses of the modes' zeros; ``u``, (n,),
+    m, is the command after the dead time, 0 before.
     """
     if not sections:
         return u[:, None]

@@ -28,20 +28,11 @@ _STEP = 1e-5
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated parameter.
-
-    Attributes
-    ----------
-    name : str
-    value : float
-    std : float
-        Standard deviation; 0 for a parameter that was not estimated.
-    unit : str
-    """
+    """Estimated parameter."""
 
     name: str
     value: float
-    std: float
+    std: float  # standard deviation; 0 for a parameter that was not estimated
     unit: str
 
 

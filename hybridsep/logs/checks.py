@@ -80,51 +80,25 @@ motion that repeat the one before, from which they are noted."""
 
 @dataclass(frozen=True)
 class Picture:
-    """Data of a picture that shows a finding.
-
-    Attributes
-    ----------
-    title : str
-    x_label, y_label : str
-        With units.
-    lines : mapping
-        Name → two (n,) arrays, abscissa and ordinate.
-    marks : (m,) array
-        Abscissae that the finding is about.
-    """
+    """Data of a picture that shows a finding."""
 
     title: str
-    x_label: str
+    x_label: str  # both with units
     y_label: str
-    lines: Mapping[str, tuple[Array, Array]]
-    marks: Array = field(default_factory=lambda: np.empty(0))
+    lines: Mapping[str, tuple[Array, Array]]  # name → abscissa and ordinate, (n,) each
+    marks: Array = field(default_factory=lambda: np.empty(0))  # (m,), abscissae that the finding is about
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with a log, or worth knowing of it.
+    """What is wrong with a log, or worth knowing of it."""
 
-    Attributes
-    ----------
-    name : str
-        A key of ``FINDINGS`` of ``docs/messages.py``.
-    words : str
-        What it is, by how much, and what to do.
-    evidence : mapping
-        The statistic, by name; SI units.
-    picture : Picture
-    refused : bool
-        Whether the columns do not mean what they were read for; otherwise it is a note.
-    options : tuple of (str, str)
-        Options that put it right, one of them, each with what it means.
-    """
-
-    name: str
-    words: str
-    evidence: Mapping[str, float]
+    name: str  # a key of ``FINDINGS`` of ``docs/messages.py``
+    words: str  # what it is, by how much, and what to do
+    evidence: Mapping[str, float]  # the statistic, by name; SI units
     picture: Picture = field(repr=False)
-    refused: bool = False
-    options: tuple[tuple[str, str], ...] = ()
+    refused: bool = False  # whether the columns do not mean what they were read for; otherwise it is a note
+    options: tuple[tuple[str, str], ...] = ()  # options that put it right, one of them, each with what it means
 
     def __str__(self) -> str:
         return f"{'error' if self.refused else 'note'}: {self.plain}"
@@ -227,23 +201,13 @@ def _unit(log: Log) -> Iterator[Finding]:
 
 
 class Following(NamedTuple):
-    """How one signal follows another.
+    """How one signal follows another."""
 
-    Attributes
-    ----------
-    left : float
-        Share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1.
-    gain, lag : float
-        Sum of the mixture's weights, and their mean lag, samples.
-    gain_at_one, lag_of_one : float
-        Weight of the best single lag, and that lag.
-    """
-
-    left: float
-    gain: float
-    lag: float
-    gain_at_one: float
-    lag_of_one: int
+    left: float  # share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1
+    gain: float  # sum of the mixture's weights
+    lag: float  # their mean lag, samples
+    gain_at_one: float  # weight of the best single lag
+    lag_of_one: int  # that lag, samples
 
 
 def following(u: Array, x: Array) -> Following:
@@ -278,13 +242,7 @@ def following(u: Array, x: Array) -> Following:
 def _meaning(log: Log, x_d: Array, x: Array, given: Following) -> Iterator[Finding]:
     """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis.
 
-    Parameters
-    ----------
-    log : Log
-    x_d, x : (n,) array
-        Its liveliest samples, NaN where missing.
-    given : Following
-        How the measured position follows the commanded one there.
+    ``x_d`` and ``x``, ``(n,)``, are the liveliest samples, NaN where missing, and ``given`` how x follows x_d there.
     """
     known = np.isfinite(x)
     picture = _over_time(log, "Command and measurement")
@@ -335,13 +293,9 @@ _MEANINGS = {
 
 
 def _other_meaning(x_d: Array, x: Array, filled: Array, given: Following) -> str:
-    """Return the reading of two columns that explains them far better than the given one; empty without any.
+    """Return the reading of two columns, ``(n,)``, that explains them far better than the given one; empty without any.
 
-    Parameters
-    ----------
-    x_d, x, filled : (n,) array
-        Commanded and measured positions, these also interpolated where they are missing.
-    given : Following
+    ``filled`` is ``x`` interpolated where it is missing.
     """
     variance, errors = float(np.nanvar(x)), [1.0]
     for position in (x_d - x, x_d + x):

@@ -33,21 +33,11 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class Column:
-    """Column that is read.
+    """Column that is read."""
 
-    Attributes
-    ----------
-    name : str
-        Its name in the file.
-    unit : Unit
-        Unit of its numbers.
-    stated : bool
-        Whether the file or the caller stated the unit; otherwise it is SI.
-    """
-
-    name: str
-    unit: Unit
-    stated: bool
+    name: str  # its name in the file
+    unit: Unit  # unit of its numbers
+    stated: bool  # whether the file or the caller stated the unit; otherwise it is SI
 
 
 def choose_columns(
@@ -60,17 +50,9 @@ def choose_columns(
 ) -> dict[str, Column]:
     """Return the columns to read, by role.
 
-    Parameters
-    ----------
-    source : Source
-    columns : mapping, optional
-        Names by role; a name may leave out the unit that the file's has.
-    unit : str, optional
-        Unit of the positions.
-    axis : str, optional
-        One of several axes, by the format's name or the columns' names: ``X1`` of ``X1_CommandPosition``.
-    time_needed : bool
-        Whether a time column must be there.
+    ``columns`` has given names by role, which may leave out the unit that the file's have; ``unit`` is the positions';
+    ``axis`` one of several, by the format's name or the columns' names (``X1`` of ``X1_CommandPosition``);
+    ``time_needed`` whether a time column must be there.
 
     Raises
     ------
@@ -234,24 +216,13 @@ def _position(source: Source, name: str, given: str | None) -> Column:
 
 @dataclass(frozen=True)
 class Channel:
-    """Column of a file, as it is listed.
-
-    Attributes
-    ----------
-    name : str
-    unit : str
-        As the file states it, or the format's convention; empty if there is none.
-    role : str
-        What it is read as without a word of the user's, ``"t"``, ``"x_d"`` or ``"x"``; empty otherwise.
-    n_samples, interval : int, float, s, optional
-        Number and mean interval of its times, where it has times.
-    """
+    """Column of a file, as it is listed."""
 
     name: str
-    unit: str = ""
-    role: str = ""
-    n_samples: int | None = None
-    interval: float | None = None
+    unit: str = ""  # as the file states it, or the format's convention; empty if there is none
+    role: str = ""  # what it is read as without a word of the user's, ``"t"``, ``"x_d"`` or ``"x"``; empty otherwise
+    n_samples: int | None = None  # number of its times, where it has times
+    interval: float | None = None  # their mean interval, s
 
 
 def channels(source: Source) -> list[Channel]:
@@ -292,13 +263,7 @@ def side_by_side(source: Source, columns: Mapping[str, Column], *, resample: boo
     that is sampled more slowly, between its first and last time in which there are both; the other is interpolated
     linearly, and refused where it has a gap: nothing is invented between samples.
 
-    Parameters
-    ----------
-    source : Source
-    columns : mapping
-        By role.
-    resample : bool
-        Whether that is done; otherwise times that differ are refused.
+    Times that differ are refused unless ``resample`` is set.
 
     Raises
     ------

@@ -38,23 +38,13 @@ _UNEVEN = 0.05
 
 
 class Samples(NamedTuple):
-    """Samples of a log.
+    """Samples of a log."""
 
-    Attributes
-    ----------
-    t, x_d, x_meas : (n,) array, s, m or rad
-        Times, commanded and measured positions, NaN where missing.
-    T_s : float, s
-        Sampling interval.
-    starts : tuple of int
-        First samples of the segments; the first is 0.
-    """
-
-    t: Array
-    x_d: Array
-    x_meas: Array
-    T_s: float
-    starts: tuple[int, ...] = (0,)
+    t: Array  # (n,), s
+    x_d: Array  # (n,), m or rad: commanded positions
+    x_meas: Array  # (n,), m or rad: measured ones, NaN where missing
+    T_s: float  # sampling interval, s
+    starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
 
     def segments(self) -> list[Samples]:
         """Return each segment by itself."""

@@ -19,18 +19,11 @@ __all__ = ["ArraysSource", "Block", "Source", "check_column", "line_number", "pa
 
 @dataclass(frozen=True)
 class Block:
-    """Samples of columns.
+    """Samples of columns."""
 
-    Attributes
-    ----------
-    columns : list of (m,) array
-        One for each requested name, as in the file, not checked for NaN, timestamps as seconds since the first one;
-        ``m ≥ 1``.
-    where : callable
-        Location of sample ``i`` of the block for messages: a line of the file, or a sample of the log.
-    """
-
+    # one (m,) for each requested name, as in the file, not checked for NaN, timestamps as seconds since the first one
     columns: list[Array]
+    # location of sample ``i`` of the block for messages: a line of the file, or a sample of the log
     where: Callable[[int], str]
 
 

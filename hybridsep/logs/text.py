@@ -59,33 +59,15 @@ _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
 
 @dataclass(frozen=True)
 class _Table:
-    """Table of a text.
+    """Table of a text."""
 
-    Attributes
-    ----------
-    names : list of str
-        Column names, one empty where rows have names of their own.
-    units : dict
-        Name → unit, from a row of units below the names.
-    delimiter : str or None
-        Between columns; None is blanks.
-    decimal_comma : bool
-        Whether numbers have a decimal comma.
-    header : int
-        Line number of the names, from 1.
-    first : int
-        Line number from which numbers are read.
-    clocks : set of int
-        Indices of columns of timestamps with a time of day.
-    """
-
-    names: list[str]
-    units: dict[str, str]
-    delimiter: str | None
-    decimal_comma: bool
-    header: int
-    first: int
-    clocks: set[int]
+    names: list[str]  # column names, one empty where rows have names of their own
+    units: dict[str, str]  # name → unit, from a row of units below the names
+    delimiter: str | None  # between columns; None is blanks
+    decimal_comma: bool  # whether numbers have a decimal comma
+    header: int  # line number of the names, from 1
+    first: int  # line number from which numbers are read
+    clocks: set[int]  # indices of columns of timestamps with a time of day
 
 
 class TextSource(Source):

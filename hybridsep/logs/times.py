@@ -44,23 +44,12 @@ _ROUNDING, _ERRORS, _ROUNDING_MAX = 1e-8, 3.0, 1e-4
 
 @dataclass(frozen=True)
 class Times:
-    """Times of a log in the order of the file.
+    """Times of a log in the order of the file."""
 
-    Attributes
-    ----------
-    t : (n,) array, s
-    T_s : float, s
-        Sampling interval.
-    starts : tuple of int
-        First samples of the segments; the first is 0.
-    remarks : tuple of str
-        What was unwrapped, and why segments begin.
-    """
-
-    t: Array
-    T_s: float
-    starts: tuple[int, ...] = (0,)
-    remarks: tuple[str, ...] = ()
+    t: Array  # (n,), s
+    T_s: float  # sampling interval, s
+    starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
+    remarks: tuple[str, ...] = ()  # what was unwrapped, and why segments begin
 
 
 def given_times(n: int, T_s: float) -> Times:
@@ -72,20 +61,9 @@ def given_times(n: int, T_s: float) -> Times:
 def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated: bool, given: float | None) -> Times:
     """Return what a column of times tells.
 
-    Parameters
-    ----------
-    path : Path
-    name : str
-        Of the column, for messages.
-    times : (n,) array
-        As in the file, n ≥ 2.
-    factor : float, s
-        Their unit.
-    stated : bool
-        Whether the file states it.
-    given : float, s, optional
-        Sampling interval that the user gives. It tells the unit of times that state none, and replaces times that are
-        rounded too coarsely.
+    ``times``, ``(n,)`` with n ≥ 2, are as in the file, in a unit of ``factor`` seconds, which the file ``stated`` or
+    not. A ``given`` sampling interval, s, tells the unit of times that state none, and replaces times that are rounded
+    too coarsely.
 
     Raises
     ------
@@ -212,15 +190,7 @@ def _words(t: Array, starts: Indices, T_s: float) -> list[str]:
 
 
 def _starts(t: Array, T_s: float) -> Indices:
-    """Return the samples that are later than the one before by more than an interval, or earlier, and all after them.
-
-    Parameters
-    ----------
-    t : (n,) array, s
-        Times.
-    T_s : float, s
-        Sampling interval.
-    """
+    """Return the samples that are later than the one before by over an interval, or earlier, and all after them."""
     steps = np.diff(t) / T_s
     at = np.flatnonzero((steps > _GAP) | (steps < 1.0 - _GAP)) + 1
     if not len(at):

@@ -24,21 +24,11 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of a column.
+    """Unit of a column."""
 
-    Attributes
-    ----------
-    name : str
-        Its spelling in options.
-    si : {"m", "rad", "s"}
-        SI unit that the library computes with: metres for linear axes, radians for rotary ones, seconds.
-    factor : float
-        One unit in SI.
-    """
-
-    name: str
-    si: str
-    factor: float
+    name: str  # its spelling in options
+    si: str  # SI unit that the library computes with: metres for linear axes, radians for rotary ones, seconds
+    factor: float  # one unit in SI
 
 
 def _units(si: str, factors: Mapping[str, float]) -> dict[str, Unit]:
@@ -60,22 +50,12 @@ TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, 
 
 @dataclass(frozen=True)
 class DisplayUnits:
-    """Units in which a log's positions and their errors are printed and drawn, each a factor from SI and a name.
-
-    Attributes
-    ----------
-    position : tuple of float and str
-        Of positions.
-    small, large : tuple of float and str
-        Of errors below and above :attr:`limit`.
-    limit : float
-        Error, in the small unit, from which on the large one is taken.
-    """
+    """Units in which a log's positions and their errors are printed and drawn, each a factor from SI and a name."""
 
     position: tuple[float, str]
-    small: tuple[float, str]
-    large: tuple[float, str]
-    limit: float = 1e4
+    small: tuple[float, str]  # of errors below ``limit``
+    large: tuple[float, str]  # and above
+    limit: float = 1e4  # error in the small unit
 
     def error(self, size: float) -> tuple[float, str]:
         """Return factor and name of the unit of errors of about ``size``, m or rad."""
