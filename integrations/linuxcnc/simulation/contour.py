@@ -135,7 +135,7 @@ def train(log: Path, out: Path) -> None:
     for axis in AXES:
         machine, state = str(HERE / f"{axis}.toml"), str(out / f"{axis}.state")
         columns = ("--x_d", f"{axis}_out", "--x", f"{axis}_fb", "--unit", "mm", "--T_s", "0.001")
-        hybridsep("backtest", str(log), "--machine", machine, *columns, "--as-is", "--save", state)
+        hybridsep("backtest", str(log), "--machine", machine, *columns, "--save", state)
         hybridsep("hal", machine, "--out", str(out / "hal"), "--weights", state)
 
 
