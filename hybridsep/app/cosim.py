@@ -71,14 +71,8 @@ def cosim(
     contour errors of the true positions with no compensation, physics model, hybrid cold, and warm from such a run.
     """
     if path is not None or axes:
-        of_one: dict[str, object] = {
-            "--machine": machine != DEFAULT_MACHINE,
-            "--trajectory": trajectory,
-            "--compensate": compensate,
-        }
-        of_one |= {"--predictor": predictor, "--plant": plant, "--weights": weights}
-        if foreign := [name for name, given in of_one.items() if given]:
-            raise ParameterError(f"{', '.join(foreign)} is for one axis; leave it out with --path")
+        if machine != DEFAULT_MACHINE or any((trajectory, compensate, predictor, plant, weights)):
+            raise ParameterError("-m, --trajectory, --compensate, --predictor, --plant and --weights are for one axis")
         _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
         return
     from ..compensate.expected import limits_that_bind
@@ -144,9 +138,6 @@ def _two_axes(
     from ..plants.path import read_path
     from .console import RUNS, check_outputs, print_contours, print_written, progress_bar
 
-    if figure is not None:
-        from ..evaluate.figures import contour_figure
-
     if path is None or len(axes) != 2:
         raise ParameterError(
             f"two machines and a path belong together, got {len(axes)}{'' if path else ' and none'}: "
@@ -158,24 +149,17 @@ def _two_axes(
     delays = [f"{axis.T_s:g} s and {axis.compensator_settings.preview} samples" for axis in machines]
     if delays[0] != delays[1]:
         raise ParameterError(f"both axes must have one T_s and one preview, got {' and '.join(delays)}")
-    inputs = {f"machine file of {name}": machine_path(axis) for name, axis in zip("XY", axes, strict=True)}
-    check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), {"path": path, **inputs}, force=force)
-    meant = read_path(path, _path_limits(machines), machines[0].T_s, unit)
+    inputs = {"path": path, **{f"machine file {axis}": machine_path(axis) for axis in axes}}
+    check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), inputs, force=force)
+    limits = Limits(*map(min, *map(_path_limits, machines)))
+    meant = read_path(path, limits, machines[0].T_s, unit)
     runs, steps = [], count()
     with tempfile.TemporaryDirectory() as temporary, progress_bar(as_json) as advance:
+        say = lambda what: advance(what, next(steps) / (2 + 2 * len(COMPENSATED)))  # noqa: E731
         for name, axis, command in zip("XY", machines, meant.axes, strict=True):
-            folder = Path(temporary) / name
-            runs.append(
-                compensate(
-                    axis,
-                    build_here(axis, "FeedDrive", folder, flavour),
-                    command,
-                    folder,
-                    f"{name} axis",
-                    lambda what: advance(what, next(steps) / (2 + 2 * len(COMPENSATED))),
-                    [axis.plant.seed] if axis.plant is not None else [0],
-                )[0]
-            )
+            folder = Path(temporary, name)
+            plant = build_here(axis, "FeedDrive", folder, flavour)
+            runs.append(compensate(axis, plant, command, folder, f"{name} axis", say)[0])
     x, y = runs
     contours = contours_of(x, y, meant)
     title = f"{path.name}: {machines[0].title}; {machines[1].title}"
@@ -185,27 +169,22 @@ def _two_axes(
             columns |= {f"x_{key}": x[key].x, f"y_{key}": y[key].x, f"contour_{key}": contour.error}
         save_columns(columns, out)
     if figure is not None:
+        from ..evaluate.figures import contour_figure
+
         contour_figure(contours, title, figure)
     print_contours({key: contour.figures() for key, contour in contours.items()}, as_json, title)
     if not as_json:
         print_written(out, figure)
 
 
-def _path_limits(machines: Sequence[Machine]) -> Limits:
-    """Return the limits along a path: the lower ones of the axes, each those of its trajectories.
-
-    Where a machine has none, they leave its compensator the room within the drive's that ``fit`` leaves it.
-    """
+def _path_limits(axis: Machine) -> tuple[float, ...]:
+    """Return velocity, acceleration and jerk for paths: ``[limits]``, or the drive's with the room of a fit's."""
     from ..fitting.compensation import MARGINS
 
-    found = []
-    for axis in machines:
-        drive, _ = axis.command_limits()
-        if axis.limits is not None or drive is None:
-            found.append(astuple(axis.trajectory_limits()))
-        else:
-            found.append(tuple(most / more for most, more in zip(astuple(drive), MARGINS.tolist(), strict=True)))
-    return Limits(*map(min, *found))
+    drive, _ = axis.command_limits()
+    if axis.limits is not None or drive is None:
+        return astuple(axis.trajectory_limits())
+    return tuple(most / more for most, more in zip(astuple(drive), MARGINS.tolist(), strict=True))
 
 
 def _file(trajectory: str) -> str | None:

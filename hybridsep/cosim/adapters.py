@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..base.errors import FmuError, brief
+from ..base.errors import FmuError
 from ..base.settings import check
 from ..base.signals import check_position
 from ..compensate.compensator import SepCompensator
@@ -178,10 +178,6 @@ class LibraryDrive:
         self.plant.step(x_d, h)
 
 
-_SAMPLES_MAX = 1_000_000
-"""Most samples of an FMU's window or delay; a hybridsep FMU's have at most a tenth."""
-
-
 class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     """FMU whose instance lives as long as the context.
 
@@ -213,13 +209,6 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     def _initialise(self, inputs: Mapping[str, float]) -> None:
         self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
 
-    def _samples(self, name: str, least: int = 0) -> int:
-        """Return a number of samples reported by the FMU, checked."""
-        value = self.fmu.get(name)
-        if not least <= value <= _SAMPLES_MAX:  # NaN too
-            raise FmuError(f"{self.name}: {name} must be {least} … {_SAMPLES_MAX} samples, got {brief(value)}")
-        return int(value)
-
     def _interval(self) -> float:
         """Return the sampling interval reported by the FMU, s, checked."""
         return float(check("T_s", self.fmu.get("T_s"), label=f"{self.name}: T_s"))
@@ -246,8 +235,8 @@ class FmuController(_OpenedFmu):
         """Begin a run at rest at ``start``, m."""
         fmu = self.fmu
         self._initialise({"x_d_ahead": start, "x_meas": start})
-        self.delay, self.Np, self.T_s = self._samples(self.kind.delay), self._samples("Np"), self._interval()
-        self.late = self._samples("measurement_delay", -1) if "measurement_delay" in fmu.variables else 0
+        self.delay, self.Np, self.T_s = int(fmu.get(self.kind.delay)), int(fmu.get("Np")), self._interval()
+        self.late = int(fmu.get("measurement_delay")) if "measurement_delay" in fmu.variables else 0
         self._get = fmu.reader([*self.kind.outputs, self.kind.state])
         self._step = fmu.real_stepper(["x_d_ahead", "x_meas"])
 

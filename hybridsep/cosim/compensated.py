@@ -31,11 +31,12 @@ Advance = Callable[[str], object]
 
 
 def compensate(
-    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = (0,)
+    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = ()
 ) -> tuple[Runs, dict[str, Any]]:
     """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
 
     The FMU goes to the folder ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
+    The seeds of the noise are the machine's if none are given.
 
     Returns
     -------
@@ -45,6 +46,8 @@ def compensate(
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
+    assert machine.plant is not None
+    seeds = seeds or [machine.plant.seed]
     flavour, weights = default_flavour(), out / f"{machine.name}.state"
     cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
     advance(f"{label}, a run to learn from")

@@ -14,7 +14,7 @@ from ..cosim.compensated import COMPENSATED, Advance, Runs, compensate, mean_sum
 from ..cosim.contour import contours_of
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
-from ..evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
+from ..evaluate.figures import contour_figure, prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
 from ..fmi.archive import build_here, default_flavour
 from ..fmi.spec import fmu_name
@@ -90,7 +90,6 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
-    spiral_figure(axes["x"], axes["y"], out / "spiral.png")
     contours = contours_of(compensated["x"], compensated["y"])
     contour_figure(contours, "Spiral, X and Y compensated", out / "spiral_contour.png")
     for case in summary.values():
@@ -121,7 +120,7 @@ def _worse(run: Run) -> dict[str, Any]:
 def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:
     """Return all files that :func:`demo` writes."""
     out, flavour = Path(out), default_flavour()
-    files = [out / name for name in ("index.html", "summary.json", *(["spiral.png", "spiral_contour.png"] * full))]
+    files = [out / name for name in ("index.html", "summary.json", *(["spiral_contour.png"] * full))]
     for case, name in list(MACHINES.items())[: len(MACHINES) if full else 1]:
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")

@@ -92,7 +92,6 @@ _PICTURES = {
     "staircase.png": "Staircase: prediction error of the paper's model",
     "spiral_x.png": "Spiral, X axis: prediction error of the paper's model",
     "spiral_y.png": "Spiral, Y axis: prediction error of the paper's model",
-    "spiral.png": "Spiral: path and prediction error of the paper's model",
 }
 """What pictures show, in the order of the page; the first ones are of what compensation is worth."""
 

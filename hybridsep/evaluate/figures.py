@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -38,7 +37,6 @@ __all__ = [
     "legend_above",
     "prediction_figure",
     "save_figure",
-    "spiral_figure",
     "tracking_figure",
 ]
 
@@ -246,22 +244,6 @@ def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
     return patches
 
 
-def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
-    """Draw each model's prediction error along the spiral, both axes together, to a PNG."""
-    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    figure.suptitle("Spiral: distance between the measured and the predicted point")
-    errors = [1e6 * np.hypot(x.x_meas - getattr(x, name), y.x_meas - getattr(y, name)) for name in ("x_pb", "x_h")]
-    limit = max(float(np.percentile(distance, 99)) for distance in errors)
-    for axes, distance, label in zip(panels, errors, ("physics-based model", "linear hybrid model"), strict=True):
-        points = _draw_path(axes, x, y, distance, limit, size=3)
-        axes.set_title(f"{label}, RMS {rms(distance):.1f} µm", fontsize=10)
-        axes.set_xlabel("X [mm]")
-    panels[0].set_ylabel("Y [mm]")
-    figure.colorbar(points, ax=panels, label="prediction error [µm]", extend="max")
-    save_figure(figure, path)
-
-
 def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path) -> None:
     """Draw runs along a planar path to a PNG: the path with the error magnified, and the error over time.
 
@@ -331,11 +313,3 @@ def _draw_errors(figure: Figure, place: SubplotSpec, contours: Mapping[str, Cont
         title = f"radial error{whose}; rings at ±{ring:g} µm"
     axes.tick_params(labelsize=8)
     axes.set_title(title, fontsize=9)
-
-
-def _draw_path(axes: Axes, x: Run, y: Run, error: Array, limit: float, *, size: float) -> PathCollection:
-    """Draw the commanded path, coloured by an error ``(n,)``, µm, from 0 to a limit."""
-    axes.set_aspect("equal")
-    return axes.scatter(
-        1e3 * x.x_d, 1e3 * y.x_d, c=error, s=size, cmap="viridis", vmin=0.0, vmax=limit, rasterized=True
-    )

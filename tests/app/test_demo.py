@@ -140,7 +140,6 @@ def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.Mo
     assert written <= set(demo_files(tmp_path, full=True))
     drawn = {path.stem for path in written if path.suffix == ".png"}
     assert drawn == {
-        "spiral",
         "spiral_contour",
         *(f"spiral_{axis}{what}" for axis in "xy" for what in ("", "_compensated")),
     }
@@ -151,7 +150,7 @@ def test_a_full_demo_writes_all_it_promises(full: Demonstration) -> None:
     assert tuple(full.summary) == CASES
     for case in full.summary.values():
         check_case(case)
-    figures = [*CASES, "spiral", "spiral_contour", *(f"{case}_compensated" for case in CASES)]
+    figures = [*CASES, "spiral_contour", *(f"{case}_compensated" for case in CASES)]
     check_files(full, figures, full=True)
     assert len(list((full.out / "fmus").glob("*.fmu"))) == 9
     assert len(list((full.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3

@@ -11,7 +11,7 @@ from drawn import cut_off, figures_drawn, hiding_legends
 
 from hybridsep.cosim.contour import Contour
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
-from hybridsep.evaluate.figures import contour_figure, prediction_figure, spiral_figure, tracking_figure
+from hybridsep.evaluate.figures import contour_figure, prediction_figure, tracking_figure
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.path import PlanarPath
 
@@ -57,13 +57,12 @@ def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
     with figures_drawn() as drawn:
         tracking_figure(several, "Staircase, compensated", tmp_path / "a.png")
         tracking_figure({"hybrid": run}, "Staircase, compensated", tmp_path / "a.png")
-        spiral_figure(run, run, tmp_path / "a.png")
         turn = 0.02 * np.exp(2j * np.pi * np.arange(1000) / 999)
         for centre in (np.nan, 0.0):  # over time, and as a ballbar draws it
             path = replace(PlanarPath.of(turn), centre=np.full(1000, complex(centre)))
             contour = Contour.of(path, turn * (1.0 + 1e-3 * turn), 1e-3)
             contour_figure(dict.fromkeys(several, contour), "a", tmp_path / "a.png")
-    assert len(drawn) == 5
+    assert len(drawn) == 4
     for figure in drawn:
         assert cut_off(figure) == []
         assert hiding_legends(figure) == 0
