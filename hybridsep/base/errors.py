@@ -78,10 +78,7 @@ class SignalError(HybridSepError, ValueError):
 class LogError(HybridSepError, ValueError):
     """A recorded log cannot be read: a missing column, a bad time axis, an unknown format.
 
-    Attributes
-    ----------
-    options : tuple of str
-        Options that would put it right, one of them, each with what it means; the command line prints itself with them.
+    The command line prints itself with the ``options`` that would put it right, one of them, each with what it means.
     """
 
     options: tuple[tuple[str, str], ...] = ()

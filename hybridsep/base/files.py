@@ -53,35 +53,32 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".hybridsep-{uuid.uuid4().hex}.tmp")
     try:
-        before = Path(path).stat() if Path(path).exists() else None
-        if before is not None and not os.access(path, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        if before is not None and not stat.S_ISREG(before.st_mode):
-            with Path(path).open("wb") as device:
-                yield device
-            return
-        with part.open("xb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        if before is not None:
-            part.chmod(stat.S_IMODE(before.st_mode))
-        part.replace(target)
-    except OSError as error:
-        if error.filename is None or str(error.filename) == str(part):
-            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
-        raise
+        with named_errors(path, part):
+            before = Path(path).stat() if Path(path).exists() else None
+            if before is not None and not os.access(path, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            if before is not None and not stat.S_ISREG(before.st_mode):
+                with Path(path).open("wb") as device:
+                    yield device
+                return
+            with part.open("xb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            if before is not None:
+                part.chmod(stat.S_IMODE(before.st_mode))
+            part.replace(target)
     finally:
         part.unlink(missing_ok=True)
 
 
 @contextmanager
-def named_errors(path: str | Path) -> Iterator[None]:
-    """Add the file name to an OSError that has none, as from a write to a full disk."""
+def named_errors(path: str | Path, part: str | Path | None = None) -> Iterator[None]:
+    """Add the file name to an OSError that has none, as from a write to a full disk, or that of a ``part``."""
     try:
         yield
     except OSError as error:
-        if error.filename is not None:
+        if error.filename is not None and str(error.filename) != str(part):
             raise
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 

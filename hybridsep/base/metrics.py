@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from html import escape
 from statistics import NormalDist
@@ -54,14 +54,9 @@ def largest(error: ArrayLike) -> float:
 
 
 def coverage(error: Array, std: Array, level: float) -> float:
-    """Return the share of errors, 0 … 1, within the interval of a level around 0 of a normal distribution.
+    """Return the share of errors, 0 … 1, within the interval of a level, 0 … 1, around 0 of a normal distribution.
 
-    Parameters
-    ----------
-    error, std : (n,) array, m
-        Errors, NaN where there is none, and their standard deviations.
-    level : float
-        Between 0 and 1.
+    ``error``, ``(n,)``, m, is NaN where there is none; ``std`` are its standard deviations.
     """
     known = ~np.isnan(error)
     return float(np.mean(np.abs(error[known]) <= NormalDist().inv_cdf(0.5 + 0.5 * level) * std[known]))
@@ -84,55 +79,35 @@ def rms_ratio(rms_h: float, rms_peer: float, least: float = 0.0) -> float:
 
 
 class RunningErrors:
-    """Running RMS and largest magnitude of several error signals that arrive in blocks.
-
-    Parameters
-    ----------
-    m : int
-        Number of error signals.
-
-    Attributes
-    ----------
-    n : int
-        Samples so far.
-    """
+    """Running RMS and largest magnitude of ``m`` error signals that arrive in blocks; ``n`` samples so far."""
 
     def __init__(self, m: int) -> None:
         self.n = 0
-        self._squares, self._peaks = [0.0] * m, [0.0] * m
+        self._squares: Array = np.zeros(m)
+        self._peaks: Array = np.zeros(m)
 
-    def add(self, n: int, squares: Iterable[float], peaks: Iterable[float]) -> None:
+    def add(self, n: int, squares: Sequence[float] | Array, peaks: Sequence[float] | Array) -> None:
         """Add the sums of squares and the largest magnitudes of ``n`` samples."""
         self.n += n
-        self._squares = [total + square for total, square in zip(self._squares, squares, strict=True)]
-        self._peaks = [max(largest_yet, peak) for largest_yet, peak in zip(self._peaks, peaks, strict=True)]
+        self._squares = self._squares + np.asarray(squares)
+        self._peaks = np.maximum(self._peaks, peaks)
 
     @property
     def rms(self) -> list[float]:
         """RMS of each error; NaN without samples."""
-        return [math.sqrt(square / self.n) if self.n else math.nan for square in self._squares]
+        return [math.sqrt(square / self.n) if self.n else math.nan for square in self._squares.tolist()]
 
     @property
     def peaks(self) -> list[float]:
         """Largest magnitude of each error; NaN without samples."""
-        return list(self._peaks) if self.n else [math.nan] * len(self._peaks)
+        return [peak if self.n else math.nan for peak in self._peaks.tolist()]
 
 
 def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late: int = 0) -> Array:
     """Return the hold baseline: ``x_pb`` plus the last residual measured before each window; ``x_pb`` in the warm-up.
 
-    It follows from what was published and measured, no model or guard has a part in it.
-
-    Parameters
-    ----------
-    x_pb, x_meas : (n,) array, m
-        Physics-based prediction as published, and measured position, NaN where missing.
-    active : (n,) array of bool
-        Whether the warm-up is over.
-    Np : int
-        Samples in a window.
-    late : int
-        Samples by which measurements were late.
+    It follows from what was published and measured, ``(n,)`` each, m, NaN where missing, no model or guard has a part
+    in it. The warm-up is over where samples are ``active``; measurements were ``late`` by so many samples.
     """
     samples = np.arange(len(x_meas))
     measured = np.maximum.accumulate(np.where(np.isnan(x_meas), -1, samples))

@@ -35,16 +35,7 @@ squares of smaller values cannot overflow."""
 
 
 def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
-    """Return ``values`` as a contiguous float64 vector, validated.
-
-    Parameters
-    ----------
-    values : array_like, (n,)
-        Samples.
-    name : str
-        Name for messages.
-    length : int, optional
-        Expected number of samples.
+    """Return ``(n,)`` samples as a contiguous float64 vector of ``length``, validated; ``name`` is for messages.
 
     Raises
     ------
@@ -87,13 +78,7 @@ def check_position(name: str, value: float, when: str = "", unit: str = "m") -> 
 
 
 def as_published(window: Array, name: str) -> Array:
-    """Return a window of predictions if it is bounded.
-
-    Parameters
-    ----------
-    window : (n,) array, m
-    name : str
-        The output's name.
+    """Return a window of predictions, ``(n,)``, m, if it is bounded; ``name`` is the output's.
 
     Raises
     ------

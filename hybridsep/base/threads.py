@@ -11,15 +11,9 @@ from contextlib import ContextDecorator
 from functools import cache
 
 import scipy.linalg  # noqa: F401  # loads the libraries that are limited
-from threadpoolctl import LibController, ThreadpoolController
+from threadpoolctl import ThreadpoolController
 
 __all__ = ["one_blas_thread"]
-
-
-@cache
-def _libraries() -> tuple[LibController, ...]:
-    """Return the BLAS libraries of NumPy and SciPy; looking for them takes milliseconds."""
-    return tuple(one for one in ThreadpoolController().lib_controllers if one.user_api == "blas")
 
 
 class _OneThread(ContextDecorator):
@@ -28,23 +22,23 @@ class _OneThread(ContextDecorator):
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._n_open = 0
-        self._before: list[tuple[LibController, int]] = []
 
     def __enter__(self) -> None:
         with self._lock:
             if self._n_open == 0:
-                threads = [(library, library.get_num_threads()) for library in _libraries()]
-                self._before = [(library, n) for library, n in threads if n is not None and n > 1]
-                for library, _ in self._before:
-                    library.set_num_threads(1)
+                self._limit = _controller().limit(limits=1, user_api="blas")
             self._n_open += 1
 
     def __exit__(self, *_: object) -> None:
         with self._lock:
             self._n_open -= 1
             if self._n_open == 0:
-                for library, n in self._before:
-                    library.set_num_threads(n)
+                self._limit.restore_original_limits()
+
+
+@cache  # looking for the libraries takes milliseconds
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 one_blas_thread = _OneThread()

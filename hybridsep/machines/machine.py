@@ -226,13 +226,7 @@ class Machine(Section):
         return {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
-        """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
-
-        Raises
-        ------
-        MachineError
-            If the file has no ``[drive_limits]``, or the measurement is late without averaging.
-        """
+        """Return the start values of the compensator FMU's parameters; MachineError if they allow no planning."""
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
         predictor = self.compensator_predictor
@@ -265,13 +259,7 @@ class Machine(Section):
         return {name: value for name, value in self.compensator.items() if name in names}
 
     def trajectory_limits(self) -> Limits:
-        """Return the limits of the reference trajectory.
-
-        Raises
-        ------
-        MachineError
-            If the file has no ``[limits]``.
-        """
+        """Return the limits of the reference trajectory; MachineError if the file has no ``[limits]``."""
         if self.limits is None:
             raise MachineError(f"machine {self.name} has no [limits] section")
         return Limits(**self.limits.values())
@@ -290,13 +278,7 @@ def machine_names() -> list[str]:
 
 
 def machine_path(machine: str | Path) -> Path:
-    """Return the machine file of a path or of a bundled machine's name.
-
-    Raises
-    ------
-    MachineError
-        If there is none.
-    """
+    """Return the machine file of a path or of a bundled machine's name; MachineError if there is none."""
     path = Path(machine)
     if path.is_file():
         return path
@@ -422,13 +404,7 @@ PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {
 
 
 def paper_machine(name: str) -> Machine:
-    """Return one of the machines of :data:`PAPER_SETTINGS`, whose predictor has the paper's settings.
-
-    Raises
-    ------
-    MachineError
-        If the paper has no settings for it.
-    """
+    """Return one of :data:`PAPER_SETTINGS`, whose predictor has the paper's settings; MachineError for another."""
     if name not in PAPER_SETTINGS:
         raise MachineError(f"the paper's machines are {', '.join(PAPER_SETTINGS)}, got {name!r}")
     return load_machine(name).changed("predictor", PAPER_SETTINGS[name])

@@ -56,13 +56,7 @@ Read = Callable[[Any, str, list[str]], Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """Table of a machine file; unknown entries are refused.
-
-    Attributes
-    ----------
-    table : mapping
-        The entries that were given, plain values in their types.
-    """
+    """Table of a machine file; unknown entries are refused, ``table`` has the given ones in their types."""
 
     table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
@@ -80,17 +74,7 @@ def entries(kind: type[Section]) -> dict[str, Any]:
 
 
 def read_section(kind: type[_S], table: Any, place: str, problems: list[str]) -> _S | None:
-    """Return a section of a file's table.
-
-    Parameters
-    ----------
-    kind : type of Section
-    table : mapping
-    place : str
-        Path of the section in the file; empty for the file itself.
-    problems : list of str
-        What is wrong is appended to; then there is no section.
-    """
+    """Return a section of a file's table, whose place is empty for the file itself; None if ``problems`` are added."""
     if not isinstance(table, Mapping):
         problems.append(f"{place} must be a table, got {brief(table)}")
         return None
@@ -195,10 +179,6 @@ def lines_entry() -> Any:
 def choice_entry(*choices: str, default: Any = MISSING) -> Any:
     """Declare an entry that is one of some words."""
     return _text_entry(lambda value: value in choices, " or ".join(choices), default, choices=choices)
-
-
-def _flag_entry(default: bool) -> Any:
-    return _text_entry(lambda value: isinstance(value, bool), "true or false", default)
 
 
 def section_entry(kind: type[Section], default: Any = MISSING) -> Any:
@@ -357,7 +337,7 @@ class DriveLimitsSection(LimitsSection):
 
     change_max: float = parameter_entry("change_max", PARAMETERS["change_max"].default)
     following_error_max: float = parameter_entry("following_error_max", 0.0)
-    estimated: bool = _flag_entry(False)
+    estimated: bool = _text_entry(lambda value: isinstance(value, bool), "true or false", False)
 
 
 @dataclass(frozen=True, kw_only=True)

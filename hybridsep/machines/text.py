@@ -17,46 +17,25 @@ _COLUMN = 32
 def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: bool = False) -> str:
     """Return a machine file; :func:`~hybridsep.machines.machine.load_machine` reads the same machine.
 
-    Parameters
-    ----------
-    machine : Machine
-    comments : iterable of str
-        Lines at the head of the file.
-    annotated : bool
-        Whether each entry says what it is, besides its unit.
+    ``comments`` are lines at its head; if it is ``annotated``, each entry says what it is, besides its unit.
     """
-    table = {**machine.table, "T_s": machine.T_s}
     head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
-    lines = [*head, *_entries(table, annotated)]
+    lines = _lines("", {**machine.table, "T_s": machine.T_s}, annotated, "")
+    return "\n".join([*head, *lines]).strip("\n") + "\n"
+
+
+def _lines(place: str, table: Mapping[str, Any], annotated: bool, heading: str) -> list[str]:
+    """Return the lines of a table's own entries below its heading, then of the tables in it."""
+    own, tables = [], []
     for name, value in table.items():
+        inner = f"{place}.{name}" if place else name
         if isinstance(value, Mapping):
-            lines += _section(name, value, annotated)
-    return "\n".join(lines).strip("\n") + "\n"
-
-
-def _section(name: str, table: Mapping[str, Any], annotated: bool) -> list[str]:
-    """Return the lines of a table with its tables, a blank one first; an empty table has none."""
-    own = _entries(table, annotated)
-    lines = ["", f"[{name}]", *own] if own else []
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            lines += _section(f"{name}.{key}", value, annotated)
-        elif _is_tables(value):
-            for item in value:
-                lines += ["", f"[[{name}.{key}]]", *_entries(item, annotated)]
-    return lines
-
-
-def _entries(table: Mapping[str, Any], annotated: bool) -> list[str]:
-    return [
-        _with_comment(f"{name} = {_value(value)}", name, annotated)
-        for name, value in table.items()
-        if not isinstance(value, Mapping) and not _is_tables(value)
-    ]
-
-
-def _is_tables(value: Any) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
+            tables += _lines(inner, value, annotated, f"[{inner}]")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+            tables += [line for item in value for line in _lines(inner, item, annotated, f"[[{inner}]]")]
+        else:
+            own.append(_with_comment(f"{name} = {_value(value)}", name, annotated))
+    return ["", heading, *own, *tables] if own and heading else [*own, *tables]
 
 
 def _with_comment(line: str, name: str, annotated: bool) -> str:

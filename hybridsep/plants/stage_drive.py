@@ -17,18 +17,10 @@ _STEPS_MAX = 60
 
 
 def velocity_under_friction(w: float, gain: float, scale: float, last: float) -> float:
-    """Return the solution of ``v = w − gain·tanh(v/scale)``, m/s.
+    """Return the solution of ``v = w − gain·tanh(v/scale)``, m/s, scale > 0.
 
-    Parameters
-    ----------
-    w : float, m/s
-        Velocity without friction.
-    gain : float, m/s
-        Velocity that the whole friction takes away at once.
-    scale : float, m/s
-        Velocity scale of the friction's change of sign, > 0.
-    last : float, m/s
-        Velocity before, whose direction is kept where there are two solutions.
+    ``w`` is the velocity without friction, ``gain`` what the whole friction takes away at once, and ``last`` the
+    velocity before, whose direction is kept where there are two solutions.
     """
     if w == 0.0 and last == 0.0:
         return 0.0
