@@ -38,6 +38,9 @@ __all__ = ["FmuInstance", "read_description"]
 _WORDS_MAX = 1000
 """Most characters of an FMU's message in an error."""
 
+_NO_RUN_NEEDS = ("sources/", "documentation/")
+"""Folders of an archive with most of its files."""
+
 _LOADING = threading.Lock()
 
 logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs' refusals are part of our errors
@@ -191,7 +194,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         place = f"binaries/{version.platform}/{identifier}{fmpy.sharedLibraryExtension}"
         try:
             with named_errors(gettempdir()):
-                fmpy.extract(str(archive), folder, include=_serves_a_run)
+                fmpy.extract(str(archive), folder, include=lambda name: not name.startswith(_NO_RUN_NEEDS))
             if not (folder / place).is_file():
                 there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
                 raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
@@ -376,11 +379,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         text = self.log[-1][1]
         framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
         return f": {' '.join((framed[2] if framed else text).split())[:_WORDS_MAX]}"
-
-
-def _serves_a_run(name: str) -> bool:
-    """Return whether a file of an archive can serve a run; sources and documentation are most files and never do."""
-    return not name.startswith(("sources/", "documentation/"))
 
 
 def _instantiate(slave: Any, version: _Version, log: list[tuple[int, str]]) -> None:

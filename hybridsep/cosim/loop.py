@@ -96,8 +96,24 @@ def cosimulate(
     """
     command = as_samples(r.x_d if isinstance(r, Log) else r, "r")
     as_samples(command[:1], "r", 1)
-    ahead = _controller(controller, controller_values, t_init, start_time)
-    drive = _drive(plant, plant_values, encoder, start_time)
+    ahead: FmuController | LibraryController | OwnController
+    if isinstance(controller, (str, Path)):
+        _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
+        ahead = FmuController(controller, controller_values or {}, start_time)
+    else:
+        _refuse(controller_values, "controller_values are for an FMU; make the controller with these parameters")
+        if isinstance(controller, HybridPredictor | SepCompensator):
+            ahead = LibraryController(controller, t_init)
+        else:
+            _refuse(t_init, "t_init is for a controller of the library; a compensator of your own has none")
+            ahead = OwnController(controller)
+    drive: FmuDrive | LibraryDrive
+    if isinstance(plant, (str, Path)):
+        _refuse(encoder, "encoder is for a plant of the library; an FMU's noise and seed are among its plant_values")
+        drive = FmuDrive(plant, plant_values or {}, start_time)
+    else:
+        _refuse(plant_values, "plant_values are for an FMU; make the plant with these parameters")
+        drive = LibraryDrive(plant, encoder or Encoder())
     with one_blas_thread, ExitStack() as stack:
         for adapter in (ahead, drive):
             if isinstance(adapter, AbstractContextManager):
@@ -147,34 +163,6 @@ def cosimulate(
         n_rejected=n_rejected,
         measurement_delay=ahead.late,
     )
-
-
-def _controller(
-    controller: str | Path | HybridPredictor | SepCompensator | Compensator,
-    values: Mapping[str, Any] | None,
-    t_init: float | None,
-    start_time: float,
-) -> FmuController | LibraryController | OwnController:
-    """Return the loop's adapter of a controller."""
-    if isinstance(controller, (str, Path)):
-        _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
-        return FmuController(controller, values or {}, start_time)
-    _refuse(values, "controller_values are for an FMU; make the controller with these parameters")
-    if isinstance(controller, HybridPredictor | SepCompensator):
-        return LibraryController(controller, t_init)
-    _refuse(t_init, "t_init is for a controller of the library; a compensator of your own has none")
-    return OwnController(controller)
-
-
-def _drive(
-    plant: str | Path | Plant, values: Mapping[str, Any] | None, encoder: Encoder | None, start_time: float
-) -> FmuDrive | LibraryDrive:
-    """Return the loop's adapter of a plant."""
-    if isinstance(plant, (str, Path)):
-        _refuse(encoder, "encoder is for a plant of the library; an FMU's noise and seed are among its plant_values")
-        return FmuDrive(plant, values or {}, start_time)
-    _refuse(values, "plant_values are for an FMU; make the plant with these parameters")
-    return LibraryDrive(plant, Encoder() if encoder is None else encoder)
 
 
 def _refuse(given: object, message: str) -> None:

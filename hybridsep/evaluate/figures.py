@@ -290,8 +290,7 @@ def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path
 
 def _draw_errors(figure: Figure, place: SubplotSpec, contours: Mapping[str, Contour], whose: str) -> None:
     """Draw contour errors over time, µm, or where the path has full circles radial errors over the angle."""
-    path = next(iter(contours.values())).path
-    if np.isnan(path.centre).all():
+    if np.isnan(next(iter(contours.values())).path.centre).all():
         axes = figure.add_subplot(place, xlabel="time [s]", ylabel="[µm]")
         for key, one in contours.items():
             draw_line(axes, one.T_s * np.arange(len(one.error)), 1e6 * one.error, 0.8, color=CASES[key][1])
@@ -299,10 +298,10 @@ def _draw_errors(figure: Figure, place: SubplotSpec, contours: Mapping[str, Cont
         title = f"contour error{whose}"
     else:
         axes = figure.add_subplot(place, projection="polar")
-        commanded = path.points - path.centre
         peak = 1e-3
         for key, one in contours.items():
-            radial = 1e6 * (np.abs(one.reached - path.centre) - np.abs(commanded))
+            commanded = one.path.points - one.path.centre
+            radial = 1e6 * (np.abs(one.reached - one.path.centre) - np.abs(commanded))
             axes.plot(np.angle(commanded), radial, color=CASES[key][1], linewidth=0.7)
             peak = max(peak, float(np.nanmax(np.abs(radial))))
         axes.plot(np.linspace(0.0, 2 * np.pi, 361), np.zeros(361), color="black", linewidth=0.6)

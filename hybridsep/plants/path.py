@@ -23,7 +23,7 @@ from ..base.settings import Limits, samples_before
 from ..base.signals import Array
 from .trajectory import read_trajectory, rest_to_rest
 
-__all__ = ["PlanarPath", "Points", "is_program", "read_path"]
+__all__ = ["PlanarPath", "Points", "read_path"]
 
 Points = NDArray[np.complexfloating[Any, Any]]
 """Planar positions, ``(n,)``, m: X + iY."""
@@ -118,12 +118,6 @@ def _shares(length: float, feed: float, limits: Limits, T_s: float) -> Array:
     return np.minimum(s[1:] / length, 1.0)
 
 
-def is_program(path: str | Path) -> bool:
-    """Return whether a file is a G-code program, by its beginning."""
-    with Path(path).open("rb") as file:
-        return _PROGRAM.match(file.read(4096).decode("latin-1")) is not None
-
-
 def read_path(path: str | Path, limits: Limits, T_s: float, unit: str | None = None) -> PlanarPath:
     """Read a planar path: a G-code program, or a log's columns ``x`` and ``y`` of commanded positions.
 
@@ -145,7 +139,9 @@ def read_path(path: str | Path, limits: Limits, T_s: float, unit: str | None = N
     LogError
         If a word would change the path and is not read, with its line; or if a log cannot be used.
     """
-    if not is_program(path):
+    with Path(path).open("rb") as file:
+        beginning = file.read(4096).decode("latin-1")
+    if not _PROGRAM.match(beginning):
         x, y = (read_trajectory(path, column=name, unit=unit, T_s=T_s)[0] for name in ("x", "y"))
         return PlanarPath.of(x + 1j * y)
     moves: list[_Move] = []

@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -74,10 +74,11 @@ class Samples:
         late = columns["overruns"][part]
         return cls(**{name: pair[part] for name, pair in pairs.items()}, n_lost=n_lost, n_late=int(late[-1] - late[0]))
 
-    def contour(self) -> Contour:
-        """Return the true positions along the commanded path."""
+    def contour(self, radius: float = np.nan) -> Contour:
+        """Return the true positions along the commanded path, m; ``radius`` is that of a circle about X0 Y0, m."""
         commanded, reached = (1e-3 * (pair @ np.array([1.0, 1.0j])) for pair in (self.delayed, self.pos))
-        return Contour.of(PlanarPath.of(commanded), reached, 1e-3)
+        centre = np.where(np.abs(np.abs(commanded) - radius) < 2e-5, 0j, complex(np.nan))
+        return Contour.of(replace(PlanarPath.of(commanded), centre=centre), reached, 1e-3)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -93,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     late: dict[str, list[str]] = {}
     for program in given.programs:
         samples = run_cases(program, given.out, given.user)
-        contours = {case: one.contour() for case, one in samples.items()}
+        contours = {case: one.contour(0.02 if program == "circle" else np.nan) for case, one in samples.items()}
         cells = ["{:.1f} ({:.0f}, {:.0f})".format(*one.figures().values()) for one in contours.values()]
         print(f"| {program} | " + " | ".join(cells) + " |", flush=True)
         drawn = {case.replace(" ", "_"): one for case, one in contours.items() if case != "without"}
