@@ -30,7 +30,7 @@ from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
+from .planning import RETRY, AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis, direct_samples
 
@@ -102,7 +102,8 @@ class SepCompensator:
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
-        self._hybrid_ended = False
+        # Windows that the averaged model does not plan: now, and after the next plan that runs away
+        self._paused, self._pause = 0, max(1, int(RETRY / (predictor.Np * predictor.T_s) + 0.5))
         self.monitor = Monitor(
             samples_before(self.settings.measurement_timeout, self.T_s), self.settings.following_error_max
         )
@@ -218,13 +219,13 @@ class SepCompensator:
         preview = Preview(command, self._x_d_before[-3:], self._delta_before, self._previous_plan)
         fades = self.monitor.is_tripped or self.monitor.is_lost
         compensate = SepState.OFF if fades else self.compensate
-        most = min(compensate, SepState.PHYSICS) if self._hybrid_ended else compensate
+        most = min(compensate, SepState.PHYSICS) if self._paused else compensate
         chosen = self._planning.choose(predictor, preview, most)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
         self._pending = PendingPlan(
-            chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.ends_hybrid
+            chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.runs_away
         )
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
@@ -263,7 +264,10 @@ class SepCompensator:
         self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
         self._x_d_before = x_d[-len(self._x_d_before) :]
         self._state_before = pending.state
-        self._hybrid_ended |= pending.ends_hybrid
+        if pending.runs_away:
+            self._paused, self._pause = self._pause, 2 * self._pause
+        else:
+            self._paused = max(0, self._paused - 1)
         self._pending = None
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
@@ -283,8 +287,9 @@ class SepCompensator:
             "settings": self.settings.as_table(),
             "lead_in": self.lead_in,
             "state_before": int(self._state_before),
-            "hybrid_ended": self._hybrid_ended,
-            "pending": pending and [int(pending.state), int(pending.ends_hybrid), pending.prediction.n_warm_up],
+            "paused": self._paused,
+            "pause": self._pause,
+            "pending": pending and [int(pending.state), int(pending.runs_away), pending.prediction.n_warm_up],
         }
         arrays = {
             "previous_plan": self._previous_plan,
@@ -314,7 +319,7 @@ class SepCompensator:
         compensator.predictor = kept  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
         compensator._state_before = SepState(saved.whole("state_before", SepState.HYBRID))
-        compensator._hybrid_ended = saved.flag("hybrid_ended")
+        compensator._paused, compensator._pause = saved.whole("paused"), saved.whole("pause")
         n, Np = len(compensator._previous_plan), predictor.Np
         compensator.monitor = restored(compensator.monitor, saved)
         compensator._previous_plan, compensator._delta_before = (
@@ -323,10 +328,10 @@ class SepCompensator:
         )
         compensator._x_d_before = saved.array("x_d_before", len(compensator._x_d_before), finite=False)
         if saved.field("pending") is not None:
-            state, ends_hybrid, n_warm_up = saved.numbers("pending", 3)
+            state, runs_away, n_warm_up = saved.numbers("pending", 3)
             if (
                 state not in range(SepState.TRIPPED)
-                or ends_hybrid not in (0, 1)
+                or runs_away not in (0, 1)
                 or n_warm_up not in range(Np + 1)
                 or kept.n_pending != Np
             ):
@@ -344,6 +349,6 @@ class SepCompensator:
                 saved.array("x_d", Np),
                 prediction,
                 SepState(int(state)),
-                ends_hybrid == 1,
+                runs_away == 1,
             )
         return compensator

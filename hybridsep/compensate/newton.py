@@ -364,6 +364,10 @@ class AveragedPlanner:
         """Return the cost of a plan, m²; not finite if its prediction overflows."""
         return self._at(coefficients).cost
 
+    def cost_of_previous(self, previous_plan: Array) -> float:
+        """Return the cost of the remainder of the last plan, m²."""
+        return self._point(previous_plan, self._model.of_previous_plan).cost
+
     def plan(self, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
         """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
 

@@ -1,8 +1,8 @@
 """Planning: how the plan of a window is chosen and published, with the paper's model and with the averaged one.
 
-With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. With the averaged one
-it is the physics model's, or one on the averaged model, which judges it to be better; where a plan runs away, the
-physics model plans the rest of the run.
+With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one judges
+all plans as soon as it has learned: its own, the physics model's, and the remainder of the last plan, which fades to no
+change. Where its own plan runs away, it plans none for a time.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ __all__ = [
     "Planning",
     "Preview",
     "PublishedPosition",
+    "RETRY",
     "has_stable_poles",
 ]
 
@@ -50,8 +51,8 @@ class PendingPlan:
         Under the modified command.
     state : SepState
         Model of the plan.
-    ends_hybrid : bool
-        Whether the residual model may plan no further window of the run.
+    runs_away : bool
+        Whether the residual model's plan ran away, so that it plans none for a time.
     """
 
     coefficients: Array
@@ -59,7 +60,7 @@ class PendingPlan:
     x_d: Array
     prediction: Prediction
     state: SepState
-    ends_hybrid: bool
+    runs_away: bool
 
 
 @dataclass(frozen=True)
@@ -92,14 +93,14 @@ class ChosenPlan(NamedTuple):
     coefficients : (3 + n_free,) array, m
     scales : FeatureScales, optional
         Of the residual model's features.
-    ends_hybrid : bool
-        Whether the residual model may plan no further window of the run.
+    runs_away : bool
+        Whether the residual model's plan ran away.
     """
 
     state: SepState
     coefficients: Array
     scales: FeatureScales | None
-    ends_hybrid: bool = False
+    runs_away: bool = False
 
 
 class PublishedPosition(NamedTuple):
@@ -249,6 +250,10 @@ def has_stable_poles(w_e: Array) -> bool:
     return True
 
 
+RETRY = 0.5
+"""Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after each
+further one of a run."""
+
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -261,7 +266,9 @@ class AveragedPlanning(Planning):
     ALWAYS: ClassVar[bool] = True
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the physics model's plan, or a better one by Newton steps on the averaged model."""
+        """Return the plan that the averaged model judges best, of those that are allowed; before it has learned, the
+        physics model's.
+        """
         assert predictor.start is not None
         path = preview.command - predictor.start
         model = self._model(predictor, path, preview)
@@ -269,22 +276,24 @@ class AveragedPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.preview)
-        follows = most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned
         physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
-        if not follows:
+        if predictor.k < predictor.n_init or not model.has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
-            bounds = self.limits(preview, may_turn=True)
-            hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
-            better = is_better(cost, planner.cost(physics))
-        if not better:
-            return ChosenPlan(SepState.PHYSICS, physics, scales)
-        if self._runs_away(hybrid, physics, cost):
-            return ChosenPlan(SepState.PHYSICS, physics, scales, ends_hybrid=True)
-        return ChosenPlan(SepState.HYBRID, hybrid, scales)
+            of_physics, runs_away = planner.cost(physics), False
+            if most is SepState.HYBRID:
+                bounds = self.limits(preview, may_turn=True)
+                hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
+                if is_better(cost, of_physics):
+                    runs_away = self._runs_away(hybrid, physics, cost)
+                    if not runs_away:
+                        return ChosenPlan(SepState.HYBRID, hybrid, scales)
+            if is_better(planner.cost_of_previous(previous_plan), of_physics):
+                return ChosenPlan(SepState.OFF, previous_plan, scales, runs_away)
+        return ChosenPlan(SepState.PHYSICS, physics, scales, runs_away)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.

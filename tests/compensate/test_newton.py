@@ -18,6 +18,7 @@ from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettin
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.planning import RETRY
 from hybridsep.compensate.newton import PlanModel, runs_away
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
@@ -196,23 +197,26 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
 
 
 @pytest.mark.slow
-def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
+def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles() -> None:
     sep = SepCompensator.from_bytes(learned())
     sep.change(change_max=2e-4)
     away = run(sep, sensor=no_faster(0.05), t_init=0.0)
-    first = int(np.argmax(away.state == SepState.PHYSICS))
-    assert 50 < first < 250
-    assert (away.state[:first] == SepState.HYBRID).all()
-    assert (away.state[first:] == SepState.PHYSICS).all()
+    windows = away.state[: len(away.state) // 50 * 50].reshape(-1, 50)[:, -1] == SepState.HYBRID
+    first = int(np.argmin(windows))
+    assert 1 <= first < 5
+    ends = np.flatnonzero(np.diff(windows[first:].astype(int)))[:3] + 1 + first
+    pause = round(RETRY / (50 * TS))
+    assert ends[0] - first == pause + 1  # with the window whose plan ran away
+    assert not windows[ends[1] : ends[1] + 2 * pause + 1].any()
     restored = SepCompensator.from_bytes(sep.to_bytes())
     for one in (sep, restored):
-        assert one.plan(np.full(200, 0.007)).state is SepState.PHYSICS
+        assert one.plan(np.full(200, 0.007)).state is not SepState.HYBRID
     sep.restart(0.0)  # another run
     assert sep.plan(moves()[:200]).state is SepState.HYBRID
     free = SepCompensator.from_bytes(learned())
     free.change(change_max=None)  # no bound, no plan at it
-    found = cosimulate(free, STAGE.new_plant(), moves()[: first + 100], sensor=no_faster(0.05), t_init=0.0)
-    assert (found.state[first:] == SepState.HYBRID).any()
+    found = cosimulate(free, STAGE.new_plant(), moves()[: 50 * first + 100], sensor=no_faster(0.05), t_init=0.0)
+    assert (found.state[50 * first :] == SepState.HYBRID).any()
 
 
 @pytest.mark.parametrize(

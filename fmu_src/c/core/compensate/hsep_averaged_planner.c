@@ -119,11 +119,14 @@ static void averaged_planner_continue(hsep_averaged_planner *self, const hsep_av
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
     self->planned = 1;
-    if (!self->follows) {
+    if (!self->judges) {
         averaged_planner_end(self);
-    } else {
+        return;
+    }
+    self->stage = HSEP_AVERAGED_COMPARE;
+    averaged_planner_copy(self, hsep_at(self, self->of_physics), c);
+    if (self->follows) {
         self->stage = HSEP_AVERAGED_STEP;
-        averaged_planner_copy(self, hsep_at(self, self->of_physics), c);
         averaged_planner_copy(self, hsep_at(self, self->best), rest);
         averaged_planner_copy(self, c, rest);
         hsep_planner_let_turn(task->planner);
@@ -167,7 +170,8 @@ static void averaged_planner_solve_physics(hsep_averaged_planner *self, const hs
 }
 
 HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best)
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
+    int warm)
 {
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
@@ -187,11 +191,13 @@ HSEP_API void hsep_averaged_planner_begin(
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
         hsep_at(self, self->e_h), self->varied);
-    self->follows = best > 1 && !self->ended && task->model->predicted[HSEP_STATIC];
+    self->judges = warm && task->model->predicted[HSEP_STATIC];
+    self->follows = self->judges && best > 1 && self->paused == 0;
+    self->paused -= self->paused > 0;
     if (best == 0) {
         averaged_planner_end(self);
     } else {
-        self->stage = self->follows ? HSEP_AVERAGED_VARY : HSEP_AVERAGED_BEGIN;
+        self->stage = self->judges ? HSEP_AVERAGED_VARY : HSEP_AVERAGED_BEGIN;
     }
 }
 
@@ -205,8 +211,8 @@ static void averaged_planner_vary(hsep_averaged_planner *self, const hsep_averag
     hsep_averaged_go_on(task->model, hsep_at(self, self->x_pb), hsep_at(self, self->e_h), self->varied, last, apart);
     self->varied = last;
     if (last == all) {
-        self->cost = averaged_planner_cost(self, task, hsep_at(self, self->rest));
-        self->stage = HSEP_AVERAGED_CHANGE;
+        self->cost = self->unchanged = averaged_planner_cost(self, task, hsep_at(self, self->rest));
+        self->stage = self->follows ? HSEP_AVERAGED_CHANGE : HSEP_AVERAGED_BEGIN;
     }
 }
 
@@ -393,18 +399,22 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
     return error > HSEP_NEWTON_LEFT && longer > HSEP_NEWTON_BOUND_SHARE;
 }
 
-/* Take the plan whose cost is lower. */
+/* Take the plan whose cost is lowest. */
 static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real cost = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
-    int is_better = averaged_planner_better(self->cost, cost);
-    if (is_better && averaged_planner_runs_away(self, task)) {
-        self->ended = 1;
-        is_better = 0;
+    hsep_int plan = averaged_planner_better(self->unchanged, cost) ? self->rest : self->of_physics;
+    self->planned = plan == self->of_physics;
+    if (self->follows && averaged_planner_better(self->cost, cost)) {
+        if (averaged_planner_runs_away(self, task)) {
+            self->paused = self->pause;
+            self->pause *= 2;
+        } else {
+            plan = self->best;
+            self->planned = 2;
+        }
     }
-    self->planned = is_better ? 2 : 1;
-    averaged_planner_copy(
-        self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
+    averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
     averaged_planner_end(self);
 }
 

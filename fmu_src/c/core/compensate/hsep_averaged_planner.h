@@ -2,9 +2,9 @@
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each step solves the quadratic programme of the linearised model (Gauss-Newton), and goes towards its
- * minimum as far as lowers the cost. The plan is compared with the physics model's plan, and the better one is
- * taken. Where a plan asks for a larger change than compensation is made for, the averaged model is wrong, and the
- * physics model plans the rest of the run.
+ * minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the physics
+ * model's, and the remainder of the last one; the best is taken. Where its own asks for a larger change than
+ * compensation is made for, it is wrong, and plans none for a time, which doubles.
  *
  * The work is cut into short parts: hsep_averaged_planner_advance does the next part, hsep_averaged_planner_next tells
  * its work, hsep_averaged_planner_left the most that all parts left may take. Both are counted in multiply-adds from
@@ -53,7 +53,8 @@ typedef struct {
     hsep_int late;        /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, n_pinned; /* splines of a plan, and the first ones, which stay as they were */
     hsep_int stage;       /* hsep_averaged_stage */
-    hsep_int follows;     /* whether the averaged model may plan */
+    hsep_int judges;      /* whether the averaged model judges plans, */
+    hsep_int follows;     /* and whether it may plan */
     hsep_int steps;       /* Newton steps begun */
     hsep_int varied;      /* samples that are predicted under the remainder of the last plan, with their variances */
     hsep_int predicted;   /* samples of the plan at hand that are predicted; 0: none is at hand */
@@ -63,8 +64,10 @@ typedef struct {
     hsep_int tries;       /* lengths of this step that were tried */
     hsep_int planned;     /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int bounded;     /* whether the limits bound the programme of the last Newton step */
-    hsep_int ended;       /* whether the averaged model plans no more in this run */
-    hsep_real cost;       /* m2, of the best plan so far */
+    hsep_int paused;      /* windows that the averaged model does not plan, now */
+    hsep_int pause;       /* and after the next of its plans that runs away */
+    hsep_real cost;       /* m2, of the best plan so far, */
+    hsep_real unchanged;  /* and of the remainder of the last one */
     hsep_real start;      /* m, position of rest */
     /* Offsets in words from the beginning of the struct */
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
@@ -81,7 +84,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 31);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 34);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -111,11 +114,12 @@ typedef struct {
 } hsep_averaged_before;
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
- * averaged. It predicts only the samples that the plan leaves as they are, and the late ones before them.
+ * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples that the plan leaves as they are, and the late ones before them.
  * Cost: as hsep_averaged_forecast; a late measurement adds late^2 / 2 multiply-adds for each expert, here and in the
  * last part, for variances. */
 HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best);
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
+    int warm);
 
 /* Multiply-adds of the next part; 0: the plan is made and predicted. */
 HSEP_API hsep_real hsep_averaged_planner_next(const hsep_averaged_planner *self, const hsep_averaged_task *task);

@@ -1,6 +1,8 @@
 /* Memory of a planner on the residual model with averaging: its layout, beginning and check. */
 #include "hsep_averaged_planner.h"
 
+#include "hsep_math.h"
+
 #include <stddef.h>
 #include <string.h>
 
@@ -49,6 +51,7 @@ HSEP_API void hsep_averaged_planner_init(
     memset(self, 0, (size_t)hsep_averaged_planner_size(parameters, planner));
     (void)averaged_planner_lay_out(self, parameters, planner);
     self->start = start;
+    self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * settings->T_s) + 0.5);
     self->columns = self->rows = self->n_pinned;
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
     for (int i = 0; i < 2; i++) {
@@ -65,11 +68,11 @@ HSEP_API int hsep_averaged_planner_valid(
     hsep_averaged_planner got;
     memcpy(&got, block, sizeof got);
     (void)averaged_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_AVERAGED_PREDICT && got.follows <= 1 &&
+    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_AVERAGED_PREDICT && got.judges <= 1 && got.follows <= got.judges &&
            got.varied <= got.preview + got.late && got.predicted <= got.preview + got.late &&
            got.steps <= HSEP_AVERAGED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
            got.part < HSEP_LINEARISED_EXPERTS && got.rows >= got.n_pinned && got.rows <= got.n &&
-           got.tries <= HSEP_AVERAGED_TRIES && got.planned <= 2 && got.bounded <= 1 && got.ended <= 1 &&
+           got.tries <= HSEP_AVERAGED_TRIES && got.planned <= 2 && got.bounded <= 1 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);

@@ -280,7 +280,7 @@ HSEP_API hsep_real hsep_averaged_planner_left(const hsep_averaged_planner *self,
     const hsep_real last = work_commands(&sizes) + work_samples(&sizes, window, 1.0);
     const hsep_real begun = self->predicted > 0 ? predict - work_next(self, &sizes) : 0.0; /* is done */
     const hsep_real after_step = work_newton(self, &sizes) + predict + last;
-    const hsep_real after_physics = self->follows ? after_step : last;
+    const hsep_real after_physics = self->follows ? after_step : self->judges ? predict + last : last;
     const hsep_int programme = self->stage == HSEP_AVERAGED_BOUNDED ? self->steps : 0;
     hsep_real bounded = work_steps(&sizes, programme, hsep_planner_steps(task->planner));
     for (hsep_int part = hsep_planner_part(task->planner); part > 0 && part < HSEP_INTERIOR_PARTS; part++) {
@@ -296,7 +296,7 @@ HSEP_API hsep_real hsep_averaged_planner_left(const hsep_averaged_planner *self,
         return 0.0;
     case HSEP_AVERAGED_VARY:
         left = work_samples(&sizes, within, 1.0) + work_samples(&sizes, behind, HSEP_NEWTON_APART);
-        return left + work_begin(&sizes) + begin;
+        return left + (self->follows ? work_begin(&sizes) : 0.0) + begin;
     case HSEP_AVERAGED_CHANGE:
         return work_begin(&sizes) + begin;
     case HSEP_AVERAGED_BEGIN:

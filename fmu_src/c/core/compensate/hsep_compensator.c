@@ -215,7 +215,6 @@ static void compensator_plan_averaged(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_averaged_task task = compensator_task(self);
     const int warm = (hsep_real)predictor->k >= predictor->n_init;
-    const hsep_int best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
     const hsep_averaged_before before = {
@@ -223,7 +222,7 @@ static void compensator_plan_averaged(hsep_compensator *self)
         .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
         .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
         .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
-    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, &before, best);
+    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, &before, self->compensate, warm);
 }
 
 HSEP_API int hsep_compensator_change(

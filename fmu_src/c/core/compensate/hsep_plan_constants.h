@@ -36,6 +36,7 @@
 
 /* hybridsep/compensate/planning.py */
 #define HSEP_PLANNING_PINNED_PAPER 8
+#define HSEP_PLANNING_RETRY 0.5
 #define HSEP_PLANNING_PINNED_AVERAGED 24
 /* clang-format on */
 
