@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -65,8 +66,15 @@ def settings_of(recipe: Recipe) -> tuple[PredictorSettings, CompensatorSettings,
     )
 
 
-def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = lambda _k, x: x, **more: float) -> Loop:
-    """Return a cold run of a drive behind its compensator.
+def closed_loop(
+    recipe: Recipe,
+    axis: Axis,
+    compensate: str,
+    sensor: Sensor = lambda _k, x: x,
+    resources: Path | None = None,
+    **more: float,
+) -> Loop:
+    """Return a run of a drive behind its compensator.
 
     Parameters
     ----------
@@ -76,6 +84,8 @@ def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = la
     compensate : {"off", "physics", "hybrid"}
     sensor : callable, optional
         Called as ``sensor(k, x_meas)``; returns what is measured in its place.
+    resources : Path, optional
+        Folder with weights that it starts with.
     **more
         Parameters of the compensator's FMU besides.
     """
@@ -89,7 +99,7 @@ def closed_loop(recipe: Recipe, axis: Axis, compensate: str, sensor: Sensor = la
     values |= {**predictor.to_fmi(), **compensator.to_fmi(), "dead_time": recipe.model.dead_time}
     assert compensator.limits is not None
     values |= {**compensator.limits.to_fmi(), "compensate": PARAMETERS["compensate"].to_fmi(compensate), **more}
-    core = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
+    core = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}, resources).initialise()
     drive = TwoMassDrive(replace(axis, change_at=axis.change_at + late), start)
     ahead, measured, modified, state = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_dm", "sep_state"))
     n, T_s, noise, quantum = len(x_d), axis.T_s, recipe.noise.tolist(), recipe.encoder.quantum
