@@ -3,8 +3,8 @@
     python -m benchmarks.two_mass_loops [--n 60] [--seed 2] [--only TEXT]      (ten minutes)
 
 RMS and largest of the tracking error of the true position, relative to no compensation, and the largest relative to
-that with ``compensate = physics``; without the samples of the last preview, whose trajectory ends while it moves. Warm: with
-weights that were learned from a run without compensation.
+that with ``compensate = physics``; without the samples of the last preview, whose trajectory ends while it moves. Warm:
+with weights that were learned from a run without compensation.
 """
 
 from __future__ import annotations
@@ -74,14 +74,13 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
     """Return the results of a drive under each condition whose name has a text."""
     recipe = Recipe.draw(index, seed)
     _, compensator, x_d = settings_of(recipe)
-    assert compensator.preview is not None
     assert compensator.limits is not None
     assert compensator.change_max is not None
-    T_s, start = recipe.axis.T_s, float(x_d[0])
+    T_s, start, late = recipe.axis.T_s, float(x_d[0]), compensator.preview or 0
     limits = (compensator.limits.velocity, compensator.limits.acceleration, compensator.limits.jerk)
 
     def errors(x: Array) -> tuple[float, float]:
-        error = (x_d - x)[: -compensator.preview]
+        error = (x_d - x)[: len(x_d) - late]
         return (rms(error), largest(error)) if np.isfinite(error).all() else (np.inf, np.inf)
 
     found = []
@@ -121,8 +120,11 @@ def _learn(recipe: Recipe, x_d: Array, x: Array, folder: Path) -> None:
 
 def rows(found: Sequence[Result]) -> Iterator[str]:
     """Yield the lines of the table."""
-    groups = (("RMS × none", "median", "95 %", "worst"), ("largest × none", "median", "95 %", "worst"))
-    groups = (*groups, ("largest × physics", "median", "> 1.02", "worst"))
+    groups = (
+        ("RMS × none", "median", "95 %", "worst"),
+        ("largest × none", "median", "95 %", "worst"),
+        ("largest × physics", "median", "> 1.02", "worst"),
+    )
     yield f"{'':38}" + "".join(f"{title:>27}" for title, *_ in groups) + f"{'limits':>9}"
     yield f"{'':38}" + "".join(f"{name:>9}" for _, *names in groups for name in names) + f"{'kept':>9}"
     for condition in CONDITIONS:

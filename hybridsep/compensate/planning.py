@@ -1,8 +1,8 @@
 """Planning: how the plan of a window is chosen and published, with the paper's model and with the averaged one.
 
-With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one judges
-all plans as soon as it has learned: its own, the physics model's, and the remainder of the last plan, which fades to no
-change. Where its own plan runs away, it plans none for a time.
+With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
+soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan, which fades
+to no change. Where its own plan runs away, it plans none for a time.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
 __all__ = [
+    "RETRY",
     "AveragedPlanning",
     "ChosenPlan",
     "PaperPlanning",
@@ -32,7 +33,6 @@ __all__ = [
     "Planning",
     "Preview",
     "PublishedPosition",
-    "RETRY",
     "has_stable_poles",
 ]
 
@@ -251,8 +251,8 @@ def has_stable_poles(w_e: Array) -> bool:
 
 
 RETRY = 0.5
-"""Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after each
-further one of a run."""
+"""Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
+each further one of a run."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -266,9 +266,7 @@ class AveragedPlanning(Planning):
     ALWAYS: ClassVar[bool] = True
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the plan that the averaged model judges best, of those that are allowed; before it has learned, the
-        physics model's.
-        """
+        """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
         assert predictor.start is not None
         path = preview.command - predictor.start
         model = self._model(predictor, path, preview)
