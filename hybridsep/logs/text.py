@@ -301,20 +301,12 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         widths = [0 if line.lstrip().startswith(_COMMENTS) else _width(fields) for _, fields, line in rows]
         for width in {*widths} - {0}:
             begun = [i for i, (before, now) in enumerate(pairwise([0, *widths])) if now == width != before]
-            tables: dict[tuple[str, ...], tuple[int, _Table]] = {}
-            names: tuple[str, ...] = ()
-            for start in begun:
-                end = next((i for i in range(start, len(widths)) if widths[i] != width), len(widths))
-                table = _with_names(rows, start, end, delimiter)
-                names = names if table is None else tuple(table.names)
-                if names:  # written again among the rows, they begin no table
-                    n, first = tables.get(names, (0, table))
-                    assert first is not None
-                    tables[names] = (n + end - start, first)
-            for n, table in tables.values():
+            ends = [next((i for i in range(one, len(widths)) if widths[i] != width), len(widths)) for one in begun]
+            found = (_with_names(rows, start, end, delimiter) for start, end in zip(begun, ends, strict=True))
+            if (table := next(filter(None, found), None)) is not None:
+                n = sum(one == width and row[0] >= table.first for one, row in zip(widths, rows, strict=True))
                 # That blanks divide a timestamp makes no column
-                divided = delimiter is None and bool(table.clocks)
-                score = (n, width - divided)
+                score = (n, width - (delimiter is None and bool(table.clocks)))
                 if best is None or score > best[0]:
                     best = (score, table)
     return _first_line(lines) if best is None else best[1]
