@@ -30,7 +30,12 @@ from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from c_coverage import count_in, table
 from command_line import Run
 from properties import LEFT_OUT, take_profile
-from quick_fits import without_other_settings, without_other_windows, without_python_fmus
+from quick_fits import (
+    without_larger_structures,
+    without_other_settings,
+    without_other_windows,
+    without_python_fmus,
+)
 
 sys.dont_write_bytecode = False  # of this process too
 
@@ -74,7 +79,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` judge one look-ahead, with the default settings alone, and write the native FMUs alone."""
+    """Let ``fit`` try small structures and the default settings, judge one look-ahead, and write native FMUs alone."""
+    without_larger_structures(monkeypatch)
     without_python_fmus(monkeypatch)
     without_other_windows(monkeypatch)
     without_other_settings(monkeypatch)

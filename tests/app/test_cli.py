@@ -127,10 +127,10 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     """Over the first moves of the staircase; the figures of all of it are the demo's."""
     command = write_rows(tmp_path / "command.csv", commanded()[:2000], commanded()[:2000])
-    options = ("--trajectory", command, "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
     for kind in ("off", "physics", "hybrid"):
-        status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json", "--force")
+        files = ("--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png") if kind == "hybrid" else ()
+        status, out, _ = hybridsep("cosim", "--compensate", kind, "--trajectory", command, *files, "--json")
         assert status == 0
         summary = json.loads(out)
         assert summary[f"share_{kind}"] > 0.9
@@ -200,7 +200,8 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     cosimulate(compensator, machine.new_plant(), staircase()[:2500], encoder=Encoder(5e-6, 1))
     compensator.predictor.save(weights)
     options = ("--weights", weights)
-    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")
+    command = write_rows(tmp_path / "command.csv", commanded()[:2000], commanded()[:2000])
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", "--trajectory", command, *options, "--json")
     assert status == 0
     assert json.loads(out)["tracking_rms_um"] < 2.5
     assert json.loads(out)["share_hybrid"] == 1.0

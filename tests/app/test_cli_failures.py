@@ -84,7 +84,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_an_ascii_terminal(tmp_path: Path) -> None:
-    log = write_log(tmp_path / "log.csv", n=1000)
+    log = write_log(tmp_path / "log.csv", n=300)
     ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "200"}
     done = command("backtest", log, "-m", MACHINE, env=ascii_only)
     assert done.returncode == 0, done.stderr

@@ -119,7 +119,7 @@ def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path,
 @pytest.mark.usefixtures("quick_fit")
 def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, tmp_path: Path, log: Path) -> None:
     out = tmp_path / "axis"
-    arguments = ("fit", log, "--Np", 20, "--out", out)
+    arguments = ("fit", log, "--Np", 50, "--out", out)
     for _ in range(2):
         assert hybridsep(*arguments)[0] == 0
     (other := log.with_name("other.csv")).write_bytes(log.read_bytes())

@@ -198,10 +198,10 @@ def test_figures_on_the_page(full: Demonstration, case: str, figure: str, label:
 
 @pytest.mark.slow
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
-    subprocess.run([*command, "--flavour", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
-    names = {f"{name}Py_als25010_x.fmu" for name in ("FeedDrive", "HybridPredictor", "SepCompensator")}
-    assert {path.name for path in tmp_path.iterdir()} == names
+    command = [sys.executable, str(ROOT / "build_fmu.py"), "FeedDrivePy_als25010_x", "--flavour", "python"]
+    machine = ROOT / "models" / "als25010_x.toml"
+    subprocess.run([*command, "--machine", machine, "--out", tmp_path], check=True, stdout=subprocess.DEVNULL)
+    assert [path.name for path in tmp_path.iterdir()] == ["FeedDrivePy_als25010_x.fmu"]
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import Run, write_rows
+from quick_fits import without_larger_structures
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
@@ -33,8 +34,16 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def short(log: Path) -> Path:
+    part = np.r_[:400, 999:1399]  # a move in each half, between them at rest
+    return write_rows(log.with_name("my axis.csv"), commanded()[part], measured(0)[part])
+
+
+@pytest.fixture(scope="module")
 def fitted(log: Path) -> Fit:
-    return fit(read_log(log), Np=NP)
+    with pytest.MonkeyPatch.context() as patch:
+        without_larger_structures(patch)
+        return fit(read_log(log), Np=NP)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +91,7 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(built: Built, log: Pa
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_fit_is_whole_where_no_library_can_be_loaded(
-    hybridsep: Run, log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    hybridsep: Run, short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As where the folder of temporary files is mounted noexec."""
 
@@ -90,7 +99,7 @@ def test_a_fit_is_whole_where_no_library_can_be_loaded(
         raise FmuError("HybridPredictor_axis.fmu cannot be loaded: failed to map segment from shared object")
 
     monkeypatch.setattr(build, "FmuController", refused)
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
+    status, out, err = hybridsep("fit", short, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "the FMU's steps are not timed: HybridPredictor_axis.fmu cannot be loaded" in " ".join(out.split())
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
@@ -133,10 +142,8 @@ def test_the_reports_script_replays_a_log(fitted: Fit, built: Built, monkeypatch
 
 
 @pytest.mark.slow
-def test_the_command_line(hybridsep: Run, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    part = np.r_[:400, 999:1399]  # a move in each half, between them at rest
-    log = write_rows(tmp_path / "my axis.csv", commanded()[part], measured(0)[part])
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json")
+def test_the_command_line(hybridsep: Run, short: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    status, out, err = hybridsep("fit", short, "--out", tmp_path / "fit", "--Np", 40, "--json")
     assert status == 0, err
     result = json.loads(out)
     assert result["findings"] == {"my axis.csv": []}
@@ -144,7 +151,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path, request: pytest.Fixtur
     assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
     assert load_machine(tmp_path / "fit" / "machine.toml").name == "my_axis"
     request.getfixturevalue("quick_fit")
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    status, out, err = hybridsep("fit", short, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out
     out = " ".join(out.split())
@@ -251,8 +258,8 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
-def test_a_rotary_axis_stays_one_under_the_default_machines_name(log: Path, tmp_path: Path) -> None:
-    found = fit(replace(read_log(log), unit="rad"), Np=20, name="spring_mass_damper").build(tmp_path, report=False)
+def test_a_rotary_axis_stays_one_under_the_default_machines_name(short: Path, tmp_path: Path) -> None:
+    found = fit(replace(read_log(short), unit="rad"), Np=20, name="spring_mass_damper").build(tmp_path, report=False)
     assert load_machine(tmp_path / "machine.toml").unit == "rad"
     assert all(path.exists() for path in found.files.values())
 

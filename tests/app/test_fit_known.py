@@ -80,7 +80,7 @@ def start_of(fmu: Path, name: str) -> float:
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
-    x_d = long_moves(2, n=3)
+    x_d = long_moves(2, n=2)
     x = screw(x_d, 0.0)
     late = np.concatenate((np.full(LATE, x[0]), x[:-LATE]))
     logs = {0: write_rows(tmp_path / "axis.csv", x_d, x), LATE: write_rows(tmp_path / "late.csv", x_d, late)}

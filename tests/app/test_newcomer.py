@@ -23,7 +23,7 @@ def test_the_lines_that_fit_prints_end_in_a_compensated_run(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    targets = np.concatenate(([0.0], np.random.default_rng(0).uniform(-0.01, 0.01, 12)))
+    targets = np.concatenate(([0.0], np.random.default_rng(0).uniform(-0.01, 0.01, 8)))
     x_d = rest_to_rest(targets, Limits(velocity=0.08, acceleration=8.0, jerk=1000.0), T_S, dwell=0.05)
     stage = StageDrive(ModalModel([Mode(35.0, 0.4, (70 * np.pi) ** 2)], dead_time=2), 8e-6, 0.05, T_S)
     x = simulate(stage, x_d, T_S) + 5e-7 * np.random.default_rng(1).standard_normal(len(x_d))

@@ -11,15 +11,21 @@ import c_core
 import elf
 import pytest
 import staircase_data as staircase
-from c_compiler import C_SOURCES, build_folder, include_flags, needs_sanitisers, run_compiler, sanitising_compiler
+from c_compiler import (
+    C_SOURCES,
+    SANITISED,
+    build_folder,
+    include_flags,
+    needs_sanitisers,
+    run_compiler,
+    sanitising_compiler,
+)
 from c_core import write_trajectory
 from places import ROOT
 
 from hybridsep.fmi.c_header import all_c
 
 SUFFIXES = (".c", ".h", ".cpp")
-SANITISED = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
-"""Not optimised: that would take three times as long to compile."""
 
 
 @pytest.mark.slow

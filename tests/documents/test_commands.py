@@ -1,4 +1,4 @@
-"""Command lines and Python blocks of README and documentation, run page by page in one folder."""
+"""Command lines and Python blocks of README and documentation, run page by page behind the README's fit."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import contextlib
 import io
 import json
 import re
+import shutil
 import sys
 from pathlib import Path
 
 import pytest
+from built_once import built_once
 from command_line import Run, run_line
 from places import ROOT
-from quick_fits import without_other_settings, without_other_windows
+from quick_fits import without_larger_structures, without_other_settings, without_other_windows
 
 from benchmarks.pictures import RECORD, judged_figures
 from hybridsep import staircase
@@ -28,10 +30,33 @@ ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 3001
-"""Lines of the example log that are left once it is written, and at night once the README's fit is over: of the others
-it is tested that they work."""
+"""Lines of the example log that are left once it is written, and at night once it is fitted: of the others it is tested
+that they work."""
 MOVES = 3500
 """Samples of the staircase that blocks of Python run by day."""
+MADE = {
+    "README.md": "my_axis/report.html",
+    "read-the-report.md": "replay.html",
+    "tune.md": "tuned.toml",
+    "close-the-loop.md": "compensated.png",
+}
+"""Files that pages leave."""
+
+
+def pieces() -> dict[Path, list[tuple[str, str]]]:
+    """Return each page's command lines and blocks of Python with their language, of equal ones the first."""
+    done = {FIT, LOG}
+    found: dict[Path, list[tuple[str, str]]] = {}
+    for page in PAGES:
+        for language, text in RUN.findall(page.read_text(encoding="utf-8")):
+            for piece in [text] if language == "python" else text.splitlines():
+                if piece not in done and not piece.startswith(ELSEWHERE):
+                    done.add(piece)
+                    found.setdefault(page, []).append((language, piece))
+    return found
+
+
+PIECES = pieces()
 
 
 def test_every_block_is_run_or_shown() -> None:
@@ -40,6 +65,9 @@ def test_every_block_is_run_or_shown() -> None:
         for language, text in re.findall(r"```(\w+)\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             assert language in ("sh", "python", "toml", "text"), page.name
             assert language == "sh" or not re.search(r"^(hybridsep|python) ", text, re.MULTILINE), page.name
+    lines = [piece for found in PIECES.values() for _, piece in found if piece.startswith("hybridsep ")]
+    assert len(lines) >= 10
+    assert set(MADE) <= {page.name for page in PIECES}
 
 
 @pytest.mark.slow
@@ -57,35 +85,39 @@ def test_fmpy_gets_the_communication_step_size() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are for a POSIX shell")
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.nightly)])
-def test_the_pages_run_from_first_to_last(
-    whole: bool, hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("page", PIECES, ids=lambda page: page.name)
+def test_a_page_runs_behind_the_readmes_fit(
+    page: Path, whole: bool, hybridsep: Run, tmp_path: Path, session_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     without_other_windows(monkeypatch)
     if not whole:
+        without_larger_structures(monkeypatch)
         without_other_settings(monkeypatch)
+        monkeypatch.setattr("os.cpu_count", lambda: 1)  # other processes would load all that this one has
         monkeypatch.setattr("hybridsep.staircase", lambda: staircase()[:MOVES])
+
+    def fitted(folder: Path) -> None:
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        run_line(LOG, hybridsep)
+        if whole:
+            run_line(FIT, hybridsep)
+            assert_the_row_of_the_readme(folder / "my_axis" / "fit.json")
+        log = folder / "my_axis.csv"
+        log.write_text("".join(log.read_text().splitlines(keepends=True)[:ROWS]))
+        if not whole:
+            run_line(FIT, hybridsep)
+
+    shutil.copytree(built_once(session_folder / f"fit of the pages, {whole}", fitted), tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    done: set[str] = set()
-    for page in PAGES:
-        for language, text in RUN.findall(page.read_text(encoding="utf-8")):
-            for piece in [text] if language == "python" else text.splitlines():
-                if piece in done or piece.startswith(ELSEWHERE):
-                    continue
-                done.add(piece)
-                if language == "python":
-                    python(piece, page)
-                else:
-                    run_line(piece, hybridsep)
-                    capsys.readouterr()
-                if piece == FIT and whole:
-                    assert_the_row_of_the_readme(tmp_path / "my_axis" / "fit.json")
-                if piece == (FIT if whole else LOG):
-                    log = tmp_path / "my_axis.csv"
-                    log.write_text("".join(log.read_text().splitlines(keepends=True)[:ROWS]))
-    assert len([piece for piece in done if piece.startswith("hybridsep ")]) >= 12
-    for name in ("my_axis/report.html", "replay.html", "tuned.toml", "compensated.png"):
-        assert (tmp_path / name).stat().st_size > 0, name
+    for language, piece in PIECES[page]:
+        if language == "python":
+            python(piece, page)
+        else:
+            run_line(piece, hybridsep)
+    if page.name in MADE:
+        assert (tmp_path / MADE[page.name]).stat().st_size > 0
 
 
 def assert_the_row_of_the_readme(results: Path) -> None:

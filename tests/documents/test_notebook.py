@@ -12,7 +12,7 @@ from places import ROOT
 
 from hybridsep.logs import formats
 
-ROWS = 4001
+ROWS = 2001
 """Lines of the example log that are left: of the others the pages tell."""
 
 

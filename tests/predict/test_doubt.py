@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from averaged_cases import PERIOD, averaged, averaged_model, cycles, friction, physics, run
-from random_drives.generator import random_drives
+from random_drives.generator import SEED, Recipe
 from random_drives.simulation import simulate
 
 from hybridsep.base.signals import Array
@@ -75,16 +75,18 @@ def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert
 @pytest.mark.slow
 def test_the_commands_expert_is_doubted_where_it_led() -> None:
     """On a plant whose frequencies fall by a tenth; with a doubt of L alone A kept its earlier runs, at 3.3 times."""
-    (drive,) = random_drives((35,))
-    modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in drive.true_model.modes]
-    (x,) = simulate([ModalModel(modes)], [drive.disturbances], [drive.x_d])
+    recipe = Recipe.draw(35, SEED)
+    model = recipe.true.model
+    modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in model.modes]
+    before, x = simulate([model, ModalModel(modes)], 2 * [recipe.disturbances], 2 * [recipe.x_d])
+    drive = recipe.drive(before)
     x_meas = x + drive.noise_std * np.random.default_rng(35).standard_normal(len(x))
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()
-    model = averaged_model(warm)
-    assert model.leading == ARX_COMMAND
-    assert_doubts(model, ARX_COMMAND)
+    learned_by = averaged_model(warm)
+    assert learned_by.leading == ARX_COMMAND
+    assert_doubts(learned_by, ARX_COMMAND)
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
     assert not averaged_model(warm).doubts

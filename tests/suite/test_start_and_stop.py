@@ -41,7 +41,7 @@ def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> No
 @pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
-    loop, stream = closed_loop(new_stream.model, 700), new_stream()
+    loop, stream = closed_loop(new_stream.model, 400), new_stream()
     stream.initialise(loop.values, start=1234.5)
     shown = replay(stream, loop, start_time=1234.5)
     other = new_stream()

@@ -23,6 +23,12 @@ FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wcast-qual", "-pedantic", "-Werror", "-ffp-contract=off"]
 
+SANITISED = (
+    *("-O0", "-g", "-fPIC", "-fno-omit-frame-pointer"),
+    *("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
+)
+"""Options of builds with sanitizers. Not optimised: that would take three times as long to compile."""
+
 
 def compiler() -> list[str]:
     """Return the command of a C compiler, or say that there is none."""

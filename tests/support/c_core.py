@@ -98,8 +98,10 @@ def _shared() -> Path:
 
 
 @cache
-def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
+def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
     """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
+
+    ``-O2`` takes twice as long, for tests that compute for little of their time.
 
     All processes of a test session share them.
     """
@@ -146,7 +148,7 @@ def library(name: str) -> ctypes.CDLL:
     folder = build_folder() / name
     write_header(name, folder)
     key = hashlib.sha256((folder / "hsep_fmu.h").read_bytes()).hexdigest()[:16]
-    flags = ["-O2", "-fPIC", "-shared", f"-I{folder}", *include_flags()]
+    flags = ["-O0", "-fPIC", "-shared", f"-I{folder}", *include_flags()]
 
     def build(built: Path) -> None:
         run_compiler([*flags, *model_sources(), EXPOSE, *object_files(), "-lm", "-o", built])

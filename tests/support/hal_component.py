@@ -33,7 +33,7 @@ def _library(model: str) -> ctypes.CDLL:
         for name in _HEADERS:
             (folder / name).write_text("")
         source = ROOT / "tests" / "integrations" / "hal_stub.c"
-        command = [*compiler(), "-std=gnu11", "-D_GNU_SOURCE", "-O1", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
+        command = [*compiler(), "-std=gnu11", "-D_GNU_SOURCE", "-O0", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
         command += ["-Wno-unused-function", "-Wno-ignored-qualifiers", f"-I{folder}"]
         command += [f'-DCOMPONENT="{COMPONENTS[model]}.c"']
         done = subprocess.run(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from stream import Array
 
@@ -14,8 +12,9 @@ def held(x_pb: Array, x_meas: Array, Np: int, *, delay: int = 0, first: int = 0)
     ``x_meas`` is what was measured at each sample, NaN where missing; it arrived ``delay`` samples later. What is
     measured before sample ``first`` does not count.
     """
-    found = []
-    for k in range(len(x_pb)):
-        known = [i for i in range(first, k // Np * Np - delay) if not math.isnan(x_meas[i])]
-        found.append(x_pb[k] + (x_meas[known[-1]] - x_pb[known[-1]] if known else 0.0))
-    return np.array(found)
+    found: Array = x_pb.copy()
+    for begin in range(0, len(x_pb), Np):
+        known = first + np.flatnonzero(~np.isnan(x_meas[first : max(first, begin - delay)]))
+        if len(known):
+            found[begin : begin + Np] += x_meas[known[-1]] - x_pb[known[-1]]
+    return found

@@ -5,8 +5,15 @@ from __future__ import annotations
 import pytest
 
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.identify.structure import STRUCTURES
 
-__all__ = ["without_other_settings", "without_other_windows", "without_python_fmus"]
+__all__ = ["without_larger_structures", "without_other_settings", "without_other_windows", "without_python_fmus"]
+
+
+def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
+    """Let ``fit`` try structures of a lag or one mode alone: half of its time."""
+    small = [one for one in STRUCTURES if one.n_modes + one.lag <= 1]
+    patch.setattr("hybridsep.identify.operation.STRUCTURES", small)
 
 
 def without_other_windows(patch: pytest.MonkeyPatch) -> None:

@@ -206,7 +206,11 @@ class StaticFeatures:
         for i, distance in enumerate(self.distances(velocity_scale).tolist()):
             u, of_operator = float(state.stops[i]), []
             for step in steps:
-                u = min(max(u + step, -distance), distance)
+                u += step
+                if u > distance:  # min and max take three times as long
+                    u = distance
+                elif u < -distance:
+                    u = -distance
                 of_operator.append(u)
             found[:, i] = of_operator
         return found
