@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import write_rows
+from quick_fits import without_larger_structures, without_other_settings, without_other_windows
 from staircase_data import commanded, measured
 
 import hybridsep
@@ -33,7 +34,11 @@ class Frame:
 
 @pytest.fixture(scope="module")
 def axis() -> Fit:
-    return hybridsep.fit(1e3 * X_D, 1e3 * X, T_s=1e-3, unit="mm", Np=NP)
+    with pytest.MonkeyPatch.context() as patch:
+        without_larger_structures(patch)
+        without_other_windows(patch)
+        without_other_settings(patch)
+        return hybridsep.fit(1e3 * X_D, 1e3 * X, T_s=1e-3, unit="mm", Np=NP)
 
 
 @pytest.mark.slow

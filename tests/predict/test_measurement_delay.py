@@ -121,9 +121,8 @@ def compensated(delay: int, compensate: str = "hybrid", n_runs: int = 2) -> list
 
 
 def moves() -> Array:
-    """Return a second and a half of 7 mm moves, there and back, (1500,), m."""
-    times = [0.05, 0.35, 0.65, 0.95]
-    return rest_to_rest([0.0, 0.007, 0.0, 0.007, 0.0], PAPER_LIMITS, TS, start_times=times, duration=1.5)
+    """Return three moves of 7 mm, there and back, (1000,), m."""
+    return rest_to_rest([0.0, 0.007, 0.0, 0.007], PAPER_LIMITS, TS, start_times=[0.05, 0.35, 0.65], duration=1.0)
 
 
 @pytest.mark.slow

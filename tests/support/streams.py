@@ -255,7 +255,8 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, ali
 
     With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
     and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and so does the
-    latter but for a test of adapters, and what ``alike`` names (``one_set``); the other sets run at night.
+    latter but for a test of adapters, and what ``alike`` names (``one_set``); the other sets run at night, and so does
+    the comparison of a pythonfmu FMU of the stage with the library.
     """
     once = (PYTHON, *alike) if adapters and needs != "agreement" else (PYTHON, NATIVE, *alike)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
@@ -268,6 +269,11 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, ali
             marks=[
                 *([pytest.mark.one_set] if implementation in once else []),
                 *([pytest.mark.slow] if implementation == PYTHON or model in STAGES else []),
+                *(
+                    [pytest.mark.nightly]
+                    if implementation == PYTHON and model in STAGES and needs == "agreement"
+                    else []
+                ),
             ],
         )
         for implementation, model in pairs
