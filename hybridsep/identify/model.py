@@ -71,14 +71,7 @@ class IdentifiedModel:
     findings: tuple[str, ...]
 
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
-        """Return the machine with this model.
-
-        Parameters
-        ----------
-        name, title : str
-            As in a machine file.
-        **entries
-            Further entries of the file, such as ``predictor={"Np": 20}`` or ``sources``.
+        """Return the machine with this model; ``entries`` are more of its file, such as ``predictor={"Np": 20}``.
 
         Raises
         ------

@@ -6,7 +6,8 @@ import math
 
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
-from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
+from ..base.signals import check_position
+from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
 __all__ = ["FeedDrive"]
 
@@ -54,7 +55,7 @@ class FeedDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        check_command(x_d)
+        check_position("x_d", x_d)
         check_step(h, self._rate)
         r = x_d - self._start
         a, w2 = self.c / self.m, self.k / self.m

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..base.clock import check_step_size
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
-from ..base.signals import POSITION_MAX, Array, as_samples
+from ..base.signals import Array, as_samples
 
 __all__ = [
     "INTERNAL_STEP",
@@ -25,7 +25,6 @@ __all__ = [
     "Drive",
     "Encoder",
     "Plant",
-    "check_command",
     "check_step",
     "internal_steps",
     "simulate",
@@ -116,12 +115,6 @@ def check_step(h: float, rate: float) -> None:
             f"the step size must be at most {longest:g} s for a drive as fast as {rate:g} 1/s, got {h!r}; "
             "make several steps"
         )
-
-
-def check_command(x_d: float) -> None:
-    """Raise SignalError if a command, m, is not finite or beyond :data:`POSITION_MAX`."""
-    if not abs(x_d) <= POSITION_MAX["m"]:  # NaN too
-        raise SignalError(f"x_d must be within ±{POSITION_MAX['m']:g} m, got {x_d:g}")
 
 
 _MASK: int = 0xFFFF_FFFF_FFFF_FFFF

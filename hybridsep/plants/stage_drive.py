@@ -7,8 +7,9 @@ import math
 from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import PARAMETERS, check
+from ..base.signals import check_position
 from ..model.physics import ModalModel, Mode
-from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
+from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
 __all__ = ["StageDrive", "velocity_under_friction"]
 
@@ -126,7 +127,7 @@ class StageDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        check_command(x_d)
+        check_position("x_d", x_d)
         check_step(h, self._rate)
         step = self._clock.stepped(self._clock.end, h)
         r, z, v = x_d - self._start, self._z, self._v
