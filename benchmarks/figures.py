@@ -1,7 +1,7 @@
-"""Baseline of all figures of README and docs/ that do not depend on the machine's speed: written to JSON, or compared.
+"""Figures of README and docs/ that do not depend on the machine's speed: written to JSON, or compared.
 
-    python -m benchmarks.figures --out benchmarks/figures.json [--emps PATH]      (some ten minutes)
-    python -m benchmarks.figures --compare benchmarks/figures.json [--emps PATH]
+    python -m benchmarks.figures --out FILE [--emps PATH]      (some ten minutes)
+    python -m benchmarks.figures --compare FILE [--emps PATH]
 
 A change of structure changes no figure: written before it and compared after it, to the printed digits. The exit code
 is 1 if one differs. Times and instruction counts stay with the benchmarks that measure them.
