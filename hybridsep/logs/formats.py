@@ -58,8 +58,8 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     (
         "halscope's file of LinuxCNC before 2.9",
         (b"Sampling period is",),
-        "import pandas; a = pandas.read_csv('{path}', sep=r'\\s+', skiprows=2, header=None)[:-1]; "
-        "a.iloc[:, 1::2].set_axis(a.iloc[0, ::2], axis=1).to_csv('log.csv', index=False); the first line has T_s",
+        "import numpy; a = numpy.loadtxt('{path}', str, skiprows=2)[:-1]; "
+        "numpy.savez('log.npz', **dict(zip(a[0, ::2], a[:, 1::2].T.astype(float)))); the first line has T_s",
     ),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),

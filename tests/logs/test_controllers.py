@@ -247,7 +247,7 @@ def test_joints_of_halscope(tmp_path: Path) -> None:
     [
         ("period is 1000000", "period is 0", "line 1: the sampling period must be a positive number of ns"),
         ("x_d;x\n", "x_d;x;y\n", r"line 5: 3 columns were expected as in line 2, got 2"),
-        ("# ", "", r"is halscope's file of LinuxCNC before 2\.9, which is not read; import pandas"),
+        ("# ", "", r"is halscope's file of LinuxCNC before 2\.9, which is not read; import numpy"),
     ],
 )
 def test_damaged_halscope(tmp_path: Path, before: str, after: str, message: str) -> None:
