@@ -11,32 +11,23 @@ import numpy as np
 
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import known_rms, peak_derivatives
-from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
+from ..base.settings import DRIVE_LIMIT_ENTRIES, CompensatorSettings, Limits
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
-from .replay import Recording
+from .replay import Recording, beginnings
 
 __all__ = [
-    "COMPENSATE",
     "LIMITS_WORDS",
     "MARGINS",
-    "PHYSICS_ALONE",
+    "ErrorSize",
+    "LimitEffect",
     "Tracking",
     "binding_words",
     "drive_limits",
     "estimated_limits",
     "expected_tracking",
 ]
-
-COMPENSATE = "physics"
-"""Model that a new compensator starts with."""
-
-PHYSICS_ALONE = (
-    "The physics model alone may leave more error than no compensation does: on 4 of 30 sound loops it left more than "
-    "1.2 times as much, 4.1 times at worst. Compare both with compensate = off before one moves a machine."
-)
-"""What is said of :data:`COMPENSATE`."""
 
 MARGINS = np.array([1.25, 2.0, 5.0])
 """Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
@@ -54,6 +45,15 @@ LIMITS_WORDS = (
 
 _SAID = 0.001
 """Share of the samples from which on a limit that binds is said: fewer cost nothing that could be seen."""
+
+FACTORS = (0.5, 1.0, 2.0)
+"""By which each limit is changed, one at a time, to say what it costs."""
+
+_GAIN, _COST = 0.05, 0.01
+"""Relative gain from which on a limit twice as large is advised, and cost up to which half of one is."""
+
+_EFFECTS_MAX = 4000
+"""Samples over which that is tried: eight runs."""
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -103,40 +103,95 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
 
 
 @dataclass(frozen=True)
-class Tracking:
-    """Tracking errors to be expected: RMS of commanded minus measured position over the test samples, m.
+class ErrorSize:
+    """RMS and largest of commanded minus measured position, m; NaN where it is not known."""
+
+    rms: float
+    largest: float
+
+    def words(self, shown: DisplayUnits) -> str:
+        """Return both with their unit."""
+        if math.isnan(self.rms):
+            return "not known"
+        return f"{shown.words(self.rms, '.4g')} (largest {shown.words(self.largest, '.4g')})"
+
+
+@dataclass(frozen=True)
+class LimitEffect:
+    """Tracking error to be expected with one of the drive's limits changed.
 
     Attributes
     ----------
-    none, physics, hybrid : float
+    name : str
+        Of the limit, such as ``a_max``.
+    error : mapping
+        Factor → :class:`ErrorSize`, with this limit alone times a factor.
+    """
+
+    name: str
+    error: Mapping[float, ErrorSize]
+
+    @property
+    def advised(self) -> float:
+        """Factor: 2 where that takes away a part of the error; of ``change_max`` ½ where it costs nothing."""
+        half, one, two = (self.error[factor].rms for factor in FACTORS)
+        if two < (1.0 - _GAIN) * one:
+            return 2.0
+        return 0.5 if self.name == "change_max" and half < (1.0 + _COST) * one else 1.0
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """Tracking errors to be expected over the test samples.
+
+    Attributes
+    ----------
+    none, physics, hybrid : ErrorSize
         As measured, and estimates with each model; NaN without a test sample, or where a plan diverges.
     limits : mapping
         Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
+    effects : tuple of LimitEffect
+        With the hybrid, over the first samples of each log; empty where no limit binds it.
+    advised : mapping
+        Name → value of the limits that are advised in their place, SI; empty where none is.
+    advised_error : ErrorSize
+        Over the same samples.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
     """
 
-    none: float
-    physics: float
-    hybrid: float
+    none: ErrorSize
+    physics: ErrorSize
+    hybrid: ErrorSize
     limits: Mapping[str, Mapping[str, float]]
+    effects: tuple[LimitEffect, ...]
+    advised: Mapping[str, float]
+    advised_error: ErrorSize
     change_max: float | None
     following_error_max: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
-
-        def figure(value: float | None) -> str:
-            return "not known" if value is None or math.isnan(value) else shown.words(value, ".4g")
-
+        change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
+        lines = [
+            f"Tracking error (commanded minus measured, RMS): {self.none.words(shown)} as recorded; with the "
+            f"compensator about {self.hybrid.words(shown)} by the hybrid, with which the FMU starts, and about "
+            f"{self.physics.words(shown)} by the physics model (compensate = physics).",
+            f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
+        ]
+        for effect in self.effects:
+            each = ", ".join(f"{factor:g} ×: {error.words(shown)}" for factor, error in effect.error.items())
+            lines.append(f"{effect.name} {each}.")
+        if self.advised:
+            options = " ".join(f"--{name} {value:.4g}" for name, value in self.advised.items())
+            lines.append(
+                f"If the drive allows it: {options}, with which about {self.advised_error.words(shown)} is left."
+            )
         return [
-            f"Tracking error (commanded minus measured, RMS): {figure(self.none)} as recorded; with the compensator "
-            f"about {figure(self.hybrid)} by the hybrid (compensate = hybrid), and about {figure(self.physics)} by the "
-            f"physics model (compensate = {COMPENSATE}), with which the FMU starts.",
-            PHYSICS_ALONE,
-            f"change_max is {figure(self.change_max)}. {binding_words(self.limits.get('hybrid', {}))}",
-            f"Where the measured following error is above following_error_max = {figure(self.following_error_max)} for "
-            "three samples in a row, the compensator trips: its change of the command fades until reset.",
+            *lines,
+            "Where the measured following error is above following_error_max = "
+            f"{shown.words(self.following_error_max, '.4g')} for three samples in a row, the compensator trips: its "
+            "change of the command fades until reset.",
             _HOW,
         ]
 
@@ -144,29 +199,84 @@ class Tracking:
 def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and which limits bind."""
-    settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
-    pairs = [(one.x_d, one.x) for one in recordings]
-    firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
-    found = dict.fromkeys(("none", "physics", "hybrid"), math.nan)
-    bound: dict[str, dict[str, float]] = {}
-    for i, model in enumerate(("physics", "hybrid")):
-        compensator = replace(machine.compensator_settings, compensate=model)
-        try:
-            expected = list(expected_errors(machine.model, settings, compensator, pairs))
-        except SignalError:
-            continue
-        parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(expected, firsts, strict=True)]
-        judged = Expected(*map(np.concatenate, zip(*parts, strict=True)))
-        for name, errors in (("none", judged.without), (model, judged.compensated)):
-            found[name] = known_rms(errors)
-        if len(judged.x_d):
-            bound[model] = limits_that_bind(judged.x_d, judged.x_dm, settings.T_s, compensator)
-        progress((i + 1) / 2)
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
     allowed = machine.compensator_settings
+    judged = {
+        model: _expected(machine, replace(allowed, compensate=model), recordings) for model in ("physics", "hybrid")
+    }
+    progress(0.5)
+    bound = {
+        model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
+        for model, one in judged.items()
+        if one is not None and len(one.x_d)
+    }
+    effects: list[LimitEffect] = []
+    advised: dict[str, float] = {}
+    advised_error = _size(None)
+    hybrid = replace(allowed, compensate="hybrid")
+    if any(share >= _SAID for share in bound.get("hybrid", {}).values()):
+        first = beginnings(recordings, _EFFECTS_MAX)
+        now, entries = _size(_expected(machine, hybrid, first)), ("acceleration", "jerk", "change_max")
+        for i, entry in enumerate(entries, start=1):
+            errors = {
+                factor: now if factor == 1.0 else _size(_expected(machine, _scaled(hybrid, entry, factor), first))
+                for factor in FACTORS
+            }
+            effects.append(LimitEffect(DRIVE_LIMIT_ENTRIES[entry].name, errors))
+            progress(0.5 + 0.4 * i / len(entries))
+        wanted = hybrid
+        for entry, effect in zip(entries, effects, strict=True):
+            if effect.advised != 1.0:
+                wanted = _scaled(wanted, entry, effect.advised)
+                advised[effect.name] = _limit(wanted, entry)
+        if advised:
+            advised_error = _size(_expected(machine, wanted, first))
+    progress(1.0)
+    without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     return Tracking(
-        **found, limits=bound, change_max=allowed.change_max, following_error_max=allowed.following_error_max
+        none=ErrorSize(known_rms(without), float(np.nanmax(np.abs(without), initial=0.0))),
+        physics=_size(judged["physics"]),
+        hybrid=_size(judged["hybrid"]),
+        limits=bound,
+        effects=tuple(effects),
+        advised=advised,
+        advised_error=advised_error,
+        change_max=allowed.change_max,
+        following_error_max=allowed.following_error_max,
     )
+
+
+def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
+    """Return the errors to be expected over the test samples, one log after the other; None where a plan diverges."""
+    settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
+    firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
+    try:
+        found = list(expected_errors(machine.model, settings, compensator, [(one.x_d, one.x) for one in recordings]))
+    except SignalError:
+        return None
+    parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(found, firsts, strict=True)]
+    return Expected(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _size(found: Expected | None) -> ErrorSize:
+    if found is None or not len(found.compensated):
+        return ErrorSize(math.nan, math.nan)
+    return ErrorSize(known_rms(found.compensated), float(np.nanmax(np.abs(found.compensated), initial=0.0)))
+
+
+def _limit(settings: CompensatorSettings, entry: str) -> float:
+    value = settings.change_max if entry == "change_max" else getattr(settings.limits, entry)
+    assert value is not None
+    return float(value)
+
+
+def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> CompensatorSettings:
+    """Return the settings with a limit of ``[drive_limits]`` times a factor."""
+    value = factor * _limit(settings, entry)
+    if entry == "change_max":
+        return replace(settings, change_max=value)
+    assert settings.limits is not None
+    return replace(settings, limits=replace(settings.limits, **{entry: value}))
 
 
 def binding_words(shares: Mapping[str, float]) -> str:

@@ -32,7 +32,7 @@ from ..predict.window import Prediction
 from .advice import Judged, recommendation
 from .build import Built, build_fmus, fit_files, sha256_of, step_times, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, settings_for, window_scores
-from .compensation import COMPENSATE, LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
+from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -125,7 +125,7 @@ class Fit:
         predictor.restart()
         return predictor
 
-    def compensator(self, compensate: str = COMPENSATE) -> SepCompensator:
+    def compensator(self, compensate: str = "hybrid") -> SepCompensator:
         """Return a compensator that begins with what was learned, within the machine's limits of the drive.
 
         ``compensate`` is the best model allowed: ``"off"``, ``"physics"`` or ``"hybrid"``.
@@ -399,7 +399,7 @@ def _machine(
 ) -> Machine:
     """Return the machine; without limits that are not required where no compensator is possible with its look-ahead."""
     sections: dict[str, Any] = {"plant": {"kind": "identified", **plant}} if plant else {}
-    compensation = {"drive_limits": dict(limits), "compensator": {"compensate": COMPENSATE}} if limits else {}
+    compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
 
     def made(more: Mapping[str, Any]) -> Machine:

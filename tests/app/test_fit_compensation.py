@@ -19,8 +19,11 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import binding_words, drive_limits
+from hybridsep.fitting.compensation import FACTORS, binding_words, drive_limits, expected_tracking
+from hybridsep.fitting.replay import Recording
 from hybridsep.fmi.archive import build_fmu
+from hybridsep.identify.model import machine_of
+from hybridsep.logs.units import DisplayUnits
 from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
 
@@ -47,8 +50,7 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, *LIMITS)
     assert status == 0, err
     words = " ".join(said.split())
-    assert "by the hybrid (compensate = hybrid), and about" in words
-    assert "The physics model alone may leave more error than no compensation does" in words
+    assert re.search(r"by the hybrid, with which the FMU starts, and about [\d.]+ µm \(largest [\d.]+ µm\)", words)
     assert re.search(r"change_max is [\d.]+ µm\. (No limit binds|Limits bind) the compensated command", words)
     assert re.search(r"above following_error_max = [\d.]+ µm for three samples in a row", words)
     assert "An estimate: the compensator plans in closed loop on the identified model" in words
@@ -60,22 +62,53 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     # As large as without the options, where a millimetre applied silently
     assert machine.drive_limits.change_max == pytest.approx(2 * np.abs(x_d - x).max(), rel=1e-3)
     assert machine.compensator_settings.following_error_max == pytest.approx(1.3 * np.abs(x_d - x).max(), rel=1e-3)
-    assert machine.compensator_settings.compensate == "physics"
+    assert machine.compensator_settings.compensate == "hybrid"
     fmus = sorted(path.stem for path in out.glob("SepCompensator*.fmu"))
     assert fmus == ["SepCompensator_axis"]
     for name in fmus:
         starts = {one.name: one.start for one in read_description(out / f"{name}.fmu").modelVariables}
-        assert (float(starts["v_max"]), int(starts["compensate"])) == (0.3, 1)
+        assert (float(starts["v_max"]), int(starts["compensate"])) == (0.3, 2)
     tracking = json.loads((out / "fit.json").read_text())["tracking"]
     judged = slice(len(x) // 2 // 50 * 50 + 50 * (len(x) // 2 % 50 > 0), None)
-    assert tracking["none"] == pytest.approx(rms((x_d - x)[judged]), rel=1e-9)
+    assert tracking["none"]["rms"] == pytest.approx(rms((x_d - x)[judged]), rel=1e-9)
+    assert tracking["none"]["largest"] == pytest.approx(np.abs(x_d - x)[judged].max(), rel=1e-9)
     cold = build_fmu(machine, "SepCompensator_axis", tmp_path)
     for value, model in enumerate(("physics", "hybrid"), start=1):
         values = {"compensate": value}
         run = cosimulate(cold, stage(), x_d, controller_values=values, encoder=Encoder(5e-7, seed=2))
         # The same axis, whose friction does change with the command.
-        assert tracking[model] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
-        assert tracking[model] < 0.6 * tracking["none"]
+        assert tracking[model]["rms"] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
+        assert tracking[model]["rms"] < 0.6 * tracking["none"]["rms"]
+
+
+@pytest.mark.slow
+def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
+    x_d = command()[:2200]
+    x = simulate(stage(), x_d, T_S)
+    change_max = 0.3 * float(np.abs(x_d - x).max())
+    limits = {"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max}
+    machine = machine_of(
+        stage().model,
+        "zoh",
+        T_S,
+        "axis",
+        "Axis",
+        unit="m",
+        sources=["drawn"],
+        predictor={"Np": 50},
+        drive_limits=limits,
+    )
+    found = expected_tracking(machine, [Recording(x_d, x, 1000)], lambda _: None)
+    assert found.limits["hybrid"]["change_max"] > 0.1
+    assert [one.name for one in found.effects] == ["a_max", "j_max", "change_max"]
+    sizes = {one.name: [one.error[factor].rms for factor in FACTORS] for one in found.effects}
+    half, one, two = sizes["change_max"]
+    assert half > 1.2 * one > 1.5 * two
+    assert sizes["j_max"] == pytest.approx([one] * 3, rel=0.05)  # it does not bind
+    assert found.advised == {"change_max": pytest.approx(2 * change_max)}
+    assert found.advised_error.rms == two
+    said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))))
+    assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
