@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -76,6 +77,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in set(left_out)]
     items.sort(key=lambda item: item.path.name != "test_types.py")  # mypy takes longest: not alone at the end
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector the modules and tests, a quarter of a second each time."""
+    gc.freeze()
 
 
 @pytest.fixture

@@ -47,7 +47,11 @@ def test_trouble_never_makes_it_worse_than_physics(trouble: str) -> None:
         if k == 3050 and isinstance(drive, FeedDrive):
             drive.k, drive.c_nl, drive.k_nl = 1.1 * drive.k, 2 * drive.c_nl, 2 * drive.k_nl
 
-    troubles: dict[str, dict[str, Any]] = {"changed": {"disturb": change}, "noise": {"noise": 5e-5}, "limits": {}}
+    troubles: dict[str, dict[str, Any]] = {
+        "changed": {"disturb": change},
+        "noise": {"noise": 5e-5, "n": 3000},
+        "limits": {"n": 3000},
+    }
     more = troubles[trouble]
     settings_: dict[str, Any] = {} if trouble == "noise" else asdict(RECOMMENDED)
     limits = PAPER_LIMITS if trouble == "limits" else DRIVE_LIMITS

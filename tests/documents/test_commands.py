@@ -29,10 +29,10 @@ ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
-ROWS = 3001
+ROWS = 2001
 """Lines of the example log that are left once it is written, and at night once it is fitted: of the others it is tested
 that they work."""
-MOVES = 3500
+MOVES = 3000
 """Samples of the staircase that blocks of Python run by day."""
 MADE = {
     "README.md": "my_axis/report.html",

@@ -126,7 +126,7 @@ def test_the_model_that_plans_first(new_stream: StreamMaker, compensate: int, st
 def test_a_reset_forgets_everything(new_stream: StreamMaker) -> None:
     stream, fresh = new_stream(), new_stream()
     initialise(fresh)
-    expected = steps(fresh, 0, 300)
+    expected = steps(fresh, 0, 160)
     for values in (
         {"x_d_ahead": 0.1, "q": 1, "averaging": True},
         {"x_d_ahead": -0.2, "lambda": 1e-9, "averaging": False},
@@ -136,7 +136,7 @@ def test_a_reset_forgets_everything(new_stream: StreamMaker) -> None:
         steps(stream, 0, 130)
         stream.reset()
     initialise(stream)
-    assert steps(stream, 0, 300) == expected
+    assert steps(stream, 0, 160) == expected
     default, reset = new_stream(), new_stream()
     initialise(reset)
     reset.reset()

@@ -64,4 +64,6 @@ def turned(x_dm: Array, x_d: Array) -> int:
 
 
 def closed(sep: SepCompensator, seed: int = 0, **more: Any) -> Run:
-    return cosimulate(sep, plant(), commanded(), encoder=Encoder(more.pop("noise", 5e-6), seed), **more)
+    return cosimulate(
+        sep, plant(), commanded()[: more.pop("n", None)], encoder=Encoder(more.pop("noise", 5e-6), seed), **more
+    )
