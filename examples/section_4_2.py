@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hybridsep import PAPER_LIMITS, Encoder, Machine, backtest, paper_machine, rest_to_rest, simulate, spiral
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import Backtest, Batch
+from hybridsep.evaluate.backtest import Backtest
 
 NEAR = 100
 """Samples after a reversal of the command that count as near it."""
@@ -28,11 +28,11 @@ def replay(machine: Machine, x_d: Array) -> tuple[Array, Backtest, list[float]]:
     x = encoder.measure_all(simulate(machine.new_plant(), x_d, machine.T_s))
     predictor, poles = machine.new_predictor(), [0.0]
 
-    def learned(_: Batch) -> None:
+    def learned(_: float) -> None:
         recursion = np.concatenate(([1.0], -predictor.residual_weights))
         poles.append(float(np.max(np.abs(np.roots(recursion)))))
 
-    return x, backtest(predictor, x_d, x, on_batch=learned), poles
+    return x, backtest(predictor, x_d, x, progress=learned), poles
 
 
 def near_reversals(x_d: Array) -> NDArray[np.bool_]:

@@ -57,7 +57,7 @@ def backtest(
     """
     from ..evaluate.backtest import replayed_run
     from ..fitting.advice import Judged, partly_used, recommendation, whole_log_words
-    from ..fitting.replay import knew, replay_log
+    from ..fitting.replay import Recording, knew, replay
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
     from ..logs.units import shown_of
@@ -93,9 +93,11 @@ def backtest(
     shown = shown_of(read.file_unit, axis.unit)
     title = f"{axis.title}, {log.name}"
     with progress_bar(as_json) as advance:
-        scores, replayed = replay_log(predictor, read, advance)
+        recordings = [Recording(one.x_d, one.x_meas, 0) for one in read.segments()]
+        replayed = replay(predictor, recordings, lambda done: advance("replay", 0.8 * done))
+        replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
-    words = whole_log_words(warm=weights is not None, known=known)
+    scores, words = replayed.backtest, whole_log_words(warm=weights is not None, known=known)
     judged = Judged(replayed, read.T_s, shown, "the whole log", known=known)
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)

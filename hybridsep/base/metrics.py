@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import IntEnum
 from html import escape
 from statistics import NormalDist
@@ -18,14 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "RunningErrors",
     "batch_rms",
     "coverage",
     "hold",
     "html_table",
     "known_rms",
     "largest",
-    "last_residual",
     "line_plot",
     "one_line",
     "peak_derivatives",
@@ -78,31 +76,6 @@ def rms_ratio(rms_h: float, rms_peer: float, least: float = 0.0) -> float:
     return rms_h / rms_peer
 
 
-class RunningErrors:
-    """Running RMS and largest magnitude of ``m`` error signals that arrive in blocks; ``n`` samples so far."""
-
-    def __init__(self, m: int) -> None:
-        self.n = 0
-        self._squares: Array = np.zeros(m)
-        self._peaks: Array = np.zeros(m)
-
-    def add(self, n: int, squares: Sequence[float] | Array, peaks: Sequence[float] | Array) -> None:
-        """Add the sums of squares and the largest magnitudes of ``n`` samples."""
-        self.n += n
-        self._squares = self._squares + np.asarray(squares)
-        self._peaks = np.maximum(self._peaks, peaks)
-
-    @property
-    def rms(self) -> list[float]:
-        """RMS of each error; NaN without samples."""
-        return [math.sqrt(square / self.n) if self.n else math.nan for square in self._squares.tolist()]
-
-    @property
-    def peaks(self) -> list[float]:
-        """Largest magnitude of each error; NaN without samples."""
-        return [peak if self.n else math.nan for peak in self._peaks.tolist()]
-
-
 def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late: int = 0) -> Array:
     """Return the hold baseline: ``x_pb`` plus the last residual measured before each window; ``x_pb`` in the warm-up.
 
@@ -115,12 +88,6 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late
     last = np.where(begin > 0, measured[begin - 1], -1)
     residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
     return np.where(active, x_pb + residual, x_pb)
-
-
-def last_residual(x_meas: Array, x_pb: Array, before: float) -> float:
-    """Return the residual of the last sample measured, m, or the one ``before`` if none was; NaN is missing."""
-    known = np.flatnonzero(~np.isnan(x_meas))
-    return float(x_meas[known[-1]] - x_pb[known[-1]]) if len(known) else before
 
 
 def batch_rms(error: Array, Np: int) -> Array:

@@ -8,19 +8,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import SignalError
 from ..base.metrics import known_rms, rms_ratio
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..logs.checks import resolution
-from ..logs.log import Log
 from ..predict.predictor import HybridPredictor
 
 __all__ = [
-    "PREDICTIONS",
     "Judgement",
     "Recording",
     "Replay",
@@ -28,12 +27,8 @@ __all__ = [
     "beginnings",
     "knew",
     "replay",
-    "replay_log",
     "split_log",
 ]
-
-PREDICTIONS = ("x_pb", "x_hold", "x_h")
-"""What a replay predicts by: physics model, hold baseline, hybrid."""
 
 
 @dataclass(frozen=True)
@@ -181,8 +176,8 @@ class Replay:
     Attributes
     ----------
     recordings : tuple of Recording
-    results : tuple of Backtest
-        One a recording.
+    backtest : Backtest
+        Of all recordings, joined.
     Np : int
         Samples in a window.
     delay : int
@@ -195,7 +190,7 @@ class Replay:
     """
 
     recordings: tuple[Recording, ...]
-    results: tuple[Backtest, ...]
+    backtest: Backtest
     Np: int
     delay: int = 0
     offset: float = 0.0
@@ -215,20 +210,19 @@ class Replay:
         return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))
 
     def joined(self, name: str) -> Array:
-        """Return a signal of a :class:`Backtest` over all test samples, ``(n,)``."""
-        return self._parts([getattr(result, name) for result in self.results])
+        """Return a signal of the :class:`Backtest` over all test samples, ``(n,)``."""
+        return np.asarray(getattr(self.backtest, name)[self._judged])
 
     def commands(self) -> Array:
         """Return the commanded position over all test samples, ``(n,)``, m."""
-        return self._parts([recording.x_d for recording in self.recordings])
+        return np.concatenate([one.x_d for one in self.recordings])[self._judged]
 
     def errors(self) -> Array:
-        """Return ``x`` minus each of :data:`PREDICTIONS` over the test samples, ``(3, n)``, m.
+        """Return ``x`` minus what physics model, hold and hybrid predict, over the test samples, ``(3, n)``, m.
 
         NaN where a measurement is missing. The physics model is judged with its offset.
         """
-        x = self._measured()
-        return np.stack([x - self._parts(list(rows)) for rows in zip(*self._predictions(), strict=True)])
+        return (self._compared - self._predictions)[:, self._judged]
 
     def rms(self) -> list[float]:
         """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
@@ -236,8 +230,9 @@ class Replay:
 
     def scored(self) -> list[Scored]:
         """Return the errors of physics model, hold, every peer, and the hybrid, over the test samples."""
-        x, (pb, hold, h) = self._measured(), self.errors()
-        peers = [Scored(one.title, x - self._parts(one.predictions), one.diverged) for one in self.peers]
+        pb, hold, h = self.errors()
+        errors = [(self._compared - np.concatenate(one.predictions))[self._judged] for one in self.peers]
+        peers = [Scored(peer.title, one, peer.diverged) for peer, one in zip(self.peers, errors, strict=True)]
         return [Scored("physics model", pb), Scored("hold", hold), *peers, Scored("hybrid", h)]
 
     def best_ways(self) -> list[Peer]:
@@ -255,41 +250,30 @@ class Replay:
 
     def horizon(self) -> Array:
         """Return the RMS of each prediction at each sample of the window, judged, ``(3, Np)``, m; NaN without any."""
-        place, errors = self._place(), self.errors()
-        found = np.full((3, self.Np), np.nan)
-        for i in range(self.Np):
-            at = errors[:, (place == i) & ~np.isnan(errors[0])]
-            if at.size:
-                found[:, i] = np.sqrt(np.mean(at**2, axis=1))
-        return found
-
-    def _place(self) -> Array:
-        """Return the number of each test sample in its window, ``(n,)``."""
-        return self._parts([np.arange(len(one.x), dtype=np.float64) % self.Np for one in self.recordings])
+        place, errors = self._place[self._judged], self.errors()
+        return np.array([[known_rms(row[place == i]) for i in range(self.Np)] for row in errors])
 
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
-        place = self._place()
+        place = self._place[self._judged]
         return [known_rms(one.errors[place < n]) for one in self.scored()]
 
     def residuals(self) -> list[tuple[Array, Array]]:
         """Return ``x_pb``, ``(n,)``, and ``x`` and ``x_h`` minus it, ``(2, n)``, m, over each whole recording."""
-        return [
-            (result.x_pb, np.stack((self._compared(recording), result.x_h)) - result.x_pb)
-            for recording, result in zip(self.recordings, self.results, strict=True)
-            if len(recording.x) > 1
-        ]
+        x_pb = self.backtest.x_pb
+        both = np.stack((self._compared, self.backtest.x_h)) - x_pb
+        return [(x_pb[span], both[:, span]) for span in self._spans if span.stop - span.start > 1]
 
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""
         peers = self.best_ways()
         tally = Tally(self.Np, [peer.title for peer in peers], self.least)
-        for i, (recording, (pb, hold, h)) in enumerate(zip(self.recordings, self._predictions(), strict=True)):
-            rows = np.stack((pb, hold, *(peer.predictions[i] for peer in peers), h))
-            x = self._compared(recording)
-            for begin in range(recording.first_judged(self.Np), len(x), self.Np):
-                window = slice(begin, begin + self.Np)
-                tally.add(recording.x_d[window], x[window], rows[:, window])
+        pb, hold, h = self._predictions
+        rows = np.stack((pb, hold, *(np.concatenate(peer.predictions) for peer in peers), h))
+        for recording, span in zip(self.recordings, self._spans, strict=True):
+            for begin in range(span.start + recording.first_judged(self.Np), span.stop, self.Np):
+                window = slice(begin, min(begin + self.Np, span.stop))
+                tally.add(recording.x_d[begin - span.start :][: self.Np], self._compared[window], rows[:, window])
         return tally.verdict()
 
     def judgement(self) -> Judgement:
@@ -300,20 +284,32 @@ class Replay:
         ratio = rms_ratio(rms_h, best.rms, self.least)
         return Judgement(rms_pb, rms_hold, rms_h, peers, best.name, ratio, verdict.n_windows, str(verdict))
 
-    def _predictions(self) -> list[list[Array]]:
-        """Return what each of :data:`PREDICTIONS` is judged by, of each recording, ``(n,)``, m."""
-        return [[result.x_pb + self.offset, result.x_hold, result.x_h] for result in self.results]
+    @cached_property
+    def _spans(self) -> list[slice]:
+        """Places of the recordings' samples among all."""
+        ends = np.cumsum([len(one.x) for one in self.recordings]).tolist()
+        return [slice(end - len(one.x), end) for one, end in zip(self.recordings, ends, strict=True)]
 
-    def _compared(self, recording: Recording) -> Array:
-        """Return the measured position, ``(n,)``, NaN where it is of before the recording."""
-        return np.where(np.arange(len(recording.x)) < self.delay, np.nan, recording.x)
+    @cached_property
+    def _place(self) -> Indices:
+        """Number of each sample in its window, ``(n,)``."""
+        return np.concatenate([np.arange(len(one.x)) % self.Np for one in self.recordings])
 
-    def _measured(self) -> Array:
-        return self._parts([self._compared(recording) for recording in self.recordings])
+    @cached_property
+    def _judged(self) -> NDArray[np.bool_]:
+        """Whether a sample is a test sample, ``(n,)``."""
+        return np.concatenate([np.arange(len(one.x)) >= one.first_judged(self.Np) for one in self.recordings])
 
-    def _parts(self, signals: Sequence[Array]) -> Array:
-        pairs = zip(self.recordings, signals, strict=True)
-        return np.concatenate([signal[recording.first_judged(self.Np) :] for recording, signal in pairs])
+    @property
+    def _predictions(self) -> Array:
+        """What physics model, hold and hybrid are judged by, ``(3, n)``, m."""
+        return np.stack((self.backtest.x_pb + self.offset, self.backtest.x_hold, self.backtest.x_h))
+
+    @cached_property
+    def _compared(self) -> Array:
+        """Measured positions, ``(n,)``, m, NaN where one is of before its recording."""
+        measured = [np.where(np.arange(len(one.x)) < self.delay, np.nan, one.x) for one in self.recordings]
+        return np.concatenate(measured)
 
 
 def replay(
@@ -336,21 +332,10 @@ def replay(
     SignalError
         If samples cannot be used, or a prediction diverges.
     """
-    n, done, results = sum(len(recording.x) for recording in recordings), 0, []
-    for i, recording in enumerate(recordings):
-        if i:
-            predictor.restart()
-        before = done
-        results.append(
-            backtest(
-                predictor,
-                recording.x_d,
-                recording.x,
-                on_batch=lambda batch, before=before: progress((before + batch.k) / n),  # type: ignore[misc]
-            )
-        )
-        done += len(recording.x)
-    return Replay(tuple(recordings), tuple(results), predictor.Np, predictor.settings.n_late)
+    x_d, x = (np.concatenate([getattr(one, name) for one in recordings]) for name in ("x_d", "x"))
+    starts = np.cumsum([0, *(len(one.x) for one in recordings[:-1])]).tolist()
+    found = backtest(predictor, x_d, x, starts=starts, progress=progress)
+    return Replay(tuple(recordings), found, predictor.Np, predictor.settings.n_late)
 
 
 def knew(saved: HybridPredictor, replayed: HybridPredictor) -> bool:
@@ -358,20 +343,3 @@ def knew(saved: HybridPredictor, replayed: HybridPredictor) -> bool:
     one, other = saved.state, replayed.state
     alike = (one.k, one.start, one.residual.last) == (other.k, other.start, other.residual.last)
     return alike and np.array_equal(one.physics, other.physics)
-
-
-def replay_log(
-    predictor: HybridPredictor, log: Log, progress: Callable[[str, float], object]
-) -> tuple[Backtest, Replay]:
-    """Replay a log with a predictor, which learns it, beside ARX models that are fitted to all samples so far.
-
-    Raises
-    ------
-    SignalError
-        If a prediction diverges.
-    """
-    n = len(log.t)
-    found = backtest(predictor, log, on_batch=lambda batch: progress("replay", 0.8 * batch.k / n))
-    recordings = tuple(Recording(one.x_d, one.x_meas, 0) for one in log.segments())
-    judged = Replay(recordings, tuple(found.pieces(log.starts)), predictor.Np, predictor.settings.n_late)
-    return found, judged.with_peers(lambda done: progress("ARX models", 0.8 + 0.2 * done))

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")
-"""Names of :data:`~hybridsep.fitting.replay.PREDICTIONS`."""
+"""Names of what a replay predicts by."""
 
 _COLOURS = (PHYSICS, HOLD, HYBRID)
 """Their colours."""

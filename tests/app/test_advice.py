@@ -24,7 +24,7 @@ def judged(x_d: Array, hybrid: float, arx: float) -> Judged:
     result = SimpleNamespace(x_pb=x + 3e-6, x_hold=x - 3e-6, x_h=x + hybrid)
     peer = Peer("ARX20", "refitted", (x + arx,))
     return Judged(
-        Replay((Recording(x_d, x, N // 2),), (cast(Any, result),), NP, peers=(peer,)), 1e-3, shown_in("m"), "the half"
+        Replay((Recording(x_d, x, N // 2),), cast(Any, result), NP, peers=(peer,)), 1e-3, shown_in("m"), "the half"
     )
 
 
@@ -65,12 +65,12 @@ def judged_of_rounded(peer: float) -> Judged:
     moving = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))
     found = judged(moving, 2e-6, peer)
     rounded = 1e-6 * np.round(moving / 1e-6)
-    [result], [of_peer] = found.replay.results, found.replay.peers
+    result, [of_peer] = found.replay.backtest, found.replay.peers
     shifted = SimpleNamespace(**{name: getattr(result, name) + rounded for name in ("x_pb", "x_hold", "x_h")})
     peers = (replace(of_peer, predictions=(of_peer.predictions[0] + rounded,)),)
     of_rounded = Recording(moving, rounded, N // 2)
     return replace(
-        found, replay=replace(found.replay, recordings=(of_rounded,), results=(cast(Any, shifted),), peers=peers)
+        found, replay=replace(found.replay, recordings=(of_rounded,), backtest=cast(Any, shifted), peers=peers)
     )
 
 
@@ -97,9 +97,7 @@ def test_what_would_help_is_said() -> None:
     late = np.arange(N) % NP >= NP // 2
     error = np.where(late, np.where(np.arange(N) < 3 * N // 4, 9e-6, 5e-6), 1e-6)
     result = SimpleNamespace(x_pb=np.full(N, 3e-6), x_hold=np.full(N, -3e-6), x_h=error)
-    learned = replace(
-        one, replay=replace(one.replay, results=(cast(Any, result),)), period="with --period 0.005 better"
-    )
+    learned = replace(one, replay=replace(one.replay, backtest=cast(Any, result)), period="with --period 0.005 better")
     words = recommendation(learned)
     assert (
         "× the error of the physics model alone, which is best, judged by 25 windows. What may help: a smaller" in words

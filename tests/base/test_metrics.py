@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from hybridsep.base.metrics import (
-    RunningErrors,
     batch_rms,
     coverage,
     hold,
     largest,
-    last_residual,
     peak_derivatives,
     reduction_percent,
     rms,
@@ -47,17 +45,6 @@ def test_coverage() -> None:
     assert coverage(np.array([0.0, np.nan, 3.0]), np.ones(3), 0.95) == 0.5
 
 
-def test_blocks_of_errors_are_one_error() -> None:
-    errors = np.random.default_rng(0).normal(size=(2, 1000))
-    running = RunningErrors(2)
-    assert all(map(math.isnan, (*running.rms, *running.peaks)))
-    for block in np.array_split(errors, 7, axis=1):
-        running.add(block.shape[1], np.sum(block**2, axis=1), np.max(np.abs(block), axis=1))
-    assert running.n == 1000
-    assert running.rms == pytest.approx([rms(error) for error in errors])
-    assert running.peaks == [largest(error) for error in errors]
-
-
 def test_hold_skips_what_is_missing_and_what_has_not_arrived() -> None:
     x_pb, x = np.arange(10.0), np.arange(10.0) + np.array([1.0, 2.0, 3.0, np.nan, 5.0, 6.0, np.nan, np.nan, 9.0, 10.0])
     active = np.ones(10, dtype=np.bool_)
@@ -69,8 +56,6 @@ def test_hold_skips_what_is_missing_and_what_has_not_arrived() -> None:
         np.testing.assert_array_equal(hold(x_pb, x, active, 2, late=late), x_pb + np.repeat(residuals, 2))
     nothing = np.full(10, np.nan)
     np.testing.assert_array_equal(hold(x_pb, nothing, active, 2), x_pb)
-    assert last_residual(x[:4], x_pb[:4], 7.0) == 3.0
-    assert last_residual(x[6:8], x_pb[6:8], 7.0) == 7.0
 
 
 def test_batch_rms_with_a_short_last_batch() -> None:

@@ -91,7 +91,7 @@ def test_the_users_setting_returns_after_an_error(two_threads: None) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        backtest(machine.new_predictor(), staircase()[:300], staircase()[:300], on_batch=fail)
+        backtest(machine.new_predictor(), staircase()[:300], staircase()[:300], progress=fail)
     assert blas_threads() == {2}
 
 

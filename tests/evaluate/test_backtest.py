@@ -13,7 +13,7 @@ from places import EMPS
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import Batch, backtest, replayed_run
+from hybridsep.evaluate.backtest import backtest, replayed_run
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
@@ -124,16 +124,6 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
     assert (score.rms_pb, score.reduction_percent) == (0.0, -math.inf)
 
 
-def test_on_batch_over_arrays() -> None:
-    batches: list[Batch] = []
-    x_d, x = log()
-    result = backtest(predictor(), x_d, x, on_batch=batches.append)
-    for name, signal in (("x_d", x_d), ("x", x), ("x_h", result.x_h)):
-        np.testing.assert_array_equal(np.concatenate([getattr(batch, name) for batch in batches]), signal)
-    assert [(batch.j, batch.k) for batch in batches] == [(j, 20 * j) for j in range(51)]
-    np.testing.assert_array_equal([batch.rms_h for batch in batches], result.batch_rms_h)
-
-
 @pytest.mark.parametrize(
     ("x_d", "x", "message"),
     [
@@ -162,12 +152,10 @@ def test_missing_measurements_are_bridged_with_averaging_and_refused_without() -
     ):
         backtest(predictor(), x_d, holes)
     settings = PredictorSettings(Np=20, p=5, q=2, t_init=-1.0)
-    batches: list[Batch] = []
-    result = backtest(HybridPredictor(predictor().model, settings), x_d, holes, on_batch=batches.append)
+    result = backtest(HybridPredictor(predictor().model, settings), x_d, holes)
     assert result.overall.n_samples == 1010 - 30
     assert result.overall.rms_h == pytest.approx(rms((holes - result.x_h)[~np.isnan(holes)]), rel=1e-12)
     assert np.isfinite(result.x_h).all()
     assert np.isfinite(result.x_h_std).all()
     assert math.isnan(result.batch_rms_h[25])
-    assert [batch.k for batch in batches] == list(range(0, 1010, 20))
     assert result.verdict.n_rejected >= 30
