@@ -6,7 +6,7 @@ path, both axes together: prediction errors and contour errors.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,6 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
-from numpy.typing import ArrayLike
 
 from ..base.files import written_whole
 from ..base.metrics import rms
@@ -27,14 +26,11 @@ from ..cosim.contour import Contour
 from ..cosim.run import Run
 from ..logs.units import DisplayUnits, shown_in
 from ..online.look_ahead import SepState
-from .report import HOLD, HYBRID, PHYSICS, drawn_places
+from .report import HOLD, HYBRID, PHYSICS
 
 __all__ = [
     "CASES",
     "contour_figure",
-    "draw_line",
-    "finish_panels",
-    "legend_above",
     "prediction_figure",
     "save_figure",
     "tracking_figure",
@@ -60,24 +56,11 @@ _SPANS = {
 """Shading of spans that a lesser model planned than others of the run."""
 
 
-_COLUMNS = 1000
-"""Columns of pixels of a panel as wide as the figure."""
-
-_THIN = 10
-"""Samples in a column of pixels above which a line is drawn thinner."""
-
 _PAD = 0.08
 """Room between panels, and at the edges, inches."""
 
 
-def draw_line(axes: Axes, x: ArrayLike, y: ArrayLike, linewidth: float = 0.9, **style: Any) -> None:
-    """Draw a line; of a long one the extremes of each column of pixels, of a very long one thinner."""
-    x, y = np.asarray(x), np.asarray(y)
-    places = drawn_places(_COLUMNS, y)
-    axes.plot(x[places], y[places], linewidth=linewidth if len(y) <= _THIN * _COLUMNS else 0.6 * linewidth, **style)
-
-
-def legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
+def _legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
     """Put a panel's legend above it, where it hides nothing; entries are the panel's if left out."""
     if handles is None:
         handles = axes.get_legend_handles_labels()[0]
@@ -92,7 +75,7 @@ def legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
     )
 
 
-def finish_panels(panels: Iterable[Axes]) -> None:
+def _finish_panels(panels: Sequence[Axes]) -> None:
     """Give panels over time a grid, and no frame above and on the right."""
     for axes in panels:
         axes.grid(alpha=0.3)
@@ -109,7 +92,8 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
     metadata = {"pdf": {"Creator": _CREATOR, "CreationDate": None}, "svg": {"Creator": _CREATOR, "Date": None}}.get(
         kind
     )
-    with written_whole(path) as file, rc_context({"svg.hashsalt": _CREATOR}):
+    # pieces of a line, which may be of any length
+    with written_whole(path) as file, rc_context({"svg.hashsalt": _CREATOR, "agg.path.chunksize": 10_000}):
         figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
 
 
@@ -133,12 +117,12 @@ def prediction_figure(run: Run, title: str, path: str | Path, shown: DisplayUnit
     command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
-    draw_line(command, t, factor * run.x_d, 1.2, color="black")
+    command.plot(t, factor * run.x_d, linewidth=1.2, color="black")
     command.set_ylabel(f"commanded\nposition [{position}]")
-    draw_line(error, t, scale * (run.x_meas - run.x_pb), 0.8, color=PHYSICS, label="physics-based model")
+    error.plot(t, scale * (run.x_meas - run.x_pb), linewidth=0.8, color=PHYSICS, label="physics-based model")
     label = f"linear hybrid model{'' if run.active.all() else ', after the warm-up'}"
     hybrid = np.where(run.active, scale * (run.x_meas - run.x_h), np.nan)
-    draw_line(error, t, hybrid, 0.8, color=HYBRID, label=label)
+    error.plot(t, hybrid, linewidth=0.8, color=HYBRID, label=label)
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
         for axes in (error, windows):
@@ -147,10 +131,10 @@ def prediction_figure(run: Run, title: str, path: str | Path, shown: DisplayUnit
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
         )
     error.set_ylabel(f"prediction error\nx − x̂ [{unit}]")
-    legend_above(error)
+    _legend_above(error)
     _draw_windows(windows, run, scale, unit)
     windows.set_xlabel("time [s]")
-    finish_panels((command, error, windows))
+    _finish_panels((command, error, windows))
     figure.align_ylabels()
     save_figure(figure, path)
 
@@ -173,7 +157,7 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
     handles = axes.get_legend_handles_labels()[0]
     if worse.any():
         handles.append(Patch(color=PHYSICS, alpha=0.15, linewidth=0, label="hybrid worse than physics"))
-    legend_above(axes, handles)
+    _legend_above(axes, handles)
 
 
 def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> None:
@@ -196,7 +180,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     panels: Sequence[Axes] = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     figure.suptitle(title)
     first = next(iter(runs.values()))
-    draw_line(panels[0], first.t - first.t[0], 1e3 * first.x_d, 1.2, color="black")
+    panels[0].plot(first.t - first.t[0], 1e3 * first.x_d, linewidth=1.2, color="black")
     panels[0].set_ylabel("commanded\nposition [mm]")
     _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs)
     panels[1].set_ylabel("tracking error\nx_d − x [µm]")
@@ -215,7 +199,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
         columnspacing=1.4,
         frameon=False,
     )
-    finish_panels(panels)
+    _finish_panels(panels)
     figure.align_ylabels()
     save_figure(figure, path)
 
@@ -226,7 +210,7 @@ def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, R
         label, color = CASES[key]
         run = runs[key]
         label = f"{label}: {1e6 * rms(run.error):.1f} µm"
-        draw_line(axes, run.t - run.t[0], 1e6 * signal, color=color, label=label)
+        axes.plot(run.t - run.t[0], 1e6 * signal, linewidth=0.9, color=color, label=label)
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
@@ -293,8 +277,8 @@ def _draw_errors(figure: Figure, place: SubplotSpec, contours: Mapping[str, Cont
     if np.isnan(next(iter(contours.values())).path.centre).all():
         axes = figure.add_subplot(place, xlabel="time [s]", ylabel="[µm]")
         for key, one in contours.items():
-            draw_line(axes, one.T_s * np.arange(len(one.error)), 1e6 * one.error, 0.8, color=CASES[key][1])
-        finish_panels([axes])
+            axes.plot(one.T_s * np.arange(len(one.error)), 1e6 * one.error, linewidth=0.8, color=CASES[key][1])
+        _finish_panels([axes])
         title = f"contour error{whose}"
     else:
         axes = figure.add_subplot(place, projection="polar")
