@@ -263,15 +263,13 @@ def fit(
     with progress_bar(as_json) as advance:
         given: dict[str, Any] = {"Np": Np, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
-        built = result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
+        result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in result.findings.items()}
         written = {what: str(path) for what, path in files.items()}
         print_json({**result.results(), "advice": result.advice, "findings": listed, "files": written})
         return
     _print_fit(result)
-    if built.untimed:
-        console.print(f"the FMU's steps are not timed: {built.untimed}")
     console.print(f"\n{result.advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
     given = {"out": out, "Np": Np, "name": name, **vars(reading)}

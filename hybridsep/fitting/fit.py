@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import FmuError, IdentificationError, ParameterError, listed
+from ..base.errors import IdentificationError, ParameterError, listed
 from ..base.files import plain, written_text, written_whole
 from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, PredictorSettings
@@ -30,7 +30,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, recommendation
-from .build import Built, build_fmus, fit_files, sha256_of, step_times, write_commands
+from .build import build_fmus, fit_files, sha256_of, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, settings_for, window_scores
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
@@ -150,8 +150,8 @@ class Fit:
         t: Array = self.machine.T_s * np.arange(float(errors.shape[1]))
         return line_plot(t, lines, "t [s]", f"error x − x̂ [{unit}]")
 
-    def report(self, path: str | Path, built: Built | None = None) -> None:
-        """Write the report, one HTML file that needs nothing else, also about the FMUs that were ``built``."""
+    def report(self, path: str | Path, fmus: Sequence[str] = ()) -> None:
+        """Write the report, one HTML file that needs nothing else, also about FMUs with these names of files."""
         judged = self.judged
         settled = any(one.judges_from > one.n_train for one in judged.replay.recordings)
         report = begun_report(
@@ -165,9 +165,8 @@ class Fit:
         write_settings(report, self.choice, judged)
         if self.tracking is not None:
             write_tracking(report, self.tracking.lines(judged.shown))
-        if built is not None and built.fmus:
-            fmus = [fmu.name for fmu in built.fmus]
-            write_use(report, fmus[0], built.steps, judged.T_s, judged.replay.Np)
+        if fmus:
+            write_use(report, fmus[0], judged.T_s, judged.replay.Np)
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
         report.write(path)
 
@@ -178,15 +177,15 @@ class Fit:
         fmus: bool = True,
         report: bool = True,
         progress: Progress = lambda _message, _done: None,
-    ) -> Built:
-        """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder.
+    ) -> dict[str, Path]:
+        """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
 
         Parameters
         ----------
         out : str or Path
             Made if needed.
         fmus, report : bool
-            Whether FMUs are built, and their steps timed; whether a report is written.
+            Whether FMUs are built; whether a report is written.
         progress : callable, optional
             Called with a message and the fraction done.
         """
@@ -202,23 +201,16 @@ class Fit:
         write_commands(files["commands to try"], commands, self.machine.T_s, self.machine.unit)
         with written_whole(files["trained predictor"]) as state:
             state.write(self.trained)
-        built = Built(files)
         if fmus:
-            build_fmus(self.machine, files, lambda done: progress("build the FMUs", 0.6 * done))
-            progress("time the FMU's steps", 0.6)
-            try:
-                first = replayed.recordings[0]
-                built = replace(built, steps=step_times(built.fmus[0], first.x_d, first.x))
-            except FmuError as error:  # as where no library can be loaded from the folder of temporary files
-                built = replace(built, untimed=str(error))
+            build_fmus(self.machine, files, lambda done: progress("build the FMUs", done))
         if report:
-            self.report(files["report"], built)
+            self.report(files["report"], [path.name for path in files.values() if path.suffix == ".fmu"])
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
         written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
         with written_text(files["results"]) as file:
             file.write(json.dumps({"hybridsep": __version__, **self.results(), "written": written}, indent=2) + "\n")
         progress("done", 1.0)
-        return built
+        return files
 
     def results(self) -> dict[str, Any]:
         """Return plain values for JSON, as in ``fit.json``: errors in m over the test samples."""

@@ -16,7 +16,6 @@ from ..identify.model import IdentifiedModel
 from ..logs.checks import Finding
 from ..logs.log import Log
 from .advice import Judged, extent, peers_in_words, recommendation
-from .build import StepTimes
 from .choice import WORTH, Tried, WindowErrors
 
 __all__ = [
@@ -242,35 +241,17 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
             report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
 
 
-def write_use(report: Report, fmu: str, steps: StepTimes | None, T_s: float, Np: int) -> None:
-    """Write how the FMU of a predictor in a file of that name is used, and how long its steps take, where it is known.
+def write_use(report: Report, fmu: str, T_s: float, Np: int) -> None:
+    """Write how the FMU of a predictor in a file of that name is used.
 
     ``T_s`` is the sampling interval, s, ``Np`` the samples of the look-ahead.
     """
     report.heading("Use it")
-    if steps is not None:
-        report.paragraph(_times(fmu, steps, T_s))
     report.code(_REPLAY.format(fmu=fmu, T_s=T_s, Np=Np))
     report.paragraph(
         f"In a simulation tool: co-simulation with a step of {T_s:g} s. x_d_ahead is the trajectory, as many samples "
         "early as the look-ahead is long; wire x_d to the drive, and its measured position to x_meas: the FMU is the "
         "look-ahead buffer."
-    )
-
-
-_LATE = (
-    " They take longer than the sampling interval: a real-time task of this interval would overrun on such a machine."
-)
-"""What is added where steps do not fit into the sampling interval."""
-
-
-def _times(fmu: str, steps: StepTimes, T_s: float) -> str:
-    """Return how long steps took, in words, and whether they are too long."""
-    late = "" if max(steps.median, steps.p99_9) <= T_s else _LATE
-    return (
-        f"Through Python on this machine a step of {fmu} took {_duration(steps.median)} (median; 99.9 % at most "
-        f"{_duration(steps.p99_9)}; the largest {_duration(steps.largest)}, interruptions by the operating "
-        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
     )
 
 
@@ -287,8 +268,3 @@ signals["x_meas"] = np.pad(x_meas, ({Np}, 0), mode="edge")  # ... and measured
 result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], output_interval={T_s!r},
                       input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
 """Replay of a log with fmpy."""
-
-
-def _duration(seconds: float) -> str:
-    """Return a duration in ms, or in µs if it is shorter."""
-    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"
