@@ -178,7 +178,6 @@ def _machine_files(arguments: Sequence[str]) -> str:
 
 def _run() -> int:
     """Run the command line; return its exit status."""
-    _open_closed()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
@@ -205,18 +204,6 @@ def _run() -> int:
             f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep "
             f"{version_text()}: please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
         )
-
-
-def _open_closed() -> None:
-    """Open the null device in the place of standard streams that the caller has closed (``>&-``).
-
-    Otherwise Python has None there, and the next file that is opened gets what an FMU prints.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            descriptor = os.open(os.devnull, os.O_RDWR)
-            os.set_inheritable(descriptor, True)
-            setattr(sys, name, os.fdopen(descriptor, mode, encoding="utf-8"))
 
 
 def _status() -> int:

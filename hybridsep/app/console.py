@@ -24,7 +24,6 @@ from ..base.metrics import shown_figure
 if TYPE_CHECKING:
     from ..cosim.run import Run
     from ..fitting.advice import Judged
-    from ..logs.columns import Channel
     from ..machines.machine import Machine
 
 __all__ = [
@@ -157,9 +156,6 @@ def print_json(result: Any) -> None:
     typer.echo(json.dumps(plain(result), indent=2))
 
 
-_ROLES = {"t": "time", "x_d": "commanded", "x": "measured"}
-
-
 def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     """Print what files hold: names, units, samples, rates, and what is read without a word.
 
@@ -171,6 +167,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     from ..logs.columns import channels
     from ..logs.formats import open_source
 
+    roles = {"t": "time", "x_d": "commanded", "x": "measured"}
     found = {str(path): channels(open_source(path)) for path in logs}
     if as_json:
         print_json(found)
@@ -178,22 +175,16 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     for path, listed in found.items():
         table = Table("channel", "unit", "samples", "interval [s]", "read as", title=path, box=box.SIMPLE)
         for one in listed:
-            table.add_row(*_cells(one))
+            n = "" if one.n_samples is None else str(one.n_samples)
+            interval = "" if one.interval is None else f"{one.interval:.9g}"
+            table.add_row(one.name, one.unit, n, interval, roles.get(one.role, ""))
         console.print(table)
-        missing = [role for role in _ROLES if role != "t" and role not in {one.role for one in listed}]
+        missing = [role for role in ("x_d", "x") if role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):
-            words = " and ".join(_ROLES[role] for role in missing)
+            words = " and ".join(roles[role] for role in missing)
             options = " ".join(f"--{role} NAME" for role in missing)
-            console.print(
-                f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}",
-                soft_wrap=True,
-            )
-
-
-def _cells(one: Channel) -> tuple[str, ...]:
-    n = "" if one.n_samples is None else str(one.n_samples)
-    interval = "" if one.interval is None else f"{one.interval:.9g}"
-    return one.name, one.unit, n, interval, _ROLES.get(one.role, "")
+            said = f"none is read as the {words} position; name it: hybridsep fit {shlex.quote(path)} {options}"
+            console.print(said, soft_wrap=True)
 
 
 def warn_of_estimates(machines: Iterable[Machine]) -> None:
@@ -279,17 +270,17 @@ def check_outputs(
     ------
     ParameterError
         If an output is an input, by whatever name, or another output; a folder; an existing file; of another ending; or
-        cannot be written for its name or its folder.
+        cannot be written in its folder.
     """
     taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
-    for _, given in taken:
-        _check_name("the name of a file that is read", given)
+    for what, given in taken:
+        if not given.name.isprintable():  # it goes into texts
+            raise ParameterError(f"{brief(what)} must have a name in UTF-8; rename it")
     for option, path, endings in outputs:
         if path is None:
             continue
         if endings and path.suffix.lower() not in endings:
             raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")
-        _check_name(option, path)
         for what, other in taken:
             if _same_file(path, other):
                 raise ParameterError(f"{option} {path} is the same file as {what}; choose another name")
@@ -303,21 +294,6 @@ def check_outputs(
             raise ParameterError(f"{option} {path}: {folder} is a file, not a folder; choose another")
         if not os.access(folder, os.W_OK):
             raise ParameterError(f"{option} {path}: no file can be written in {folder}")
-
-
-def _check_name(option: str, path: Path) -> None:
-    """Raise ParameterError if a path cannot be a file's, or not be written into a text."""
-    try:
-        str(path).encode()
-        path.lstat()
-    except UnicodeEncodeError as error:
-        raise ParameterError(
-            f"{option} must be in UTF-8, got {brief(str(path))}; rename the file or the folder"
-        ) from error
-    except (FileNotFoundError, NotADirectoryError):
-        return
-    except OSError as error:
-        raise ParameterError(f"{option} {brief(str(path))}: {error.strerror}; choose a shorter name") from error
 
 
 def _same_file(one: Path, other: Path) -> bool:

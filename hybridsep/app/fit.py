@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shlex
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -139,11 +140,8 @@ def print_tuning(tuning: Tuning, title: str, factor: float, unit: str) -> None:
     chosen = tuning.candidates[tuning.chosen]
     console.print(f"{title}: RMS in {unit} against the measured position, Np = {chosen.Np}")
     console.print(_ranked(tuning, factor))
-    for line in _words(tuning):
-        console.print(line)
-    console.print("For the machine file:\n\n[predictor]")
-    for name, value in tuning.entries(tuning.chosen).items():
-        console.print(f"{name} = {value}")
+    entries = (f"{name} = {value}" for name, value in tuning.entries(tuning.chosen).items())
+    console.print("\n".join((*_words(tuning), "For the machine file:\n\n[predictor]", *entries)))
 
 
 def _ranked(tuning: Tuning, factor: float) -> Table:
@@ -272,18 +270,7 @@ def fit(
     _print_fit(result)
     console.print(f"\n{result.advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
-    given = {"out": out, "Np": Np, "name": name, **vars(reading)}
-    given |= {entry: known[entry] for entry in PredictorSettings.KNOWN if entry in known}
-    console.print("\n".join(_next_steps(result, files, _again(logs, given))), soft_wrap=True, highlight=False)
-
-
-def _again(logs: Sequence[Path], given: Mapping[str, Any]) -> str:
-    """Return the command line of this fit, with the options that are given."""
-    words = ["hybridsep", "fit", *map(str, logs)]
-    for option, value in given.items():
-        if value:
-            words += [f"--{option}", *([] if value is True else [str(value)])]
-    return shlex.join(words)
+    console.print("\n".join(_next_steps(result, files)), soft_wrap=True, highlight=False)
 
 
 def _print_fit(found: Fit) -> None:
@@ -312,8 +299,8 @@ def _print_fit(found: Fit) -> None:
         console.print(line)
 
 
-def _next_steps(found: Fit, files: Mapping[str, Path], again: str) -> list[str]:
-    """Return what to do after a fit that wrote ``files`` and is repeated by a line, as lines to paste."""
+def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
+    """Return what to do after a fit that wrote ``files``, as lines to paste."""
     from ..fmi.archive import other_platforms
 
     file, state = (shlex.quote(str(files[what])) for what in ("machine file", "trained predictor"))
@@ -337,7 +324,7 @@ def _next_steps(found: Fit, files: Mapping[str, Path], again: str) -> list[str]:
         names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
         known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
         lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
-        lines.append(f"  {again} {' '.join(known)}")
+        lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")
     native = files.get("native FMU")
     if native and (note := other_platforms(native, files["machine file"], files["trained predictor"])):
         says, _, command = note.rpartition(": ")

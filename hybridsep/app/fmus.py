@@ -71,7 +71,10 @@ def build(
     from ..fmi.compile import default_targets, expanded, library_paths
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..fmi.spec import table_of
+    from ..fmi.weights import load_trained
+    from ..logs.log import check_reading
     from ..machines.machine import load_machine, machine_path
+    from ..plants.trajectory import read_trajectory
     from .console import check_outputs, print_built, progress_bar, warn_of_estimates
 
     native = {
@@ -90,7 +93,17 @@ def build(
             raise ParameterError(f"--for {controller} is for FMUs that open no files; ReferenceTrajectory plays files")
         models = {name: model for name, model in models.items() if model != "ReferenceTrajectory"}
         embed_weights = embed_weights or weights is not None
-    extras = _extras_of(axis, models, weights, trajectory, unit, no_windows=no_windows, embed_weights=embed_weights)
+    check_reading(unit, None)
+    extras: dict[str, dict[str, Any]] = {}  # of some models
+    if weights is not None:
+        model = _one_of(models, "--weights", "HybridPredictor", "SepCompensator")
+        load_trained(weights, axis, model)  # before any file is written
+        extras[model] = {"weights": weights, "embed_weights": embed_weights}
+    elif embed_weights:
+        raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
+    if trajectory is not None:
+        model = _one_of(models, "--trajectory", "ReferenceTrajectory")
+        extras[model] = {"samples": read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]}
     names = [*(f"{name}.fmu" for name in models), *([CONFIGURATION_FILE] if controller else [])]
     inputs = {"machine file": machine_path(machine), "saved predictor": weights, "trajectory": trajectory}
     check_outputs([("--out", out / name, ()) for name in names], inputs, force=force)
@@ -104,7 +117,7 @@ def build(
             library_paths(needed, lambda one, done: advance(f"compiled {one[0]} for {one[1]}", done))
         for i, (name, model) in enumerate(models.items()):
             advance(name, i / len(models))
-            given = {"targets": target or None, "fmi": fmi, **extras.get(model, {})}
+            given = {"targets": target or None, "fmi": fmi, "windows": not no_windows, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
         if controller is not None:
             paths.append(write_configuration(out, fmi))
@@ -131,46 +144,13 @@ def _models(axis: Machine, fmus: Sequence[str], flavour: str, targets: Sequence[
     return {name: model for name, model in models.items() if not fmus or name in fmus}
 
 
-def _extras_of(
-    axis: Machine,
-    models: Mapping[str, str],
-    weights: Path | None,
-    trajectory: Path | None,
-    unit: str | None,
-    *,
-    no_windows: bool,
-    embed_weights: bool,
-) -> dict[str, dict[str, Any]]:
-    """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
-
-    Weights, which ``embed_weights`` compiles into the sources, and the samples of a trajectory are for one of them.
-    """
-    from ..fmi.weights import load_trained
-    from ..logs.log import check_reading
-    from ..plants.trajectory import read_trajectory
-
-    def one_of(option: str, *users: str) -> str:
-        found = {name: model for name, model in models.items() if model in users}
-        if len(found) != 1:
-            built = ", ".join(found) or "none"
-            raise ParameterError(f"{option} is for one {' or '.join(users)}, this would build {built}; name one")
-        return next(iter(found.values()))
-
-    extras: dict[str, dict[str, Any]] = {}
-    check_reading(unit, None)
-    if weights is not None:
-        model = one_of("--weights", "HybridPredictor", "SepCompensator")
-        load_trained(weights, axis, model)
-        extras[model] = {"weights": weights, "embed_weights": embed_weights}
-    elif embed_weights:
-        raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
-    if trajectory is not None:
-        model = one_of("--trajectory", "ReferenceTrajectory")
-        extras[model] = {"samples": read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]}
-    if no_windows:
-        model = one_of("--no-windows", "HybridPredictor")
-        extras[model] = {**extras.get(model, {}), "windows": False}
-    return extras
+def _one_of(models: Mapping[str, str], option: str, *users: str) -> str:
+    """Return the one model of those to build that an option is for."""
+    found = {name: model for name, model in models.items() if model in users}
+    if len(found) != 1:
+        built = ", ".join(found) or "none"
+        raise ParameterError(f"{option} is for one {' or '.join(users)}, this would build {built}; name one")
+    return next(iter(found.values()))
 
 
 def hal(

@@ -161,20 +161,12 @@ def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple
 
 def different_logs(logs: Sequence[Log]) -> list[Log]:
     """Return the logs, leaving out and reporting each that has the samples of an earlier one."""
-    import numpy as np
-
-    kept: list[Log] = []
+    kept: dict[tuple[bytes, bytes], Log] = {}
     for log in logs:
-        same = [
-            one
-            for one in kept
-            if np.array_equal(one.x_d, log.x_d) and np.array_equal(one.x_meas, log.x_meas, equal_nan=True)
-        ]
-        if same:
-            show([f"{log.path} has the samples of {same[0].path}: it counts once"], ())
-        else:
-            kept.append(log)
-    return kept
+        first = kept.setdefault((log.x_d.tobytes(), log.x_meas.tobytes()), log)
+        if first is not log:
+            show([f"{log.path} has the samples of {first.path}: it counts once"], ())
+    return list(kept.values())
 
 
 def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:

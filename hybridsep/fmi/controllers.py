@@ -16,7 +16,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING
 
 from ..base.errors import ParameterError
@@ -24,6 +23,7 @@ from ..base.files import data_folder, written_text
 from ..base.version import __version__
 from ..machines.machine import Machine, check_drive_limits
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
+from .pages import filled
 from .spec import content_guid, table_of
 from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 
@@ -134,7 +134,7 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
     ]
     modes = [f"    {{{mode.f_n!r}, {mode.zeta!r}, {mode.alpha!r}, {mode.beta!r}}}," for mode in machine.model.modes]
     name = machine.name
-    return _filled(
+    return filled(
         "axis.h",
         version=__version__,
         name=name,
@@ -144,11 +144,6 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
         settings="\n".join(settings),
         n_modes=len(modes),
     )
-
-
-def _filled(template: str, **values: object) -> str:
-    text = (Path(__file__).parent / "templates" / template).read_text(encoding="utf-8")
-    return Template(text).substitute(values)
 
 
 def _weights(name: str, trained: HybridPredictor | None) -> list[str]:
@@ -187,5 +182,5 @@ def write_configuration(out: Path, fmi: str) -> Path:
     excluded = sorted(name for name in c_sources((fmi,)) if name.endswith(".c") and name != "all.c")
     values = {"definitions": ";".join(DEFINITIONS), "excluded": ";".join(excluded)}
     with written_text(out / CONFIGURATION_FILE) as file:  # the tool is the generationTool of modelDescription.xml
-        file.write(_filled("CustomFMU.xml", tool=f"hybridsep {__version__}", **values))
+        file.write(filled("CustomFMU.xml", tool=f"hybridsep {__version__}", **values))
     return out / CONFIGURATION_FILE

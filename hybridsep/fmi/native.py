@@ -31,7 +31,7 @@ from .description import (
     terminals_and_icons,
 )
 from .flavours import FMI_VERSIONS
-from .pages import compile_note, documentation, icon
+from .pages import compile_note, documentation, filled, icon
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .variables import FmuTable
@@ -40,16 +40,6 @@ __all__ = ["files", "sources"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
-_DEPENDENCIES = """\
-What a platform must have besides the FMU:
-
-Linux, x86-64 and ARM64   the C library with libm and libdl, glibc 2.17 or newer
-Windows, 64 and 32 bit    the Universal C Runtime: part of Windows 10 and newer, an update of older ones (KB2999226)
-macOS, both kinds         macOS 11 or newer
-
-It starts no other program, opens no connection, and reads no file but its own resources.
-Elsewhere compile sources/all.c (documentation/index.html), which needs a C99 compiler, libm and on Linux libdl.
-"""
 _RUNTIME_LICENSES = """\
 Binaries that Zig compiled have parts of its run-time library:
 
@@ -91,7 +81,8 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
 
         weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
     reference = reference_run(spec, content)
-    content |= documentation(spec, needs, _DEPENDENCIES, reference, sources=compile_note(name, fmi))
+    dependencies = filled("native_dependencies.txt")
+    content |= documentation(spec, needs, dependencies, reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()

@@ -40,9 +40,8 @@ def icon(model: str) -> bytes:
 
 
 def filled(template: str, **values: object) -> str:
-    """Return a template of ``fmi/templates`` with ``$name`` replaced by values, which are HTML."""
-    text = (_HERE / "templates" / f"{template}.html").read_text(encoding="utf-8")
-    return Template(text.rstrip("\n")).substitute(values)
+    """Return a file of ``fmi/templates`` with ``$name`` replaced by values, which are HTML in HTML."""
+    return Template((_HERE / "templates" / template).read_text(encoding="utf-8")).substitute(values)
 
 
 def documentation(
@@ -86,16 +85,16 @@ def documentation(
         run["inputs"] = f', fed with <a href="reference/{name}_in.csv">{name}_in.csv</a>'
     named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
-    page = filled(
+    page = _section(
         "index",
         name=name,
         title=html.escape(spec.title),
         needs=html.escape(needs),
-        computes=filled(model, steps=filled("steps"), residual=filled("residual")),
+        computes=_section(model, steps=_section("steps"), residual=_section("residual")),
         partner=partner,
         command=command,
         rows=rows,
-        reference=filled("reference", **run) if reference else "",
+        reference=_section("reference", **run) if reference else "",
         limits=limits,
         compiling=sources,
         sources="\n".join(f"<li>{html.escape(source)}</li>" for source in named),
@@ -106,9 +105,13 @@ def documentation(
     }
 
 
+def _section(template: str, **values: object) -> str:
+    return filled(f"{template}.html", **values).rstrip("\n")
+
+
 def compile_note(name: str, fmi: str) -> str:
     """Return the section on compiling the sources of an FMU with a model identifier, HTML."""
-    return filled("compile", name=name, version=f"{fmi}.0", plain=_PLAIN_NAMES[fmi])
+    return _section("compile", name=name, version=f"{fmi}.0", plain=_PLAIN_NAMES[fmi])
 
 
 def _rows(group: list[tuple[str, str, str, str, str, str]]) -> str:

@@ -36,18 +36,6 @@ _SLAVES = {
     "FeedDrive": "feed_drive.py",
 }
 
-_DEPENDENCIES = """\
-The importing tool's process must have
-
-Python   3.10 or newer, whose libpython the process has loaded, on Linux x86-64 or 64-bit Windows
-NumPy    1.24 or newer
-SciPy    1.11 or newer
-
-Its binary for Linux needs glibc 2.32 and the libstdc++ of GCC 12 (GLIBCXX_3.4.30), as in Debian 12 and Ubuntu 22.04.
-pythonfmu {} and the part of hybridsep that the FMU needs are in its resources. In a tool that is no Python itself the
-interpreter is found by the usual means: on Linux LD_PRELOAD with the path of libpython, PYTHONHOME, PYTHONPATH.
-"""
-
 _LAUNCHER = "launcher.py"
 """The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
 
@@ -73,10 +61,10 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
 
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
-    limits = filled("pythonfmu_limits", version=version)
+    limits = filled("pythonfmu_limits.html", version=version).rstrip("\n")
     content["model.png"] = icon(model)
     reference = reference_run(spec, content)
-    content |= documentation(spec, needs, _DEPENDENCIES.format(version), reference, limits=limits)
+    content |= documentation(spec, needs, filled("python_dependencies.txt", version=version), reference, limits=limits)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()

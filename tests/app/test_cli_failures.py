@@ -91,17 +91,6 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     assert b"RMS [?m]" in done.stdout
 
 
-@pytest.mark.slow
-@POSIX
-@pytest.mark.parametrize("streams", ["2>&-", "<&- >&- 2>&-"])
-def test_closed_standard_streams(tmp_path: Path, streams: str) -> None:
-    out = tmp_path / "machine.toml"
-    shell = f'exec "$0" -m hybridsep init "$1" {streams}'
-    done = subprocess.run(["sh", "-c", shell, sys.executable, str(out)], capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (0, b"")
-    assert "[physics" in out.read_text(encoding="utf-8")
-
-
 def test_ctrl_c_is_one_line_and_status_130(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     step = FmuDrive.step
 

@@ -136,7 +136,7 @@ def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, t
     ("name", "message"),
     [
         (b"x" * 226 + b".csv", "an axis's name must have at most 100 letters"),
-        (b"spindel\xe9.csv", "the name of a file that is read must be in UTF-8, got"),
+        (b"spindel\xe9.csv", "must have a name in UTF-8; rename it"),
     ],
     ids=["long", "Latin-1"],
 )

@@ -252,10 +252,6 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
         (("-m", "emps", "--weights", "TRAINED"), "HybridPredictor.state was not trained for machine emps: it has "),
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
-        (
-            ("SepCompensator", "--no-windows"),
-            "--no-windows is for one HybridPredictor, this would build none; name one",
-        ),
         (("--flavour", "python", "--target", "host"), "--target is for native FMUs; with --flavour python leave it"),
     ],
 )
