@@ -98,7 +98,7 @@ class Verdict:
         lines = [
             f"Not compared with {peer}: its error is below what the log's resolution shows"
             if math.isnan(value)
-            else f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
+            else f"{_comparison(value, peer)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(self.peers, self.ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
@@ -216,35 +216,26 @@ class Tally:
         )
 
     def _causes(self, ratios: Sequence[float]) -> list[str]:
-        """Return what explains a hybrid that is worse."""
-        causes = []
+        """Return what explains a hybrid that is worse than some of :data:`PEERS`."""
         if self._largest_change > _UNSTABLE * self._largest_residual > 0.0:
             times = self._largest_change / self._largest_residual
-            causes.append(
-                f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"
-            )
-        elif max(ratios) > 1.0 + ALIKE:
-            causes += self._causes_of_worse(ratios)
-        return causes
-
-    def _causes_of_worse(self, ratios: Sequence[float]) -> list[str]:
-        moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
+            return [f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"]
+        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
+        if not peers:
+            return []
         causes = []
+        moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
         if moving < _LITTLE_MOTION:
             causes.append(f"hardly any motion, in {100 * moving:.2g} % of these samples")
-        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
-        if all(self._worse_early(peer) for peer in peers):
+        rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
+        good_later = all(_ratio(rest[-1], rest[peer]) <= 1.0 + ALIKE for peer in peers)
+        if good_later and self._n_windows > 2 * _N_EARLY:
             causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")
         elif ratios[0] <= 1.0 + ALIKE and not causes:
             causes.append("the residual changes so slowly that its last value predicts it better than the motion does")
         elif not causes:
             causes.append("the residual does not repeat with the motion")
         return causes
-
-    def _worse_early(self, peer: int) -> bool:
-        """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
-        rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
-        return self._n_windows > 2 * _N_EARLY and _ratio(rest[-1], rest[peer]) <= 1.0 + ALIKE
 
 
 def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:
@@ -269,14 +260,10 @@ def _ratio(own: float, other: float) -> float:
     return rms_ratio(math.sqrt(own), math.sqrt(other))
 
 
-def _times(value: float) -> str:
-    return f"{value:.3g} × its RMS error" if math.isfinite(value) else "its RMS error is 0"
-
-
-def _comparison(value: float) -> str:
-    if abs(value - 1.0) <= ALIKE:
-        return "As good as"
-    return "Better than" if value < 1.0 else "Worse than"
+def _comparison(value: float, peer: str) -> str:
+    how = "As good as" if abs(value - 1.0) <= ALIKE else "Better than" if value < 1.0 else "Worse than"
+    times = f"{value:.3g} × its RMS error" if math.isfinite(value) else "its RMS error is 0"
+    return f"{how} {peer}: {times}"
 
 
 def _where(value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:

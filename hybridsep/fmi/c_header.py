@@ -13,6 +13,8 @@ all before as u64.
 from __future__ import annotations
 
 import hashlib
+import json
+import re
 import struct
 import zlib
 from collections import defaultdict
@@ -22,7 +24,6 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..base.errors import FmuError
 from ..base.files import data_folder
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, FmuTable, Value, Variable, angular_unit
@@ -54,14 +55,6 @@ KINDS: Mapping[str, FmuTable] = {
     )
 }
 """Kinds of FMU, each with a table that stands for all FMUs of it."""
-
-_MACROS = {
-    "HybridPredictor": "HYBRID_PREDICTOR",
-    "SepCompensator": "SEP_COMPENSATOR",
-    "FeedDrive": "FEED_DRIVE",
-    "StageDrive": "STAGE_DRIVE",
-    "ReferenceTrajectory": "REFERENCE_TRAJECTORY",
-}
 
 
 @dataclass(frozen=True)
@@ -132,7 +125,7 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     """
     layout = layout_of(table.variables)
     starts = ",\n".join(
-        f"    {_double(start)} /* {variable.name} */"
+        f"    {start!r} /* {variable.name} */"
         for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
     )
     text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
@@ -140,7 +133,7 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
 #define FMI{fmi}_FUNCTION_PREFIX {table.name}_
 #endif
 
-#define HSEP_GUID {_string(guid)}
+#define HSEP_GUID {json.dumps(guid)}
 #define HSEP_N_MODES {len(layout.modes) // len(_MODE)}
 #define HSEP_WINDOW {layout.window} /* samples in each window, 0 where they are left out */
 #define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES)
@@ -178,7 +171,7 @@ def _header(kind: str, whose: str, table: str) -> str:
 
 #include "hsep_model.h"
 
-#define HSEP_MODEL_{_MACROS[kind]} 1
+#define HSEP_MODEL_{re.sub("(?<=[a-z])(?=[A-Z])", "_", kind).upper()} 1
 #define HSEP_INTERFACE UINT64_C(0x{_interface_number(kind):016X}) /* of all below, up to the table of one FMU */
 {_interface(kind)}
 {table}
@@ -204,7 +197,7 @@ def _interface(kind: str) -> str:
     rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
     rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
     references, lines = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
-    return f"""#define HSEP_MODEL_NAME {_string(model)}
+    return f"""#define HSEP_MODEL_NAME {json.dumps(model)}
 #define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
 #define HSEP_N_SCALARS {len(layout.scalars)}
 #define HSEP_HAS_MODES {int(bool(layout.modes))}
@@ -241,28 +234,17 @@ static const unsigned char hsep_embedded_weights[{len(content)}] = {{
 def _row(variable: Variable, name: str) -> str:
     unit = "" if variable.unit in (None, "1") else str(variable.unit)
     fields = [
-        _string(name),
-        _string(unit),
-        _string(angular_unit(unit) or ""),
+        *map(json.dumps, (name, unit, angular_unit(unit) or "")),
         f"HSEP_{variable.kind.upper()}",
         f"HSEP_{variable.causality.upper()}",
         str(int(variable.variability == "tunable")),
-        "-HUGE_VAL" if variable.minimum is None else _double(variable.minimum),
-        "HUGE_VAL" if variable.maximum is None else _double(variable.maximum),
-        _double(variable.nonzero),
-        "HUGE_VAL" if variable.automatic is None else _double(variable.automatic),
+        "-HUGE_VAL" if variable.minimum is None else repr(float(variable.minimum)),
+        "HUGE_VAL" if variable.maximum is None else repr(float(variable.maximum)),
+        repr(float(variable.nonzero)),
+        "HUGE_VAL" if variable.automatic is None else repr(float(variable.automatic)),
         str(int(variable.learned)),
     ]
     return "{" + ", ".join(fields) + "}"
-
-
-def _double(value: float) -> str:
-    """Write a number so that a C compiler reads the same double back: the shortest digits that do."""
-    return repr(float(value))
-
-
-def _string(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 FMI_HEADERS = {
@@ -298,17 +280,11 @@ def all_c(files: Sequence[str]) -> str:
 
 
 def fmi_headers(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
-    """Return the FMI headers for shared libraries, as fmpy carries them, with the line ends of a text file.
-
-    Raises
-    ------
-    FmuError
-        If fmpy is not installed.
-    """
-    found = find_spec("fmpy")
-    if found is None or found.origin is None:
-        raise FmuError("the FMI headers come with fmpy, which is not installed: pip install fmpy")
-    folder = Path(found.origin).parent / "c-code"
+    """Return the FMI headers for shared libraries, as fmpy carries them, with the line ends of a text file."""
+    fmpy = find_spec("fmpy")  # which loads slowly
+    assert fmpy is not None
+    assert fmpy.origin is not None
+    folder = Path(fmpy.origin).parent / "c-code"
     files = [file for version in versions for file in FMI_HEADERS[version]]
     return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in files}
 

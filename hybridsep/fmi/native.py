@@ -34,9 +34,8 @@ from .flavours import FMI_VERSIONS
 from .pages import compile_note, documentation, filled, icon
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
-from .variables import FmuTable
 
-__all__ = ["files", "sources"]
+__all__ = ["files"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
@@ -65,8 +64,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     """
     table, fmi = spec.table, spec.fmi
     model, name = table.model, table.name
-    content = {f"sources/{file}": text for file, text in sources(table, "", fmi).items()}
-    del content["sources/hsep_fmu.h"]  # names the GUID
+    content = {f"sources/{file}": text for file, text in c_sources((fmi,)).items()}
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
     if fmi == "3":
@@ -91,20 +89,6 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     content |= reference
     compiled = libraries(table.kind, targets or default_targets())
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
-
-
-def sources(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
-    """Return the C sources with the generated ``hsep_fmu.h``, without the FMI headers: file name → content.
-
-    Parameters
-    ----------
-    table : FmuTable
-    guid : str
-        The modelDescription's.
-    fmi : {"2", "3"}
-        Version of FMI.
-    """
-    return {**c_sources((fmi,)), "hsep_fmu.h": c_header(table, guid, fmi).encode()}
 
 
 def _licenses() -> dict[str, bytes]:

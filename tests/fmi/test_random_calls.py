@@ -24,8 +24,8 @@ from c_compiler import (
 from c_core import STAGE_DRIVE, object_files
 from places import ROOT
 
+from hybridsep.fmi.c_header import c_header, c_sources
 from hybridsep.fmi.compile import _sources
-from hybridsep.fmi.native import sources
 from hybridsep.fmi.variables import FmuTable
 from hybridsep.machines.machine import load_machine
 
@@ -104,7 +104,7 @@ def test_each_source_of_an_adapter_compiles_alone_without_warnings(tmp_path: Pat
     for table, fmi in ((compensator, "2"), (stage, "2"), (predictor, "3")):
         folder = tmp_path / table.name
         folder.mkdir()
-        for file, content in sources(table, "{}", fmi).items():
+        for file, content in {**c_sources((fmi,)), "hsep_fmu.h": c_header(table, "{}", fmi).encode()}.items():
             (folder / file).write_bytes(content)
         files += [path for path in folder.glob("*.c") if path.name not in core | {"all.c"}]
     assert len(files) > 40
