@@ -31,30 +31,30 @@ fmi2Status fmi2GetDirectionalDerivative(
     return fmi2_unsupported(c, HSEP_FMI2(GET_DIRECTIONAL_DERIVATIVE), "providesDirectionalDerivative is false");
 }
 
-/* fmi2Get...Status: whether that status, s, is known, and its value. */
-#define FMI2_STATUS(name, NAME, type, known, answer) \
-    fmi2Status fmi2Get##name(fmi2Component c, const fmi2StatusKind s, type *value) \
+/* The functions that get a status: whether that one, s, is known, and its value. */
+#define FMI2_STATUS(function, call, type, known, answer) \
+    fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) \
     { \
-        hsep_instance *instance = hsep_begin(c, HSEP_FMI2(GET_##NAME)); \
+        hsep_instance *instance = hsep_begin(c, HSEP_FMI2(call)); \
         (void)s; \
         if (instance == NULL) { \
             return fmi2Error; \
         } \
         if (value == NULL) { \
-            return hsep_fmi2_status(hsep_refuse(instance, "fmi2Get" #name ": value is NULL")); \
+            return hsep_fmi2_status(hsep_refuse(instance, #function ": value is NULL")); \
         } \
         if (!(known)) { \
             hsep_log( \
                 instance, HSEP_LOG_DISCARD, \
-                "fmi2Get" #name ": this status does not exist, because no step is ever pending"); \
+                #function ": this status does not exist, because no step is ever pending"); \
             return fmi2Discard; \
         } \
         *value = answer; \
         return fmi2OK; \
     }
 
-FMI2_STATUS(Status, STATUS, fmi2Status, 0, fmi2OK)
-FMI2_STATUS(RealStatus, REAL_STATUS, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
-FMI2_STATUS(IntegerStatus, INTEGER_STATUS, fmi2Integer, 0, 0)
-FMI2_STATUS(BooleanStatus, BOOLEAN_STATUS, fmi2Boolean, s == fmi2Terminated, fmi2False)
-FMI2_STATUS(StringStatus, STRING_STATUS, fmi2String, 0, NULL)
+FMI2_STATUS(fmi2GetStatus, GET_STATUS, fmi2Status, 0, fmi2OK)
+FMI2_STATUS(fmi2GetRealStatus, GET_REAL_STATUS, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
+FMI2_STATUS(fmi2GetIntegerStatus, GET_INTEGER_STATUS, fmi2Integer, 0, 0)
+FMI2_STATUS(fmi2GetBooleanStatus, GET_BOOLEAN_STATUS, fmi2Boolean, s == fmi2Terminated, fmi2False)
+FMI2_STATUS(fmi2GetStringStatus, GET_STRING_STATUS, fmi2String, 0, NULL)

@@ -3,9 +3,9 @@
 
 #include <math.h>
 
-/* fmi2Get... and fmi2Set... of a type. */
-#define FMI2_ACCESS(name, NAME, type, get, set) \
-    fmi2Status fmi2Get##name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##name value[]) \
+/* The functions that get and set variables of a type. */
+#define FMI2_ACCESS(getter, setter, NAME, c_type, type, get, set) \
+    fmi2Status getter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, c_type value[]) \
     { \
         const hsep_instance *self = hsep_call_access(c, HSEP_FMI2(GET_##NAME), 0, type, vr, nvr, value, nvr); \
         for (size_t i = 0; self != NULL && i < nvr; i++) { \
@@ -14,23 +14,27 @@
         } \
         return (self == NULL) ? fmi2Error : fmi2OK; \
     } \
-    fmi2Status fmi2Set##name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##name value[]) \
+    fmi2Status setter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const c_type value[]) \
     { \
         hsep_instance *self = hsep_call_access(c, HSEP_FMI2(SET_##NAME), 1, type, vr, nvr, value, nvr); \
         for (size_t i = 0; self != NULL && i < nvr; i++) { \
-            const fmi2##name number = value[i]; \
+            const c_type number = value[i]; \
             self = hsep_call_tune(self, HSEP_FMI2(SET_##NAME), vr[i], set); \
         } \
         for (size_t i = 0; self != NULL && i < nvr; i++) { \
-            const fmi2##name number = value[i]; \
+            const c_type number = value[i]; \
             self->values[vr[i]] = set; \
         } \
         return (self == NULL) ? fmi2Error : fmi2OK; \
     }
 
-FMI2_ACCESS(Real, REAL, hsep_fmi2_names()->types[HSEP_REAL], number, number)
-FMI2_ACCESS(Integer, INTEGER, hsep_fmi2_names()->types[HSEP_INTEGER], hsep_values_integer(number), (double)number)
-FMI2_ACCESS(Boolean, BOOLEAN, hsep_fmi2_names()->types[HSEP_BOOLEAN], number != 0.0, number ? 1.0 : 0.0)
+FMI2_ACCESS(fmi2GetReal, fmi2SetReal, REAL, fmi2Real, hsep_fmi2_names()->types[HSEP_REAL], number, number)
+FMI2_ACCESS(
+    fmi2GetInteger, fmi2SetInteger, INTEGER, fmi2Integer, hsep_fmi2_names()->types[HSEP_INTEGER],
+    hsep_values_integer(number), (double)number)
+FMI2_ACCESS(
+    fmi2GetBoolean, fmi2SetBoolean, BOOLEAN, fmi2Boolean, hsep_fmi2_names()->types[HSEP_BOOLEAN], number != 0.0,
+    number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])

@@ -9,11 +9,11 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
     return found.row->causality == HSEP_INDEPENDENT ? &instance->experiment.time : &instance->values[found.place];
 }
 
-/* fmi3Get… and fmi3Set… of a kind of variables that there are; what is set has one value for each reference, as no
- * array is an input or a parameter. */
-#define FMI3_ACCESS(name, NAME, kind, get, set) \
-    fmi3Status fmi3Get##name( \
-        fmi3Instance instance, const fmi3ValueReference references[], size_t n, fmi3##name values[], size_t n_values) \
+/* The functions that get and set a kind of variables that there are; what is set has one value for each reference, as
+ * no array is an input or a parameter. */
+#define FMI3_ACCESS(getter, setter, NAME, c_type, kind, get, set) \
+    fmi3Status getter( \
+        fmi3Instance instance, const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values) \
     { \
         const char *type = hsep_fmi3_names()->types[kind]; \
         const hsep_instance *self = \
@@ -28,28 +28,28 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
         } \
         return (self == NULL) ? fmi3Error : fmi3OK; \
     } \
-    fmi3Status fmi3Set##name( \
-        fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3##name values[], \
+    fmi3Status setter( \
+        fmi3Instance instance, const fmi3ValueReference references[], size_t n, const c_type values[], \
         size_t n_values) \
     { \
         const char *type = hsep_fmi3_names()->types[kind]; \
         hsep_instance *self = \
             hsep_call_access(instance, HSEP_FMI3(SET_##NAME), 1, type, references, n, values, n_values); \
         for (size_t i = 0; self != NULL && i < n; i++) { \
-            const fmi3##name number = values[i]; \
+            const c_type number = values[i]; \
             self = hsep_call_tune(self, HSEP_FMI3(SET_##NAME), references[i], set); \
         } \
         for (size_t i = 0; self != NULL && i < n; i++) { \
-            const fmi3##name number = values[i]; \
+            const c_type number = values[i]; \
             self->values[references[i]] = set; \
         } \
         return (self == NULL) ? fmi3Error : fmi3OK; \
     }
 
-FMI3_ACCESS(Float64, FLOAT64, HSEP_REAL, number, number)
-FMI3_ACCESS(Int32, INT32, HSEP_INTEGER, hsep_values_integer(number), (double)number)
-FMI3_ACCESS(Int64, INT64, HSEP_ENUMERATION, hsep_values_integer(number), (double)number)
-FMI3_ACCESS(Boolean, BOOLEAN, HSEP_BOOLEAN, number != 0.0, number ? 1.0 : 0.0)
+FMI3_ACCESS(fmi3GetFloat64, fmi3SetFloat64, FLOAT64, fmi3Float64, HSEP_REAL, number, number)
+FMI3_ACCESS(fmi3GetInt32, fmi3SetInt32, INT32, fmi3Int32, HSEP_INTEGER, hsep_values_integer(number), (double)number)
+FMI3_ACCESS(fmi3GetInt64, fmi3SetInt64, INT64, fmi3Int64, HSEP_ENUMERATION, hsep_values_integer(number), (double)number)
+FMI3_ACCESS(fmi3GetBoolean, fmi3SetBoolean, BOOLEAN, fmi3Boolean, HSEP_BOOLEAN, number != 0.0, number ? 1.0 : 0.0)
 
 /* Access to types that no variable has: with references, it is refused by name. */
 static fmi3Status fmi3_none(
@@ -60,25 +60,25 @@ static fmi3Status fmi3_none(
     return (self == NULL) ? fmi3Error : fmi3OK;
 }
 
-#define FMI3_NO_VARIABLE(verb, VERB, sets, name, NAME, ...) \
-    fmi3Status fmi3##verb##name( \
+#define FMI3_NO_VARIABLE(function, call, sets, type, ...) \
+    fmi3Status function( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, __VA_ARGS__ values[], size_t n_values) \
     { \
-        return fmi3_none(instance, HSEP_FMI3(VERB##_##NAME), sets, #name, references, n, values, n_values); \
+        return fmi3_none(instance, HSEP_FMI3(call), sets, type, references, n, values, n_values); \
     }
 
-#define FMI3_NO_VARIABLES(name, NAME) \
-    FMI3_NO_VARIABLE(Get, GET, 0, name, NAME, fmi3##name) \
-    FMI3_NO_VARIABLE(Set, SET, 1, name, NAME, const fmi3##name)
+#define FMI3_NO_VARIABLES(getter, setter, NAME, type, c_type) \
+    FMI3_NO_VARIABLE(getter, GET_##NAME, 0, type, c_type) \
+    FMI3_NO_VARIABLE(setter, SET_##NAME, 1, type, const c_type)
 
-FMI3_NO_VARIABLES(Float32, FLOAT32)
-FMI3_NO_VARIABLES(Int8, INT8)
-FMI3_NO_VARIABLES(UInt8, UINT8)
-FMI3_NO_VARIABLES(Int16, INT16)
-FMI3_NO_VARIABLES(UInt16, UINT16)
-FMI3_NO_VARIABLES(UInt32, UINT32)
-FMI3_NO_VARIABLES(UInt64, UINT64)
-FMI3_NO_VARIABLES(String, STRING)
+FMI3_NO_VARIABLES(fmi3GetFloat32, fmi3SetFloat32, FLOAT32, "Float32", fmi3Float32)
+FMI3_NO_VARIABLES(fmi3GetInt8, fmi3SetInt8, INT8, "Int8", fmi3Int8)
+FMI3_NO_VARIABLES(fmi3GetUInt8, fmi3SetUInt8, UINT8, "UInt8", fmi3UInt8)
+FMI3_NO_VARIABLES(fmi3GetInt16, fmi3SetInt16, INT16, "Int16", fmi3Int16)
+FMI3_NO_VARIABLES(fmi3GetUInt16, fmi3SetUInt16, UINT16, "UInt16", fmi3UInt16)
+FMI3_NO_VARIABLES(fmi3GetUInt32, fmi3SetUInt32, UINT32, "UInt32", fmi3UInt32)
+FMI3_NO_VARIABLES(fmi3GetUInt64, fmi3SetUInt64, UINT64, "UInt64", fmi3UInt64)
+FMI3_NO_VARIABLES(fmi3GetString, fmi3SetString, STRING, "String", fmi3String)
 
 fmi3Status fmi3GetBinary(
     fmi3Instance instance, const fmi3ValueReference references[], size_t n, size_t sizes[], fmi3Binary values[],
