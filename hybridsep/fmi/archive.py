@@ -11,6 +11,7 @@ import shlex
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -108,14 +109,8 @@ def build_fmu(
             from .weights import load_trained  # which loads slowly
 
             trained = load_trained(weights, machine, model)
-        spec = FmuSpec.of(
-            *(machine, model),
-            flavour=flavour,
-            fmi=fmi,
-            samples=samples,
-            trained=trained,
-            windows=windows,
-        )
+        more: dict[str, Any] = {"samples": samples, "trained": trained, "windows": windows}
+        spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, **more)
         if flavour == "native":
             files = native.files(spec, targets=targets, embed_weights=embed_weights)
         else:
@@ -125,12 +120,9 @@ def build_fmu(
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip whose bytes depend on its content, and on the zlib of this Python, alone.
+    """Return a zip of files, archive name → content, whose bytes depend on them, and on the zlib of this Python, alone.
 
-    Parameters
-    ----------
-    files : mapping
-        Archive name → content; what readers that stream look for comes first.
+    What readers that stream look for comes first.
     """
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:

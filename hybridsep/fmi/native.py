@@ -49,13 +49,7 @@ Those for Windows have parts of mingw-w64 besides:
 
 
 def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
-    """Return all files of one FMU: archive name → content.
-
-    Parameters
-    ----------
-    spec : FmuSpec
-    targets, embed_weights
-        As in :func:`hybridsep.fmi.archive.build_fmu`.
+    """Return all files of one FMU: archive name → content; arguments as of :func:`hybridsep.fmi.archive.build_fmu`.
 
     Raises
     ------

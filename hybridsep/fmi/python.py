@@ -41,12 +41,7 @@ _LAUNCHER = "launcher.py"
 
 
 def files(spec: FmuSpec) -> dict[str, bytes]:
-    """Return all files of one FMU: archive name → content.
-
-    Parameters
-    ----------
-    spec : FmuSpec
-        Of FMI 2.0.
+    """Return all files of one FMU of FMI 2.0: archive name → content.
 
     Raises
     ------

@@ -38,7 +38,6 @@ _LAST_READ: dict[str, dict[str, Any]] = {}
 _LOG = logging.getLogger("hybridsep.fmu")
 """Refusals, for stderr: where the importer's logging is off, pythonfmu passes on no message."""
 
-_KIND = "fmu"
 _STOP_TOLERANCE = 1e-6  # of a step: a last step that ended at the stop time but for rounding
 _TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "Enumeration": Integer}  # pythonfmu has no Enumeration
 
@@ -198,10 +197,10 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         core: dict[str, bytes] = {}
         if self.running:
             meta["core"], core["core"] = self.core_state()
-        return pack(_KIND, meta, {}, core)
+        return pack("fmu", meta, {}, core)
 
     def _set_fmu_state(self, state: bytes) -> None:
-        saved = Saved(_KIND, *unpack(_KIND, state))
+        saved = Saved("fmu", *unpack("fmu", state))
         if saved.text("content") != self.content:
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
         running, terminated, values = saved.flag("running"), saved.flag("terminated"), saved.table("values")

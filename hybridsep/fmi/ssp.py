@@ -6,7 +6,7 @@ There is no geometry, which is optional: tools place components themselves, and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
 
-__all__ = ["SSP_VERSIONS", "Component", "Connection", "build_system", "check_system", "system_structure"]
+__all__ = ["SSP_VERSIONS", "build_system", "check_system"]
 
 SSP_VERSIONS = ("1", "2")
 """SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""
@@ -39,25 +39,24 @@ _NAMESPACES = {
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
     "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
-Connection = tuple[str, str, str, str]
-"""Component and output, component and input."""
 
 
 @dataclass(frozen=True)
-class Component:
+class _Component:
     """An FMU of a system.
 
     Attributes
     ----------
     name : str
-    fmu : str
-        File below ``resources/``.
+    fmu, parameter_set : str
+        Files below ``resources/``.
     variables : tuple of Variable
         Its table; the inputs and outputs become connectors, parameters its parameter set.
     """
 
     name: str
     fmu: str
+    parameter_set: str
     variables: tuple[Variable, ...]
 
     @property
@@ -71,61 +70,50 @@ class Component:
         return [v for v in self.variables if v.causality == "parameter" and not v.items]
 
 
-def system_structure(
+def _structure(
     name: str,
-    components: Sequence[Component],
-    connections: Sequence[Connection],
-    sets: Mapping[str, str],
+    components: Sequence[_Component],
+    connections: Sequence[tuple[str, str, str, str]],
     T_s: float,
     stop_time: float,
-    ssp: str = SSP_VERSIONS[0],
+    ssp: str,
 ) -> bytes:
-    """Return ``SystemStructure.ssd``.
+    """Return ``SystemStructure.ssd``; connections are of component and output to component and input.
 
-    Parameters
-    ----------
-    name : str
-        Of the system.
-    components : sequence of Component
-        In the order of the signals.
-    connections : sequence of tuple
-    sets : mapping
-        Component → file of its parameters below ``resources/``.
-    T_s : float, s
-        Communication step size, for OMSimulator's annotation.
-    stop_time : float, s
-    ssp : {"1", "2"}
-        Version of SSP.
+    OMSimulator needs annotations of the system, with the communication step size, and of the default experiment.
     """
     root = _root("ssd", "SystemStructureDescription", name, ssp)
     root.set("generationTool", f"hybridsep {__version__}")
     system = _add(root, "ssd:System", name=name)
     elements, wires = _add(system, "ssd:Elements"), _add(system, "ssd:Connections")
     for component in components:
-        _add_component(elements, component, sets[component.name])
+        attributes = {"type": "application/x-fmu-sharedlibrary", "source": f"resources/{component.fmu}"}
+        element = _add(elements, "ssd:Component", name=component.name, **attributes, implementation="CoSimulation")
+        connectors = _add(element, "ssd:Connectors")
+        for variable in component.connectors:
+            connector = _add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
+            _add(connector, f"ssc:{variable.kind}", **_unit(variable))
+        binding = {"type": "application/x-ssp-parameter-set", "source": f"resources/{component.parameter_set}"}
+        _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", **binding)
     for connection in connections:
         places = zip(("startElement", "startConnector", "endElement", "endConnector"), connection, strict=True)
         _add(wires, "ssd:Connection", **dict(places))
     master = {"description": "oms-ma", "stepSize": T_s, "absoluteTolerance": 1e-4, "relativeTolerance": 1e-4}
-    _add(_add(_omsimulator(system), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)
-    connectors = [variable for component in components for variable in component.connectors]
-    _add_units(_add(root, "ssd:Units"), connectors)
+    _add(_omsimulator(system), "oms:FixedStepMaster", **master)
+    _add_units(_add(root, "ssd:Units"), [variable for component in components for variable in component.connectors])
     experiment = _add(root, "ssd:DefaultExperiment", startTime=0.0, stopTime=stop_time)
-    result = {"resultFile": f"{name}_res.mat", "loggingInterval": 0.0, "bufferSize": 10, "signalFilter": ".*"}
-    _add(_omsimulator(experiment), "oms:SimulationInformation", **result)
+    _omsimulator(experiment, resultFile=f"{name}_res.mat", loggingInterval=0.0, bufferSize=10, signalFilter=".*")
     return _document(root)
 
 
-def _parameter_set(component: Component, ssp: str = SSP_VERSIONS[0]) -> bytes:
+def _parameter_set(component: _Component, ssp: str) -> bytes:
     """Return the ``.ssv`` with a component's parameters and their start values."""
     root = _root("ssv", "ParameterSet", component.name, ssp)
     parameters = _add(root, "ssv:Parameters")
     for variable in component.parameters:
-        parameter = _add(parameters, "ssv:Parameter", name=variable.name)
-        if variable.kind in _REALS:
-            _add(parameter, f"ssv:{variable.kind}", value=float(variable.start or 0.0), **_unit(variable))
-        else:
-            _add(parameter, f"ssv:{variable.kind}", value=variable.start)
+        start = float(variable.start or 0.0) if variable.kind in _REALS else variable.start
+        unit = _unit(variable) if variable.kind in _REALS else {}
+        _add(_add(parameters, "ssv:Parameter", name=variable.name), f"ssv:{variable.kind}", value=start, **unit)
     _add_units(_add(root, "ssv:Units"), component.parameters)
     return _document(root)
 
@@ -136,10 +124,10 @@ def _root(prefix: str, tag: str, name: str, ssp: str) -> ET.Element:
     return ET.Element(_tag(f"{prefix}:{tag}"), version=f"{ssp}.0", name=name)
 
 
-def _omsimulator(parent: ET.Element) -> ET.Element:
-    """Add OMSimulator's annotation, which it needs of a system and of the default experiment."""
+def _omsimulator(parent: ET.Element, **attributes: object) -> ET.Element:
+    """Add OMSimulator's annotation; return its information."""
     annotation = _add(_add(parent, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
-    return _add(annotation, "oms:Annotations")
+    return _add(_add(annotation, "oms:Annotations"), "oms:SimulationInformation", **attributes)
 
 
 def _tag(name: str) -> str:
@@ -160,17 +148,6 @@ def _document(root: ET.Element) -> bytes:
 
 def _unit(variable: Variable) -> dict[str, str]:
     return {} if variable.unit in (None, "1") else {"unit": str(variable.unit)}
-
-
-def _add_component(parent: ET.Element, component: Component, parameters: str) -> None:
-    attributes = {"type": "application/x-fmu-sharedlibrary", "source": f"resources/{component.fmu}"}
-    element = _add(parent, "ssd:Component", name=component.name, **attributes, implementation="CoSimulation")
-    connectors = _add(element, "ssd:Connectors")
-    for variable in component.connectors:
-        connector = _add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
-        _add(connector, f"ssc:{variable.kind}", **_unit(variable))
-    binding = {"type": "application/x-ssp-parameter-set", "source": f"resources/{parameters}"}
-    _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", **binding)
 
 
 def _add_units(parent: ET.Element, variables: Iterable[Variable]) -> None:
@@ -242,7 +219,7 @@ def build_system(
         machine = machine.changed("compensator", {"compensate": compensate})
     parts = {"reference": "ReferenceTrajectory", look_ahead: model, "drive": "FeedDrive"}
     content: dict[str, bytes] = {}
-    components, sets = [], {}
+    components: list[_Component] = []
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
         trained = None
@@ -257,10 +234,9 @@ def build_system(
         name = spec.table.name
         content[f"resources/{name}.fmu"] = archived(native.files(spec, targets=targets))
         scalars = [variable for variable, size in described_variables(spec.table, spec.fmi) if size is None]
-        components.append(Component(part, f"{name}.fmu", tuple(scalars)))
-        sets[part] = f"{machine.name}_{part}.ssv"
-        content[f"resources/{sets[part]}"] = _parameter_set(components[-1], ssp)
-    connections: list[Connection] = [
+        components.append(_Component(part, f"{name}.fmu", f"{machine.name}_{part}.ssv", tuple(scalars)))
+        content[f"resources/{components[-1].parameter_set}"] = _parameter_set(components[-1], ssp)
+    connections = [
         ("reference", "r", look_ahead, "x_d_ahead"),
         (look_ahead, sent, "drive", "x_d"),
         ("drive", "x_meas", look_ahead, "x_meas"),
@@ -268,7 +244,7 @@ def build_system(
     starts = {variable.name: variable.start for variable in components[1].variables}
     delay = int(starts["Np" if compensate is None else "preview"] or 0)
     stop_time = round((len(samples) - 1 + delay) * machine.T_s, 9)
-    structure = system_structure(machine.name, components, connections, sets, machine.T_s, stop_time, ssp)
+    structure = _structure(machine.name, components, connections, machine.T_s, stop_time, ssp)
     with written_whole(path) as file:
         file.write(archived({"SystemStructure.ssd": structure, **content}))
     progress("done", 1.0)
