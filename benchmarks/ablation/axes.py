@@ -26,7 +26,7 @@ from hybridsep.base.metrics import coverage, rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Piece, predict_peers
-from hybridsep.fitting.choice import settings_for
+from hybridsep.fitting.choice import with_window
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
 from hybridsep.logs.log import read_log
@@ -160,7 +160,7 @@ def _log(folder: str, path: Path, Np: int) -> Axis:
     n_train = round(0.5 * len(x))
     first = -(-n_train // Np) * Np
     found = _identified(x_d[:n_train].tobytes(), x[:n_train].tobytes(), T_s)
-    settings = settings_for(Np, T_s, found.input_hold)
+    settings = with_window(PredictorSettings(T_s=T_s, input_hold=found.input_hold), Np)
     residual = x - physics(found.model, settings, x_d)
     begins = np.arange(len(x)) // Np * Np
     errors = [rms((residual - found.offset)[first:]), rms((residual - residual[begins - 1])[first:])]

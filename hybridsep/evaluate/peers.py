@@ -34,11 +34,8 @@ __all__ = [
     "predict_peers",
 ]
 
-LATE_MAX = 21
-"""Most samples that a command is tried to be late by."""
-
-TIME_CONSTANTS = (0.05, 1e4)
-"""Least and largest time constant that are tried, samples."""
+_LATE_MAX, _TIME_CONSTANTS = 21, (0.05, 1e4)
+"""Most samples that a command is tried to be late by; least and largest time constant that are tried, samples."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,9 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
         errors = [(x - lag.position(x_d))[at] for (x_d, x), at in zip(recordings, known, strict=True)]
         return float(sum(error @ error for error in errors))
 
-    bounds = [math.log(samples) for samples in TIME_CONSTANTS]
+    bounds = [math.log(samples) for samples in _TIME_CONSTANTS]
     fits = [
-        (minimize_scalar(misfit, bounds=bounds, args=(late,), method="bounded"), late) for late in range(LATE_MAX + 1)
+        (minimize_scalar(misfit, bounds=bounds, args=(late,), method="bounded"), late) for late in range(_LATE_MAX + 1)
     ]
     best, late = min(fits, key=lambda fit: float(fit[0].fun))
     return FirstOrderLag(math.exp(best.x), late)
@@ -306,7 +303,8 @@ def _lag_hold(pieces: Sequence[Piece], training: Sequence[tuple[Array, Array]], 
 
 
 def _arx(n: int, way: str, pieces: Sequence[Piece], Np: int, delay: int) -> Peer:
-    name, far = f"ARX{n}", _FAR * _reach(pieces)
+    name, distances = f"ARX{n}", (np.abs(np.stack((one.x_d, one.x)) - one.x_d[0]) for one in pieces)
+    far = _FAR * max((float(np.nanmax(distance)) for distance in distances), default=math.inf)
     least_squares = MinimumNorm(2 * n + 2)
     runs = [ArxRun(one.x_d, one.x, n, delay) for one in pieces]
     if way == FROZEN:
@@ -333,11 +331,6 @@ def _arx(n: int, way: str, pieces: Sequence[Piece], Np: int, delay: int) -> Peer
 def _first_window(piece: Piece, Np: int, delay: int) -> int:
     """Return the beginning of the first window that is predicted, so that late ones cover the first sample."""
     return max(0, piece.first - -(-delay // Np) * Np)
-
-
-def _reach(pieces: Sequence[Piece]) -> float:
-    """Return the largest distance, m, of a command or measurement from where its piece starts."""
-    return max((float(np.nanmax(np.abs(np.stack((one.x_d, one.x)) - one.x_d[0]))) for one in pieces), default=math.inf)
 
 
 def _late(signal: Array, delay: int) -> Array:

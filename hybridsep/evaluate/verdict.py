@@ -82,16 +82,6 @@ class Verdict:
     n_samples: int
     n_windows: int
 
-    @property
-    def ratio_pb(self) -> float:
-        """RMS error of the hybrid relative to the physics model's."""
-        return self.ratios[0]
-
-    @property
-    def ratio_hold(self) -> float:
-        """RMS error of the hybrid relative to the hold baseline's."""
-        return self.ratios[1]
-
     def __str__(self) -> str:
         if self.n_windows < WINDOWS_MIN:
             return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."

@@ -26,7 +26,6 @@ __all__ = [
     "WindowErrors",
     "choose_settings",
     "period_finding",
-    "settings_for",
     "settings_to_try",
     "trained_rms",
     "window_scores",
@@ -67,11 +66,6 @@ class WindowErrors:
     rms_pb: float
     rms_hold: float
     rms_h: float
-
-
-def settings_for(Np: int, T_s: float, input_hold: str) -> PredictorSettings:
-    """Return the default settings for a window, with as many lags as fit into it."""
-    return with_window(PredictorSettings(T_s=T_s, input_hold=input_hold), Np)
 
 
 def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:

@@ -31,7 +31,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, recommendation
 from .build import build_fmus, fit_files, sha256_of, write_commands
-from .choice import Tried, WindowErrors, choose_settings, period_finding, settings_for, window_scores
+from .choice import Tried, WindowErrors, choose_settings, period_finding, window_scores, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
@@ -299,7 +299,7 @@ def fit(
             f"Np must be at most {judging}, got {Np}: the first half of each log trains, and the longest stretch for "
             f"the test has {judging} samples; give a smaller Np, or a log of {2 * Np} samples or more"
         )
-    default = replace(settings_for(window, T_s, "zoh"), **entries)
+    default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.fitting.choice import choose_settings, settings_for, settings_to_try, window_scores
+from hybridsep.fitting.choice import choose_settings, settings_to_try, window_scores, with_window
 from hybridsep.fitting.replay import Recording, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
@@ -30,15 +30,15 @@ def ringing(n: int = 800) -> list[Recording]:
 
 
 def test_what_fits_into_a_short_window_is_the_default() -> None:
-    default = PredictorSettings()
-    assert settings_for(default.Np, 1e-3, "foh") == replace(default, input_hold="foh")
-    short = settings_for(1, 2e-3, "zoh")
+    default = PredictorSettings(T_s=2e-3)
+    assert with_window(default, default.Np) == default
+    short = with_window(default, 1)
     assert (short.Np, short.p, short.q, short.T_s) == (1, 1, 0, 2e-3)
 
 
 @pytest.mark.parametrize("Np", [1, 2, 19, 100])
 def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
-    settings = settings_for(Np, 1e-3, "zoh")
+    settings = with_window(PredictorSettings(), Np)
     tried = settings_to_try(settings)
     assert tried[0] == settings
     assert all(one.Np == Np and one.p <= Np and one.q < Np for one in tried)
@@ -48,7 +48,7 @@ def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
 @pytest.mark.slow
 def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     recordings = ringing()
-    settings = settings_for(40, 1e-3, "zoh")
+    settings = with_window(PredictorSettings(), 40)
     chosen, tried = choose_settings(MODEL, recordings, settings)
     candidates = settings_to_try(settings)
     assert [(one.p, one.q) for one in tried] == [(one.p, one.q) for one in candidates]
@@ -66,7 +66,7 @@ def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
 
 @pytest.mark.slow
 def test_errors_over_the_window() -> None:
-    recordings, settings = ringing(), settings_for(40, 1e-3, "zoh")
+    recordings, settings = ringing(), with_window(PredictorSettings(), 40)
     judged = replay(HybridPredictor(MODEL, settings), recordings)
     scores = window_scores(MODEL, recordings, settings)
     assert [one.Np for one in scores] == [8, 20, 40, 80]
