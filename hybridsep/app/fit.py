@@ -69,7 +69,7 @@ def tune(
 
     The look-ahead is the controller's.
     """
-    from ..fitting.advice import partly_used
+    from ..fitting.advice import extent
     from ..fitting.tuning import candidates, default_values, unsettled
     from ..fitting.tuning import tune as tune_on
     from ..logs.checks import findings_table
@@ -103,8 +103,8 @@ def tune(
     else:
         if in_motion := [name for name, log in pieces.items() if any(one.n_settling for one in log)]:
             show([f"{', '.join(in_motion)}: begins in motion, and is ranked without its first window"], ())
-        for line in (partly_used(log) for log, _ in read.values()):
-            console.print(line) if line else None
+        for name, (log, _) in read.items():
+            console.print(f"{name}: {extent([log])}")
         shown = shown_of(read[names[-1]][0].file_unit, axis.unit)
         print_tuning(tuning, axis.title, *shown.error(float(max(tuning.rms_pb))))
     if out is not None:

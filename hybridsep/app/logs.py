@@ -56,7 +56,7 @@ def backtest(
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
     from ..evaluate.backtest import replayed_run
-    from ..fitting.advice import Judged, partly_used, recommendation, whole_log_words
+    from ..fitting.advice import Judged, extent, recommendation, whole_log_words
     from ..fitting.replay import Recording, knew, replay
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
@@ -116,8 +116,7 @@ def backtest(
         more = {"findings": findings_table(findings), "advice": recommendation(judged)}
         print_json({**figures, "judged": replayed.judgement(), "verdict": verdict, **more})
         return
-    if line := partly_used(read):
-        console.print(line)
+    console.print(f"{log.name}: {extent([read])}")
     print_judged(judged, f"{title}: prediction error against the measured position", verdict)
     for line in dict.fromkeys((words, recommendation(judged))):
         console.print(line)

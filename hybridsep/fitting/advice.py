@@ -17,7 +17,7 @@ from ..logs.log import Log
 from ..logs.units import DisplayUnits
 from .replay import Replay
 
-__all__ = ["Judged", "extent", "partly_used", "peers_in_words", "recommendation", "whole_log_words"]
+__all__ = ["Judged", "extent", "peers_in_words", "recommendation", "whole_log_words"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
@@ -211,13 +211,13 @@ def extent(logs: Sequence[Log]) -> str:
     Where measurements are missing or were cut out, or samples left out, the share of the files' samples and their own
     rate are said as well.
     """
-    T_s, n = logs[0].T_s, sum(len(log.t) for log in logs)
-    n_used, n_recorded = _used(logs)
+    T_s, n, own = logs[0].T_s, sum(len(log.t) for log in logs), logs[0].T_recorded
+    n_used = sum(int(np.count_nonzero(~np.isnan(log.x_meas))) for log in logs)
+    n_recorded = sum(log.n_recorded or len(log.t) for log in logs)
     words = f"{n} samples"
     if n_used < _ALL * n_recorded:
         words = f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
     words += f", {n * T_s:.4g} s at {1 / T_s:.4g} Hz"
-    own = logs[0].T_recorded
     if own and abs(T_s / own - 1.0) > _RATE:
         words += f" (recorded at {1 / own:.4g} Hz)"
     segments = sum(len(log.starts) for log in logs)
@@ -225,17 +225,3 @@ def extent(logs: Sequence[Log]) -> str:
         return words
     lasted = sum(float(log.t[-1] - log.t[0]) + T_s for log in logs)
     return f"{words} in {segments} segments of a record of {lasted:.4g} s"
-
-
-def partly_used(log: Log) -> str:
-    """Return the extent of a log of which a part is used, or at another rate than its file's; empty otherwise."""
-    own, (n_used, n_recorded) = log.T_recorded or log.T_s, _used([log])
-    if n_used >= _ALL * n_recorded and abs(log.T_s / own - 1.0) <= _RATE:
-        return ""
-    return f"{log.path.name}: used are {extent([log])}"
-
-
-def _used(logs: Sequence[Log]) -> tuple[int, int]:
-    """Return how many samples are measured and used, and how many were recorded."""
-    used = sum(int(np.count_nonzero(~np.isnan(log.x_meas))) for log in logs)
-    return used, sum(log.n_recorded or len(log.t) for log in logs)

@@ -41,7 +41,6 @@ from .report import (
     write_identification,
     write_other_windows,
     write_settings,
-    write_tracking,
     write_use,
 )
 
@@ -164,7 +163,9 @@ class Fit:
         write_identification(report, self.identification, judged)
         write_settings(report, self.choice, judged)
         if self.tracking is not None:
-            write_tracking(report, self.tracking.lines(judged.shown))
+            report.heading("Compensation")
+            for line in self.tracking.lines(judged.shown):
+                report.paragraph(line)
         if fmus:
             write_use(report, fmus[0], judged.T_s, judged.replay.Np)
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")

@@ -24,7 +24,6 @@ __all__ = [
     "write_identification",
     "write_other_windows",
     "write_settings",
-    "write_tracking",
     "write_use",
 ]
 
@@ -120,14 +119,6 @@ def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> N
         f"unless another is better by {100 * WORTH:g} %.",
         "dim",
     )
-
-
-def write_tracking(report: Report, lines: Sequence[str]) -> None:
-    """Write the tracking errors to be expected, in words, the last line being how they came about."""
-    report.heading("Compensation")
-    for line in lines[:-1]:
-        report.paragraph(line)
-    report.paragraph(lines[-1], "dim")
 
 
 def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:
