@@ -208,33 +208,24 @@ _PAUSE = 5.0
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """Show progress on stderr; yield a function of a message, which names the stage, and the fraction done."""
-    if quiet or not errors_console.is_terminal:
-        yield _nothing if quiet else _Lines()
+    if errors_console.is_terminal and not quiet:
+        columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+        with Progress(*columns, console=errors_console, transient=True) as bar:
+            task = bar.add_task("starting", total=1.0)
+            yield lambda message, fraction: bar.update(task, description=message, completed=fraction)
         return
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=errors_console, transient=True) as bar:
-        task = bar.add_task("starting", total=1.0)
-        yield lambda message, fraction: bar.update(task, description=message, completed=fraction)
+    begun, stage, printed = monotonic(), "", 0.0
 
-
-def _nothing(_message: str, _fraction: float) -> None:
-    """Show nothing."""
-
-
-class _Lines:
-    """Prints a line where a stage begins, and while it lasts one after each pause."""
-
-    def __init__(self) -> None:
-        self._begun = monotonic()
-        self._stage, self._printed = "", 0.0
-
-    def __call__(self, message: str, fraction: float) -> None:
+    def print_line(message: str, fraction: float) -> None:
+        """Print where a stage begins, and while it lasts after each pause."""
+        nonlocal stage, printed
         now = monotonic()
-        if now - self._begun < _SILENT or fraction >= 1.0:
+        if quiet or now - begun < _SILENT or fraction >= 1.0 or (message == stage and now - printed < _PAUSE):
             return
-        if message != self._stage or now - self._printed >= _PAUSE:
-            self._stage, self._printed = message, now
-            errors_console.print(f"[{fraction:4.0%}] {message}", soft_wrap=True)
+        stage, printed = message, now
+        errors_console.print(f"[{fraction:4.0%}] {message}", soft_wrap=True)
+
+    yield print_line
 
 
 # Files ----------------------------------------------------------------------------------------------------------------

@@ -326,8 +326,7 @@ def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
         lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
         lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")
     native = files.get("native FMU")
-    if native and (note := other_platforms(native, files["machine file"], files["trained predictor"])):
-        says, _, command = note.rpartition(": ")
-        lines += [f"  # {says}", f"  {command}"]
+    if native and (said := other_platforms(native, files["machine file"], files["trained predictor"])):
+        lines += [f"  # {said[0]}", f"  {said[1]}"]
     lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
     return lines

@@ -144,15 +144,15 @@ def build_here(machine: Machine, model: str, out: Path, flavour: str, *, weights
     return build_fmu(machine, fmu_name(model, machine.name, flavour), out, flavour, weights=weights)
 
 
-def other_platforms(fmu: Path, machine: Path, weights: Path | None = None) -> str:
-    """Return which platforms a native FMU was built for here and the line that builds it for all; empty if it was.
+def other_platforms(fmu: Path, machine: Path, weights: Path | None = None) -> tuple[str, ...]:
+    """Return which platforms a native FMU was built for here, and the line that builds it for all; empty if it was.
 
     ``fmu`` is the archive, ``machine`` its machine file, ``weights`` what it has learned.
     """
     targets = expanded(default_targets())
     if set(targets) == set(ALL_TARGETS):
-        return ""
+        return ()
     line: list[object] = ["hybridsep", "build", fmu.stem, "--target", "all", "-m", machine]
     line += [] if weights is None else ["--weights", weights]
     line += ["--out", fmu.parent]
-    return f"native FMUs are for {', '.join(targets)}; for all platforms: {shlex.join(map(str, line))}"
+    return f"native FMUs are for {', '.join(targets)}; for all platforms", shlex.join(map(str, line))
