@@ -19,6 +19,7 @@ from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
+from ..fmi.archive import build_fmu
 from ..identify.model import IdentifiedModel, machine_of
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
@@ -30,7 +31,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, recommendation
-from .build import build_fmus, fit_files, sha256_of, write_commands
+from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, window_scores, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
@@ -191,21 +192,20 @@ class Fit:
             Called with a message and the fraction done.
         """
         files = fit_files(Path(out), self.machine.name, compensator=self.tracking is not None)
-        left_out = {"report": not report}
-        files = {
-            what: path for what, path in files.items() if not left_out.get(what, path.suffix == ".fmu" and not fmus)
-        }
+        archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
+        for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
+            del files[what]
         with written_text(files["machine file"]) as file:
             file.write(machine_text(self.machine, comments=self._comments()))
-        replayed = self.judged.replay
-        commands = commands_to_try(replayed.recordings)
+        commands = commands_to_try(self.judged.replay.recordings)
         write_commands(files["commands to try"], commands, self.machine.T_s, self.machine.unit)
         with written_whole(files["trained predictor"]) as state:
             state.write(self.trained)
-        if fmus:
-            build_fmus(self.machine, files, lambda done: progress("build the FMUs", done))
+        for i, (what, path) in enumerate(archives.items() if fmus else ()):
+            progress(f"build the {what}", i / len(archives))
+            build_fmu(self.machine, path.stem, path.parent, what.split()[0], weights=files["trained predictor"])
         if report:
-            self.report(files["report"], [path.name for path in files.values() if path.suffix == ".fmu"])
+            self.report(files["report"], [path.name for path in archives.values() if fmus])
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
         written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
         with written_text(files["results"]) as file:

@@ -31,9 +31,6 @@ _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 _LEVEL = 6
 """Of zlib's deflate; fixed, as another level, like another implementation, gives other bytes for the same content."""
 
-_COMPRESSED = ".fmu"
-"""Suffix of what is stored as it is."""
-
 
 def build_fmu(
     machine: Machine,
@@ -129,7 +126,7 @@ def archived(files: Mapping[str, bytes]) -> bytes:
         for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
             entry.external_attr, entry.create_system = 0o644 << 16, 3
-            how = zipfile.ZIP_STORED if arcname.endswith(_COMPRESSED) else zipfile.ZIP_DEFLATED
+            how = zipfile.ZIP_STORED if arcname.endswith(".fmu") else zipfile.ZIP_DEFLATED
             archive.writestr(entry, files[arcname], how, _LEVEL)
     return file.getvalue()
 

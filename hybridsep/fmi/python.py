@@ -36,9 +36,6 @@ _SLAVES = {
     "FeedDrive": "feed_drive.py",
 }
 
-_LAUNCHER = "launcher.py"
-"""The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
-
 
 def files(spec: FmuSpec) -> dict[str, bytes]:
     """Return all files of one FMU of FMI 2.0: archive name → content.
@@ -78,7 +75,7 @@ def _resources(model: str) -> dict[str, bytes]:
     """Return the Python side of an FMU: slave, library and pythonfmu, under names with a hash of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
     library = _imported_modules(slave)
-    launcher = slave.with_name(_LAUNCHER).read_text(encoding="utf-8")
+    launcher = slave.with_name("launcher.py").read_text(encoding="utf-8")  # which pythonfmu loads first
     digest = hashlib.sha256(slave.read_bytes() + launcher.encode())
     for module, text in library.items():
         digest.update(module.encode() + text)

@@ -147,7 +147,7 @@ def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredic
     return predictor
 
 
-def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredictor:
+def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredictor:
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
     Parameters
@@ -156,7 +156,7 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     machine : Machine
         Machine that it must have been trained for: with its ``Np``, ``input_hold``, modes, and all settings on which
         weights depend (:func:`learned_settings`).
-    model : {"HybridPredictor", "SepCompensator"}
+    kind : {"HybridPredictor", "SepCompensator"}
         Which of the machine's two sets of settings is meant.
 
     Raises
@@ -169,9 +169,12 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
         trained = HybridPredictor.load(path)
     except StateError as error:
         raise StateError(f"{path.name}: {error}") from error
-    compensates = model == "SepCompensator"
+    compensates = kind == "SepCompensator"
     settings = machine.compensator_predictor if compensates else machine.predictor_settings
-    found, expected = _parameters(trained.settings, trained.model), _parameters(settings, machine.model)
+    found, expected = (  # by their names in the machine file
+        {"Np": one.Np, **learned_settings(one, model), "input_hold": one.input_hold}
+        for one, model in ((trained.settings, trained.model), (settings, machine.model))
+    )
     differing = [
         f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
         for name in {**expected, **found}
@@ -186,8 +189,3 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     if trained.regression.n_rows == 0:
         raise StateError(f"{path.name} has learned no sample; save the predictor after a run")
     return trained
-
-
-def _parameters(settings: PredictorSettings, model: ModalModel) -> dict[str, object]:
-    """Return the settings that must agree, by their names in the machine file."""
-    return {"Np": settings.Np, **learned_settings(settings, model), "input_hold": settings.input_hold}
