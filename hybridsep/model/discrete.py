@@ -21,20 +21,9 @@ class DiscreteModel:
     ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time, in its
     lifted form over a window: ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
 
-    Positions are relative to the initial position; the state is plain data, ``(n_state,)``.
-
-    Parameters
-    ----------
-    state_space : tuple of arrays
-        ``(A, b, c)`` of the modes, block diagonal, as :meth:`ModalModel.state_space` returns it.
-    dead_time : int
-        Whole samples.
-    T_s : float
-        Sampling interval, s.
-    input_hold : {"zoh", "foh"}
-        Zero-order or first-order hold of ``x_d``.
-    block : int
-        Longest window computed in one piece.
+    Positions are relative to the initial position; the state is plain data, ``(n_state,)``. ``state_space`` is
+    :meth:`ModalModel.state_space`, block diagonal, ``dead_time`` in samples, ``T_s`` in s, ``input_hold`` zero-order
+    ("zoh") or first-order ("foh"); windows of up to ``block`` samples are computed in one piece.
 
     Raises
     ------
@@ -130,12 +119,7 @@ def _discretised(state_space: StateSpace, T_s: float, input_hold: str) -> tuple[
 def discretised_block(A: Array, b: Array, T_s: float, input_hold: str) -> tuple[Array, Array, Array]:
     """Return ``(A_d, b_d, d)`` with ``s(k+1) = A_d s(k) + b_d u(k)`` and the continuous state ``s(k) + d u(k)``.
 
-    Parameters
-    ----------
-    A : (m, m) array, 1/s
-    b : (m,) array, 1/s
-    T_s : float, s
-    input_hold : {"zoh", "foh"}
+    ``A``, (m, m), and ``b``, (m,), are in 1/s, ``T_s`` in s.
     """
     from scipy.linalg import expm
 

@@ -58,22 +58,9 @@ class StageDrive:
     the physics model's hold. Without a dead time that would need the next command, so the command goes on with its last
     slope.
 
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``, eq. (15), with its dead time.
-    f : float
-        Friction as an offset of the command, m, ≥ 0.
-    kappa : float
-        Cable stiffness as an offset of the command, 1/m, ≥ 0.
-    T_s : float
-        Sampling interval of the command, s, for the commanded velocity.
-    friction_on : {"command", "motion"}
-        Velocity of the friction, the commanded or the actual one.
-    v_friction : float
-        Velocity over which the friction changes sign, m/s; 2 mm/s, a choice of the stand-in, as the paper gives none.
-    input_hold : {"zoh", "foh"}
-        Zero-order or first-order hold of the command.
+    ``f``, m, and ``kappa``, 1/m, both ≥ 0, are friction and cable stiffness as offsets of the command, ``T_s``, s, is
+    its sampling interval, and ``friction_on`` says which velocity the friction has, the command's or the motion's.
+    ``v_friction``, m/s, over which it changes sign, is 2 mm/s, a choice of the stand-in, as the paper gives none.
     """
 
     def __init__(

@@ -191,23 +191,10 @@ def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float
 
 
 def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T_s: float = 1e-3) -> Array:
-    """Return a rest-to-rest motion along a planar path, with limits along the arc.
+    """Return a rest-to-rest motion along a planar path, with limits along the arc, ``(n, d)``, m, at ``k·T_s``.
 
-    Parameters
-    ----------
-    position, derivative : callable, (n,) → (n, d)
-        The path and its derivative, m, over a parameter ``u`` from 0 to ``end``; the derivative is never zero inside.
-    end : float
-        Last value of ``u``, > 0.
-    limits : Limits
-        Velocity, acceleration and jerk along the arc.
-    T_s : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    (n, d) array, m
-        Positions at ``k·T_s``; the arc length is inverted to 1e-12 of the total.
+    ``position`` and ``derivative``, (n,) → (n, d), m, are the path and its derivative over a parameter from 0 to
+    ``end`` > 0; the derivative is never zero inside. The arc length is inverted to 1e-12 of the total.
     """
     nodes = np.linspace(0.0, end, _PANELS + 1)
     arc = np.concatenate(([0.0], np.cumsum(_panel_lengths(derivative, nodes[:-1], nodes[1:]))))  # up to each node
