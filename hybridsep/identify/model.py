@@ -26,49 +26,21 @@ class Alternative:
 
 @dataclass(frozen=True)
 class IdentifiedModel:
-    """Identified physics model.
+    """Identified physics model."""
 
-    Attributes
-    ----------
-    model : ModalModel
-        ``G_pb`` of eq. (15) with its dead time.
-    input_hold : {"zoh", "foh"}
-        Hold of the command between samples.
-    T_s : float
-        Sampling interval, s.
-    unit : {"m", "rad"}
-        Unit of the positions, and of what is in metres below.
-    structure : str
-        Name of the chosen structure.
-    parameters : tuple of Estimate
-        Parameters with standard deviations.
-    offset : float
-        Measured minus modelled position, m, which no physics model holds.
-    rms, rms_held_out : float
-        Error of the simulated position: of the fit to all samples, and of the held-out part before, m.
-    n_samples : int
-        Samples that were used.
-    n_effective : float
-        Independent samples that would tell as much.
-    alternatives : tuple of Alternative
-        All structures that were tried, the simplest first.
-    findings : tuple of str
-        What a user should know, in words.
-    """
-
-    model: ModalModel
-    input_hold: str
-    T_s: float
-    unit: str
-    structure: str
-    parameters: tuple[Estimate, ...]
-    offset: float
-    rms: float
-    rms_held_out: float
-    n_samples: int
-    n_effective: float
-    alternatives: tuple[Alternative, ...]
-    findings: tuple[str, ...]
+    model: ModalModel  # ``G_pb`` of eq. (15) with its dead time
+    input_hold: str  # "zoh" or "foh", hold of the command between samples
+    T_s: float  # sampling interval, s
+    unit: str  # "m" or "rad", of the positions, and of what is in metres below
+    structure: str  # name of the chosen structure
+    parameters: tuple[Estimate, ...]  # parameters with standard deviations
+    offset: float  # measured minus modelled position, m, which no physics model holds
+    rms: float  # error of the simulated position, m, of the fit to all samples
+    rms_held_out: float  # and of the held-out part before
+    n_samples: int  # samples that were used
+    n_effective: float  # independent samples that would tell as much
+    alternatives: tuple[Alternative, ...]  # all structures that were tried, the simplest first
+    findings: tuple[str, ...]  # what a user should know, in words
 
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
         """Return the machine with this model; ``entries`` are more of its file, such as ``predictor={"Np": 20}``.

@@ -30,54 +30,28 @@ class Block:
 class Source(ABC):
     """Open log file; one subclass a format, listed in :mod:`hybridsep.logs.formats`.
 
-    Attributes
-    ----------
-    format : str
-        The format's name in messages.
-    endings : tuple of str
-        Usual endings of its files' names; what a file is, its content tells.
-    path : Path
-        The file.
-    names : list of str
-        Available columns.
-    twins : mapping
-        Name of a column → the further columns that the file gives the same name, under names of their own: ``Time#2``.
-    units : mapping
-        Name of a column → unit that the file states beside it, where it does so outside the name.
-    assumed_units : mapping
-        Name of a column → unit by the format's convention, which a given one overrides.
-    roles : mapping
-        ``"t"``, ``"x_d"``, ``"x"`` → the column that the format itself has for it.
-    stamps : set of str
-        Columns of clock timestamps, which become seconds since the first one.
-    times : mapping
-        Name of a column → column of its times, where columns may be sampled at rates of their own; only those with the
-        same times can be read side by side.
-    axes : mapping
-        Name of an axis → its columns of commanded and measured position, where the format names them.
-    axis : str
-        Axis that is read without a word of the user's, where it is not the first one.
-    remarks : list of str
-        What was chosen for the reader that the user may want to change.
-    commanded, measured : str
-        Columns of the positions that are read; nothing between two delimiters of the latter stands for NaN.
+    A mapping without another word is by the name of a column; times are of the columns that may be sampled at rates of
+    their own, and only those with the same times can be read side by side.
     """
 
-    format: ClassVar[str]
-    endings: ClassVar[tuple[str, ...]]
+    format: ClassVar[str]  # its name in messages
+    endings: ClassVar[tuple[str, ...]]  # usual ones of its files' names; what a file is, its content tells
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.names: list[str] = []
-        self.twins: Mapping[str, Sequence[str]] = {}
-        self.units: Mapping[str, str] = {}
-        self.assumed_units: Mapping[str, str] = {}
-        self.roles: Mapping[str, str] = {}
-        self.stamps: Set[str] = frozenset()
-        self.times: Mapping[str, str] = {}
-        self.axes: Mapping[str, tuple[str, str]] = {}
-        self.axis = ""
-        self.remarks: list[str] = []
+        self.names: list[str] = []  # available columns
+        self.twins: Mapping[
+            str, Sequence[str]
+        ] = {}  # further columns of the same name, under names of their own, Time#2
+        self.units: Mapping[str, str] = {}  # units that the file states, where it does so outside the name
+        self.assumed_units: Mapping[str, str] = {}  # units by the format's convention, which a given one overrides
+        self.roles: Mapping[str, str] = {}  # "t", "x_d", "x" → the column that the format itself has for it
+        self.stamps: Set[str] = frozenset()  # columns of clock timestamps, which become seconds since the first one
+        self.times: Mapping[str, str] = {}  # columns of their times
+        self.axes: Mapping[str, tuple[str, str]] = {}  # axis → columns of commanded and measured position
+        self.axis = ""  # the one that is read without a word of the user's, where it is not the first
+        self.remarks: list[str] = []  # what was chosen for the reader that the user may want to change
+        # Columns that are read; nothing between two delimiters of the latter stands for NaN
         self.commanded, self.measured = "", ""
 
     @staticmethod

@@ -16,14 +16,8 @@ class FeedDrive:
     """Spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
 
     ``m ẍ + c ẋ + k x + H_NL = c ẋ_d + k x_d`` with ``H_NL = c_nl·ẋ|ẋ| + k_nl·x|x|``, in the states
-    ``x`` and ``u = ẋ − (c/m) x_d``, which need no derivative of the command.
-
-    Parameters
-    ----------
-    m, c, k : float
-        Mass kg, damping N·s/m, stiffness N/m, > 0.
-    c_nl, k_nl : float
-        Quadratic damping N·s²/m² and stiffness N/m², ≥ 0; both 0 give eq. (11).
+    ``x`` and ``u = ẋ − (c/m) x_d``, which need no derivative of the command. Mass, kg, damping, N·s/m, and stiffness,
+    N/m, are > 0; the quadratic ones, N·s²/m² and N/m², both 0, give eq. (11).
     """
 
     def __init__(self, m: float, c: float, k: float, c_nl: float = 0.0, k_nl: float = 0.0) -> None:

@@ -125,17 +125,10 @@ def rest_to_rest(
 
 
 def staircase(T_s: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
-    """Return the paper's staircase: a 10 mm move at the start of every second, three up, three down, 6 s.
+    """Return the paper's staircase: a 10 mm move at the start of every second, three up, three down, 6 s, ``(n,)``, m.
 
-    Returns
-    -------
-    x_d : (6 / T_s + 1,) array, m
-        6001 samples at 1 ms; each move takes 0.143 s under eq. (14).
-
-    Raises
-    ------
-    ParameterError
-        If a move would take more than a second under other limits.
+    It has 6001 samples at 1 ms; each move takes 0.143 s under eq. (14), and ParameterError is raised if one would take
+    more than a second.
     """
     steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010
     return rest_to_rest(steps, limits, T_s, start_times=range(6), duration=6.0)
