@@ -39,7 +39,9 @@ etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 
 MACHINE = load_machine("spring_mass_damper")
 ALL = [*NATIVE, *FMI3, *PYTHON]
-MORE_MODES_ALONE = ("HybridPredictor_als25010_x", "HybridPredictorPy_als25010_x", "SepCompensatorPy_als25010_x")
+MORE_MODES_ALONE = tuple(
+    f"{kind}_als25010_x" for kind in ("HybridPredictor", "HybridPredictorPy", "SepCompensator", "SepCompensatorPy")
+)
 """The default machine's variables and more modes, as other FMUs have: fmpy takes seconds for so many variables."""
 
 FILES = {

@@ -78,7 +78,8 @@ def test_fmpy_repeats_the_run_to_the_stated_tolerance(fmus: BuiltFmus, tmp_path:
 @pytest.mark.parametrize(("machine", "name"), each_kind(LIBRARY))
 def test_the_library_gives_the_reference_result(fmus: BuiltFmus, machine: str, name: str) -> None:
     """The files hold what the FMU gave when it was built."""
-    files, table = content(fmus(name)), FmuSpec.of(load_machine(machine), name.partition("_")[0]).table
+    loaded = load_machine(machine)
+    files, table = content(fmus(name)), FmuSpec.of(loaded, name.partition("_")[0]).table
     stream = (PlantStream if "FeedDrive" in name else LookAheadStream)(name)
     stream.initialise({v.name: v.start for v in table.variables if v.start is not None})
     expected, given = (table_in(files[f"{REFERENCE_FOLDER}/{name}_{end}.csv"]) for end in ("ref", "in"))
@@ -87,7 +88,7 @@ def test_the_library_gives_the_reference_result(fmus: BuiltFmus, machine: str, n
         found.append(stream.outputs())
         for one, value in zip(inputs, row, strict=True):
             stream.set(one, value)
-        stream.step(t, load_machine(machine).T_s)
+        stream.step(t, loaded.T_s)
     tolerance = 1e-9 if name.startswith("Sep") else 1e-11
     np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=tolerance)
     assert len(OUTPUTS[name.partition("_")[0]]) == expected.shape[1] - 1

@@ -185,19 +185,19 @@ def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream
 @on_all(LOOK_AHEADS)
 def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker) -> None:
     t_init = 0.25
-    shown = shown_by(new_stream, 1500, {"t_init": t_init})
+    shown = shown_by(new_stream, 1000, {"t_init": t_init})
     fill, Np = (100, 100) if new_stream.model == PREDICTOR else (200, 50)
     first = fill + round(t_init / TS)
     sums = {"rms_pb": shown["x_pb"], "rms_h": shown["x_h"]}
     if new_stream.model == COMPENSATOR:
         sums["rms_e"] = shown["x_d"]
     else:
-        x_pb, after_fill = shown["x_pb"][:-1], np.arange(1500) >= fill
+        x_pb, after_fill = shown["x_pb"][:-1], np.arange(1000) >= fill
         sums["rms_hold"] = hold(x_pb, np.where(after_fill, shown["x_meas"], x_pb), after_fill, Np)
     for name, against in sums.items():
         assert not shown[name][: first + 1].any()
-        for k in (first, first + 1, first + 400, 1499):
+        for k in (first, first + 1, first + 400, 999):
             expected = math.sqrt(np.mean((shown["x_meas"][first : k + 1] - against[first : k + 1]) ** 2))
             assert shown[name][k + 1] == pytest.approx(expected, rel=1e-9)
     assert shown["rms_h"][-1] < shown["rms_pb"][-1]
-    np.testing.assert_array_equal(shown["batch"], np.arange(1501) // Np)
+    np.testing.assert_array_equal(shown["batch"], np.arange(1001) // Np)
