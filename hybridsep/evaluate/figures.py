@@ -253,9 +253,7 @@ def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path
     for plane, (key, one) in zip(planes, contours.items(), strict=True):
         label, color = CASES[key]
         drawn = 1e3 * (one.nearest + factor * (one.reached - one.nearest))
-        drawn[np.flatnonzero(np.abs(np.diff(drawn)) > 0.2 * extent)] = (
-            np.nan
-        )  # the nearest point has gone round a corner
+        drawn[np.flatnonzero(np.abs(np.diff(drawn)) > 0.2 * extent)] = np.nan  # the nearest point went round a corner
         plane.plot(path_mm.real, path_mm.imag, color="black", linewidth=0.6)
         plane.plot(drawn.real, drawn.imag, color=color, linewidth=0.8)
         found = one.figures()

@@ -39,14 +39,6 @@ __all__ = ["files"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
-_RUNTIME_LICENSES = """\
-Binaries that Zig compiled have parts of its run-time library:
-
-{}
-Those for Windows have parts of mingw-w64 besides:
-
-{}"""
-
 
 def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content; arguments as of :func:`hybridsep.fmi.archive.build_fmu`.
@@ -88,7 +80,9 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
 def _licenses() -> dict[str, bytes]:
     """Return our licence, the FMI headers' licences, which are in their own comments, and the compiler's."""
     folder = data_folder("fmu_src")
-    runtime = [(folder / "c" / "licenses" / file).read_text(encoding="utf-8") for file in ("zig.txt", "mingw-w64.txt")]
+    zig, mingw = (
+        (folder / "c" / "licenses" / f"{one}.txt").read_text(encoding="utf-8") for one in ("zig", "mingw-w64")
+    )
     lines = []
     for version in FMI_VERSIONS:
         first, second, third = FMI_HEADERS[version]
@@ -100,7 +94,7 @@ def _licenses() -> dict[str, bytes]:
     return {
         "license.txt": (folder.parent / "LICENSE").read_bytes(),
         "fmi-headers.txt": ("\n".join(lines).rstrip("\n") + "\n").encode(),
-        "compiler-runtime.txt": _RUNTIME_LICENSES.format(*runtime).encode(),
+        "compiler-runtime.txt": filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
     }
 
 
