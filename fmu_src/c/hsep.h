@@ -1,8 +1,8 @@
 /* hsep: prediction and pre-compensation of a feed drive's servo error, for C99 and C++11. README.md says how to use it.
  *
  * A predictor, or a compensator, is a block of memory that the caller provides: aligned for hsep_real, of the size that
- * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state, and hsep_*_valid judges
- * bytes from elsewhere.
+ * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state. Nothing judges bytes that
+ * were changed: keep a checksum with what is stored.
  *
  * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
  * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.
@@ -14,7 +14,6 @@
  *   hsep_defaults            | constant                                              | nothing
  *   hsep_*_size, _refused    | constant                                              | returns 0: refused
  *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
- *   hsep_*_valid             | constant; the predictor's, its windows                | returns 0: invalid
  *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
  *                            | window's end Np (p + q) + n^2 / 2 on top; with averaging, |
  *                            | for each of three experts, four in a warm run,        |
@@ -111,10 +110,6 @@ HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters);
 HSEP_API hsep_began hsep_predictor_init(
     hsep_predictor *self, const hsep_parameters *parameters, hsep_real start, const void *weights, size_t weights_size);
 
-/* Whether bytes in any alignment are a block for these parameters that has processed k samples: size is its, and every
- * index lies within it. Bytes that were changed on purpose may be valid and mean nothing. */
-HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
-
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
@@ -155,9 +150,6 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
 HSEP_API hsep_began hsep_compensator_init(
     hsep_compensator *self, const hsep_parameters *parameters, hsep_real start, const void *weights,
     size_t weights_size);
-
-/* As hsep_predictor_valid. */
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0;
  * following_error_max, m, which counts from the next sample on, 0: none. Every plan goes on from the remainder of the

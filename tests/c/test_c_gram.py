@@ -158,11 +158,6 @@ class CSolution:
         self.library.hsep_solution_complete(self._block)
 
     @property
-    def valid(self) -> bool:
-        sizes = [ctypes.c_uint64(int(word)) for word in self.block[:3].view(np.uint64)]
-        return bool(self.library.hsep_solution_valid(self._block, *sizes))
-
-    @property
     def _block(self) -> Any:
         return pointer(self.block)
 
@@ -245,7 +240,6 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
     assert_same(CSolution(gram, penalties, later=later, amounts=amounts, apart=False), library, penalties, rows)
     assert solution.lefts == sorted(solution.lefts, reverse=True)
     assert solution.waiting == 1
-    assert solution.valid
 
 
 @given(
@@ -304,18 +298,6 @@ def test_no_more_rows_wait_than_there_is_room_for() -> None:
     before = solution.block.copy()
     solution.add(later)
     np.testing.assert_array_equal(solution.block, before)
-
-
-def test_a_solution_of_other_sizes_or_out_of_range_is_not_valid() -> None:
-    gram, _, rows, _ = both(9, 40, 5)
-    solution = CSolution(gram, np.abs(rows).max(axis=0) ** 2)
-    assert solution.valid
-    for name, value in (("factored", 6), ("waiting", 5), ("begun", 2), ("finished", 2), ("completed", 2), ("room", 0)):
-        words, word = solution.block.view(np.uint64), WORDS.index(name)
-        before, words[word] = int(words[word]), value
-        assert not solution.valid
-        words[word] = before
-    assert solution.valid
 
 
 def test_rows_of_others_are_added_with_their_weight() -> None:

@@ -156,7 +156,6 @@ def test_weights_from_memory(kind: str) -> None:
     assert given.begin(0.0) == 0
     cold = bytes(given.block)
     assert warm != cold
-    assert given.is_valid(warm, 0)
     damaged, other = spoiled(content)
     for what, refused in ((1, damaged), (2, other)):
         for name, changed in refused.items():
@@ -167,20 +166,6 @@ def test_weights_from_memory(kind: str) -> None:
     elsewhere = given.begin(0.0, content), bytes(given.block)
     assert given.begin(0.0) == 0
     assert elsewhere == (2, bytes(given.block))
-
-
-def test_saved_blocks_are_judged() -> None:
-    predictor = library(Np=10, p=3)
-    assert predictor.begin(0.1) == 0
-    for _ in range(25):
-        predictor.sample(0.1, 0.1)
-    saved = bytes(predictor.block)
-    assert predictor.is_valid(saved, 25)
-    assert not predictor.is_valid(saved, 24)
-    assert not predictor.is_valid(saved[:-8], 25)
-    assert not predictor.is_valid(saved[:8] + b"\xff" * 8 + saved[16:], 25)
-    predictor.parameters["Np"] = 11
-    assert not predictor.is_valid(saved, 25)
 
 
 def test_a_limit_of_the_following_error_is_checked_and_a_trip_ends_with_a_rising_reset() -> None:

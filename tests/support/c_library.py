@@ -195,11 +195,5 @@ class Library:
         self._call("read", self.block, ctypes.byref(outputs))
         return self.outputs
 
-    def is_valid(self, block: bytes, k: int) -> bool:
-        """Return whether bytes are a block after k samples."""
-        return bool(
-            self._call("valid", block, ctypes.c_size_t(len(block)), ctypes.byref(self.parameters), ctypes.c_uint64(k))
-        )
-
     def _call(self, function: str, *arguments: Any) -> Any:
         return getattr(self.core, f"hsep_{self.kind}_{function}")(*arguments)

@@ -20,7 +20,7 @@ from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c
 from pathlib import Path
 from typing import Any
 
-from fmi_library import ABSENT, DISCARD, ERROR, OK, library_of, repair_checksum
+from fmi_library import ABSENT, DISCARD, ERROR, OK, library_of
 
 NUMBERS = [0.0, 1e-3, -1e-3, 1.0, 1e300, -1e300, 5e-324, float("nan"), float("inf"), -float("inf")]
 WHOLE = [0, 1, -1, 50, 2**31 - 1, -(2**31)]
@@ -267,8 +267,6 @@ class Fuzzer:
         elif odd < 0.7 and block:
             for _ in range(self.random.choice([1, 1, 8])):
                 block[self.random.randrange(len(block))] ^= 1 << self.random.randrange(8)
-            if self._chance(0.7):
-                repair_checksum(block)
         state, given = c_void_p(), self.library.block(create_string_buffer(bytes(block), len(block) + 1))
         if self._call("DeSerializeFMUstate", instance, given, len(block), byref(state)) == OK:
             self.states.append(state)

@@ -134,7 +134,6 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
     const unsigned char *block = (const unsigned char *)saved->block;
     const double *values = saved->block + sizeof(hsep_header) / sizeof(double);
     hsep_header header;
-    size_t state_size = 0;
     memcpy(&header, block, sizeof header);
     if (memcmp(header.magic, HSEP_SAVED_MAGIC, sizeof header.magic) != 0 || header.byte_order != HSEP_BYTE_ORDER) {
         return "it is no state of this kind of FMU";
@@ -157,17 +156,10 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
         return known && header.state_size == 0 ? NULL
                                                : "it is inconsistent: its phase is unknown or has no model state";
     }
-    if (hsep_model_size(&instance->context, values, &state_size, message) != HSEP_OK) {
-        return message;
-    }
-    if (state_size != header.state_size) {
-        return "its size does not fit its parameters";
-    }
-    if (hsep_model_check_state(&instance->context, block + saved_fixed_size(instance), state_size, values, message) !=
-        HSEP_OK) {
-        return message;
-    }
-    return NULL;
+    const void *state = block + saved_fixed_size(instance);
+    return hsep_model_check_state(&instance->context, state, (size_t)header.state_size, values, message) == HSEP_OK
+               ? NULL
+               : message;
 }
 
 HSEP_API hsep_status

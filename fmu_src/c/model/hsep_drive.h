@@ -12,19 +12,17 @@
 
 #if defined(HSEP_MODEL_FEED_DRIVE)
 
-#define HSEP_DRIVE_KIND UINT64_C(0x4556495244444546) /* any number that no other model has */
 #define HSEP_DRIVE(function) hsep_feed_drive_##function
 typedef hsep_feed_drive hsep_drive;
 
 #elif defined(HSEP_MODEL_STAGE_DRIVE)
 
-#define HSEP_DRIVE_KIND UINT64_C(0x4556495244475453) /* any number that no other model has */
 #define HSEP_DRIVE(function) hsep_stage_##function
 typedef hsep_stage hsep_drive;
 
 #endif
 
-#if defined(HSEP_DRIVE_KIND)
+#if defined(HSEP_DRIVE)
 
 /* Check the parameters of this drive together, after each alone; *bytes: of its block, counted in double. */
 HSEP_API hsep_status
@@ -38,9 +36,6 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 
 /* True velocity under the last step's command, m/s. */
 HSEP_API double hsep_drive_velocity(const hsep_drive *self);
-
-/* Whether a block, in any alignment and of so many bytes, is a state of the drive for these parameters. */
-HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[]);
 
 #endif
 

@@ -79,8 +79,3 @@ HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
     self->clock = step->counted.after;
     return 0;
 }
-
-HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s)
-{
-    return hsep_clock_valid(&self->clock) && self->clock.T_s == T_s;
-}

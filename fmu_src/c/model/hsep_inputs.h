@@ -48,7 +48,4 @@ HSEP_API hsep_status hsep_inputs_count(
  * done. */
 HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
 
-/* Whether inputs that were read from a state count samples of T_s, s, within their bounds. */
-HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s);
-
 #endif

@@ -11,7 +11,6 @@
 
 #include "hsep_predictor.h"
 
-#define HSEP_ONLINE_KIND UINT64_C(0x4453524550594848) /* any number that no other model has */
 #define HSEP_ONLINE(function) hsep_predictor_##function
 typedef hsep_predictor hsep_online;
 typedef hsep_predictor_parameters hsep_online_parameters;
@@ -20,14 +19,13 @@ typedef hsep_predictor_parameters hsep_online_parameters;
 
 #include "hsep_compensator.h"
 
-#define HSEP_ONLINE_KIND UINT64_C(0x4E45504D4F435053) /* any number that no other model has */
 #define HSEP_ONLINE(function) hsep_compensator_##function
 typedef hsep_compensator hsep_online;
 typedef hsep_compensator_parameters hsep_online_parameters; /* the predictor's are the first of them */
 
 #endif
 
-#if defined(HSEP_ONLINE_KIND)
+#if defined(HSEP_ONLINE)
 
 /* Check the settings of this model alone; return how many settings are wrong, each added to message. */
 HSEP_API int hsep_online_check(const double values[], char message[]);

@@ -40,8 +40,8 @@ static uint64_t state_hash(const hsep_context *context, const double values[])
 }
 
 HSEP_API hsep_status hsep_state_begin(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
-    size_t size, char message[])
+    hsep_state_header *header, const hsep_context *context, const double values[], size_t needed, size_t size,
+    char message[])
 {
     if (needed != size) {
         return hsep_message_add(
@@ -50,35 +50,31 @@ HSEP_API hsep_status hsep_state_begin(
             "initialise again",
             (double)needed, (double)size);
     }
-    *header = (hsep_state_header){kind, HSEP_STATE_VERSION, size, state_hash(context, values)};
+    *header = (hsep_state_header){HSEP_STATE_VERSION, context->n_variables, size, state_hash(context, values)};
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
-    char message[])
+HSEP_API hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     hsep_state_header header;
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     if (size < sizeof header || size != expected) {
         return hsep_message_add(
             message, "the state must have %.0f bytes, got %.0f; it is truncated or of another FMU", (double)expected,
             (double)size);
     }
     memcpy(&header, state, sizeof header);
-    if (header.kind != kind) {
-        hsep_message_add(message, "the state belongs to another model than this one");
-    } else if (header.version != HSEP_STATE_VERSION) {
-        hsep_message_add(
+    if (header.version != HSEP_STATE_VERSION) {
+        return hsep_message_add(
             message, "the state must be of version %d, got %.0f", HSEP_STATE_VERSION, (double)header.version);
-    } else if (header.size != size || header.parameters != state_hash(context, values)) {
-        hsep_message_add(message, "the state was saved with other parameters than this instance has");
-    } else {
-        return HSEP_OK;
     }
-    return HSEP_REFUSED;
-}
-
-HSEP_API hsep_status hsep_state_damaged(char message[])
-{
-    return hsep_message_add(message, "the state is inconsistent: it is damaged");
+    if (header.variables != context->n_variables || header.size != size ||
+        header.parameters != state_hash(context, values)) {
+        return hsep_message_add(message, "the state was saved with other parameters than this instance has");
+    }
+    return HSEP_OK;
 }

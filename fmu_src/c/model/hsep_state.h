@@ -1,4 +1,4 @@
-/* Header of every model's state: model, version, size, and hash of the parameters. */
+/* Header of every model's state: version, size, number of variables and hash of the parameters. */
 #ifndef HSEP_STATE_H
 #define HSEP_STATE_H
 
@@ -8,11 +8,11 @@
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 29 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 30 /* changes whenever the layout of any state does */
 
 typedef struct {
-    uint64_t kind;       /* one number for each model */
     uint64_t version;    /* HSEP_STATE_VERSION */
+    uint64_t variables;  /* their number */
     uint64_t size;       /* of the whole state, bytes */
     uint64_t parameters; /* a hash of the values of all parameters that are not tunable */
 } hsep_state_header;
@@ -31,15 +31,7 @@ HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
 /* Fill the header of a state in memory of size bytes. Fails if it needs another size: a resource may have changed since
  * the size was told. */
 HSEP_API hsep_status hsep_state_begin(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
-    size_t size, char message[]);
-
-/* Check the first bytes of what may be a state of that kind and of expected bytes, in any alignment. */
-HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
+    hsep_state_header *header, const hsep_context *context, const double values[], size_t needed, size_t size,
     char message[]);
-
-/* Refuse a state whose header fits and whose content does not. */
-HSEP_API hsep_status hsep_state_damaged(char message[]);
 
 #endif

@@ -5,7 +5,7 @@
  */
 #include "hsep_drive.h"
 
-#if defined(HSEP_DRIVE_KIND)
+#if defined(HSEP_DRIVE)
 
 #include "hsep_check.h"
 #include "hsep_encoder.h"
@@ -50,7 +50,7 @@ HSEP_API hsep_status hsep_model_initialise(
     size_t needed = 0;
     drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, HSEP_DRIVE_KIND, needed, size, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
         hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -123,24 +123,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     values[HSEP_VR_x] = x;
     values[HSEP_VR_v] = 0.0;
     values[HSEP_VR_x_meas] = drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
-}
-
-HSEP_API hsep_status hsep_model_check_state(
-    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
-{
-    size_t expected = 0;
-    hsep_encoder encoder;
-    double end = 0.0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, HSEP_DRIVE_KIND, expected, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
-    memcpy(&encoder, (const char *)state + offsetof(drive_state, encoder), sizeof encoder);
-    memcpy(&end, (const char *)state + offsetof(drive_state, end), sizeof end);
-    const size_t before = offsetof(drive_state, drive);
-    const int valid = isfinite(end) && hsep_within(&encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
-                      hsep_drive_valid(context, (const char *)state + before, size - before, values);
-    return valid ? HSEP_OK : hsep_state_damaged(message);
 }
 
 #else

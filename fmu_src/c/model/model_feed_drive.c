@@ -43,12 +43,6 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 
 HSEP_API double hsep_drive_velocity(const hsep_drive *self) { return hsep_feed_drive_v(self); }
 
-HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[])
-{
-    (void)context, (void)values;
-    return hsep_within(block, bytes / sizeof(double), HSEP_PREDICTION_MAX);
-}
-
 #else
 typedef int hsep_no_feed_drive; /* a translation unit must not be empty */
 #endif

@@ -5,7 +5,7 @@
  */
 #include "hsep_online.h"
 
-#if defined(HSEP_ONLINE_KIND)
+#if defined(HSEP_ONLINE)
 
 #include "hsep_check.h"
 #include "hsep_inputs.h"
@@ -67,7 +67,7 @@ HSEP_API hsep_status hsep_model_initialise(
     const double start = values[HSEP_VR_x_d_ahead];
     if (online_checked(context, values, &parameters, message) != HSEP_OK ||
         hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -120,26 +120,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     }
     hsep_online_write(context, &self->online, window, values);
     return status;
-}
-
-HSEP_API hsep_status hsep_model_check_state(
-    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
-{
-    size_t expected = 0;
-    hsep_online_parameters parameters;
-    online_state head;
-    if (online_checked(context, values, &parameters, message) != HSEP_OK ||
-        hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, expected, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
-    memcpy(&head, state, sizeof head);
-    const char *online = (const char *)state + (sizeof head - sizeof head.online);
-    if (!hsep_inputs_valid(&head.inputs, values[HSEP_VR_T_s]) ||
-        !HSEP_ONLINE(block_valid)(online, &parameters, (uint64_t)head.inputs.clock.k)) {
-        return hsep_state_damaged(message);
-    }
-    return HSEP_OK;
 }
 
 #else

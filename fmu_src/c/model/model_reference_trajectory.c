@@ -25,7 +25,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define TRAJECTORY_KIND UINT64_C(0x59524F544A415254) /* any number that no other model has */
 #define TRAJECTORY_NAME_SIZE 32
 
 static const double trajectory_tolerance = 1e-6; /* of T_s */
@@ -106,7 +105,7 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     /* Memory was taken for the samples that were there when hsep_model_size looked. */
     if (trajectory_bytes(count, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, TRAJECTORY_KIND, needed, size, message) != HSEP_OK) {
+        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK) {
         fclose(file);
         return HSEP_REFUSED;
     }
@@ -161,25 +160,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
         values[HSEP_VR_r] = first;
     }
     fclose(file);
-}
-
-HSEP_API hsep_status hsep_model_check_state(
-    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
-{
-    size_t expected = 0;
-    trajectory_state head;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, TRAJECTORY_KIND, expected, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
-    memcpy(&head, state, sizeof head);
-    const double before = (double)(sizeof head - sizeof head.trajectory);
-    /* size follows from the number of samples in the file, so it bounds the state's own count. */
-    if (!hsep_clock_valid(&head.clock) || head.clock.T_s != values[HSEP_VR_T_s] ||
-        before + hsep_trajectory_size(head.trajectory.count) != (double)size) {
-        return hsep_state_damaged(message);
-    }
-    return HSEP_OK;
 }
 
 #else

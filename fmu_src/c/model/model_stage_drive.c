@@ -60,18 +60,6 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 
 HSEP_API double hsep_drive_velocity(const hsep_drive *self) { return self->v; }
 
-HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[])
-{
-    hsep_stage stage;
-    memcpy(&stage, block, sizeof stage);
-    const hsep_stage_settings settings = stage_settings(values);
-    const double numbers[] = {stage.friction_gain, stage.start, stage.acting, stage.last_x_d, stage.v_d, stage.v};
-    return hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
-           hsep_within(
-               (const char *)block + sizeof stage, (bytes - sizeof stage) / sizeof(double), HSEP_PREDICTION_MAX) &&
-           hsep_stage_valid(block, context->n_modes, &settings) && stage.clock.T_s == values[HSEP_VR_T_s];
-}
-
 #else
 typedef int hsep_no_stage_drive; /* a translation unit must not be empty */
 #endif

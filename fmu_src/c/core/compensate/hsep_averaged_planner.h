@@ -102,8 +102,6 @@ hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hse
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start);
-HSEP_API int hsep_averaged_planner_valid(
-    const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* State before a window. */
 typedef struct {

@@ -60,20 +60,3 @@ HSEP_API void hsep_averaged_planner_init(
             settings->dead_time, settings->T_s, (hsep_hold)settings->input_hold);
     }
 }
-
-HSEP_API int hsep_averaged_planner_valid(
-    const void *block, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
-    hsep_averaged_planner got;
-    memcpy(&got, block, sizeof got);
-    (void)averaged_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_AVERAGED_PREDICT && got.judges <= 1 && got.follows <= got.judges &&
-           got.varied <= got.preview + got.late && got.predicted <= got.preview + got.late &&
-           got.steps <= HSEP_AVERAGED_STEPS && got.columns >= got.n_pinned && got.columns <= got.n &&
-           got.part < HSEP_LINEARISED_EXPERTS && got.rows >= got.n_pinned && got.rows <= got.n &&
-           got.tries <= HSEP_AVERAGED_TRIES && got.planned <= 2 && got.bounded <= 1 &&
-           hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);
-}

@@ -83,10 +83,6 @@ HSEP_API hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
-/* Whether a block, in any alignment and of hsep_compensator_block_size(parameters) bytes, is a valid state for these
- * parameters at sample k: hsep_compensator_block_init would lay it out so, and every index lies within it. */
-HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_int k);
-
 /* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
  * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
 HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[]);

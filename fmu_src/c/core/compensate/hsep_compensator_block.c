@@ -76,25 +76,3 @@ HSEP_API void hsep_compensator_block_init(
         (size_t)(4 * parameters->planner.spacing) * sizeof(hsep_real));
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
 }
-
-HSEP_API int hsep_compensator_block_valid(const void *block, const hsep_compensator_parameters *parameters, hsep_int k)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-    hsep_compensator got;
-    hsep_predictor online;
-    memcpy(&got, block, sizeof got);
-    (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
-    memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
-    return memcmp(&got, block, sizeof got) == 0 && got.compensate <= HSEP_SEP_HYBRID &&
-           got.compensate_next <= HSEP_SEP_HYBRID && got.change_max_next > 0.0 && isfinite(got.change_max_next) &&
-           got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.missing <= got.n_lost &&
-           got.over <= HSEP_OVER && got.was_reset <= 1 && got.error_max >= 0.0 && isfinite(got.error_max) &&
-           (online.divergence ||
-            hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
-           hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
-           (!got.averaged ||
-            hsep_averaged_planner_valid(hsep_at_bytes(block, got.averaged), &model, &parameters->planner)) &&
-           hsep_predictor_block_valid(hsep_at_bytes(block, got.predictor), predictor, k);
-}

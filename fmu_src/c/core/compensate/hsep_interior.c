@@ -59,14 +59,6 @@ HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n)
     return interior_lay_out(NULL, preview, n, &arrays);
 }
 
-HSEP_API int hsep_interior_valid(const void *block, hsep_int first_max)
-{
-    hsep_interior got;
-    memcpy(&got, block, sizeof got);
-    return got.first <= first_max && got.steps <= got.tolerance.steps && got.part < HSEP_INTERIOR_PARTS &&
-           got.tolerance.steps <= HSEP_QP_STEPS;
-}
-
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
 {
     interior_arrays a;

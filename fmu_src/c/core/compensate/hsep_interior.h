@@ -49,10 +49,6 @@ typedef struct {
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
-/* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of fixed
- * splines. */
-HSEP_API int hsep_interior_valid(const void *block, hsep_int first_max);
-
 /* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
  * tolerance. */
 HSEP_API void hsep_interior_begin(

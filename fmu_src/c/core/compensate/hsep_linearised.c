@@ -81,14 +81,6 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
         settings->T_s, (hsep_hold)settings->input_hold);
 }
 
-HSEP_API int hsep_linearised_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
-    hsep_linearised got;
-    return HSEP_LAID_OUT(got, block, linearised_lay_out(&got, parameters)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
-}
-
 /* Index of a disturbance's first weight among the weights of an expert. */
 static hsep_int linearised_first(const hsep_linearised *self, const hsep_averaged *model)
 {

@@ -52,16 +52,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
         (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
 }
 
-HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
-{
-    hsep_planner got;
-    memcpy(&got, block, sizeof got);
-    (void)planner_lay_out(&got, parameters); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 &&
-           hsep_splines_valid(hsep_at_bytes(block, got.splines), parameters->preview, parameters->spacing) &&
-           hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
-}
-
 HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max)
 {
     hsep_splines_limit((hsep_splines *)hsep_at(self, self->splines), 0, change_max);

@@ -40,8 +40,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 /* Splines that a bounded plan leaves as they are. */
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
-HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
-
 /* Set another bound on |delta| from the next plan on, m; where the remainder of the last plan is larger, it is the
  * bound. */
 HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);

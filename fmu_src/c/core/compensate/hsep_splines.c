@@ -38,14 +38,6 @@ HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing)
     return splines_lay_out(&(hsep_splines){0}, preview, spacing);
 }
 
-HSEP_API int hsep_splines_valid(const void *block, hsep_int preview, hsep_int spacing)
-{
-    hsep_splines got;
-    memcpy(&got, block, sizeof got);
-    (void)splines_lay_out(&got, preview, spacing); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0;
-}
-
 /* The uniform cubic B-spline on the knots 0, 1, 2, 3, 4. */
 static hsep_real splines_b(hsep_real u)
 {

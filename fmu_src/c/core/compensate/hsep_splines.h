@@ -40,8 +40,6 @@ HSEP_API void hsep_splines_init(
 /* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
 HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit);
 
-HSEP_API int hsep_splines_valid(const void *block, hsep_int preview, hsep_int spacing);
-
 /* Sum of the first count splines at sample k, with coefficients c, (count,), which begin with splines -3, -2, -1. 4
  * multiply-adds. */
 HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k);

@@ -103,15 +103,6 @@ HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *set
     return stage_lay_out(&(hsep_stage){0}, n_modes, settings);
 }
 
-HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes, const hsep_stage_settings *settings)
-{
-    hsep_stage got;
-    memcpy(&got, block, sizeof got);
-    (void)stage_lay_out(&got, n_modes, settings); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_clock_valid(&got.clock) &&
-           (got.oldest < got.n_line || got.oldest == 0);
-}
-
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start)

@@ -91,10 +91,6 @@ HSEP_ASSERT_WORDS(hsep_stage, 23);
 /* Bytes of the block, counted in double. */
 HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
 
-/* Whether a block, in any alignment, is one that hsep_stage_init with so many modes and these settings began, with a
- * valid clock. */
-HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes, const hsep_stage_settings *settings);
-
 /* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,

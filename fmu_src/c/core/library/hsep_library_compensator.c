@@ -27,13 +27,3 @@ HSEP_API hsep_began hsep_compensator_init(
     hsep_compensator_begin(self);
     return began;
 }
-
-HSEP_API int hsep_compensator_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k)
-{
-    const size_t expected = hsep_compensator_size(parameters);
-    if (expected == 0 || size != expected) {
-        return 0;
-    }
-    const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
-    return hsep_compensator_block_valid(bytes, &derived, k);
-}

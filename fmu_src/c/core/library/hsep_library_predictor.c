@@ -23,13 +23,3 @@ HSEP_API hsep_began hsep_predictor_init(
     }
     return began;
 }
-
-HSEP_API int hsep_predictor_valid(const void *bytes, size_t size, const hsep_parameters *parameters, hsep_int k)
-{
-    const size_t expected = hsep_predictor_size(parameters);
-    if (expected == 0 || size != expected) {
-        return 0;
-    }
-    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
-    return hsep_predictor_block_valid(bytes, &derived, k);
-}

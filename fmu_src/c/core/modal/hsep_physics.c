@@ -108,13 +108,6 @@ HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time)
     return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
 }
 
-HSEP_API int hsep_physics_valid(const void *block, hsep_int n_modes, hsep_int dead_time)
-{
-    hsep_physics got;
-    return HSEP_LAID_OUT(got, block, physics_lay_out(&got, n_modes, dead_time)) &&
-           (got.oldest == 0 || got.oldest < dead_time);
-}
-
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold)
 {

@@ -41,7 +41,6 @@ HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time);
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold);
-HSEP_API int hsep_physics_valid(const void *block, hsep_int n_modes, hsep_int dead_time);
 
 /* Begin with a state, (2 n_modes + dead_time,), m: the modes', then the commands within the dead time, oldest first. */
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);

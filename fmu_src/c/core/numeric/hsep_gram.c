@@ -27,15 +27,6 @@ HSEP_API void hsep_gram_init(hsep_gram *self, hsep_int n)
     (void)gram_lay_out(self, n);
 }
 
-HSEP_API int hsep_gram_valid(const void *block, hsep_int n)
-{
-    hsep_gram got;
-    memcpy(&got, block, sizeof got);
-    (void)gram_lay_out(&got, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.waiting <= HSEP_GRAM_TOGETHER && got.n_rows >= 0.0 &&
-           got.n_rows <= HSEP_PREDICTION_MAX;
-}
-
 /* Add row a of the products of four rows, from its diagonal on, to the sums; their rounding errors are kept in the
  * carries and added back next time (Kahan 1965). */
 static void gram_add_row(

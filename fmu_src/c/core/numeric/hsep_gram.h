@@ -30,7 +30,6 @@ HSEP_ASSERT_WORDS(hsep_gram, 6);
 HSEP_API hsep_real hsep_gram_size(hsep_int n);
 /* Fill the block for n >= 1 features, without rows. */
 HSEP_API void hsep_gram_init(hsep_gram *self, hsep_int n);
-HSEP_API int hsep_gram_valid(const void *block, hsep_int n);
 
 /* Where the next row goes, (n + 1,): phi, then its target; what is there before does not matter. */
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);

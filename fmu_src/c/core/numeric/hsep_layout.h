@@ -4,9 +4,8 @@
  * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of
  * one size alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  *
- * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, hsep_NAME_init fills it
- * with nothing learned, and hsep_NAME_valid tells whether a block, in any alignment, is one that init with the same
- * parameters began. All functions of a block are reentrant and allocate nothing.
+ * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, and hsep_NAME_init fills
+ * it with nothing learned. All functions of a block are reentrant and allocate nothing.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H
@@ -45,16 +44,5 @@ static inline const hsep_real *hsep_at_const(const void *block, hsep_int offset)
 {
     return (const hsep_real *)block + offset;
 }
-
-/* The same in bytes of any alignment, to be read by memcpy. */
-static inline const void *hsep_at_bytes(const void *bytes, hsep_int offset)
-{
-    return (const char *)bytes + offset * sizeof(hsep_real);
-}
-
-/* Whether the struct of a block, in any alignment, is as its lay-out function leaves it, which changes nothing where it
- * is sound; got: becomes a copy of it. */
-#define HSEP_LAID_OUT(got, block, lay_out) \
-    (memcpy(&(got), block, sizeof(got)), (void)(lay_out), memcmp(&(got), block, sizeof(got)) == 0)
 
 #endif

@@ -23,14 +23,6 @@ static hsep_real regression_lay_out(hsep_regression *self, hsep_int n)
 
 HSEP_API hsep_real hsep_regression_size(hsep_int n) { return regression_lay_out(&(hsep_regression){0}, n); }
 
-HSEP_API int hsep_regression_valid(const void *block, hsep_int n)
-{
-    hsep_regression got;
-    memcpy(&got, block, sizeof got);
-    (void)regression_lay_out(&got, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0;
-}
-
 HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real lambda)
 {
     memset(self, 0, (size_t)hsep_regression_size(n));

@@ -36,7 +36,6 @@ HSEP_API hsep_real hsep_regression_size(hsep_int n);
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
 HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real lambda);
-HSEP_API int hsep_regression_valid(const void *block, hsep_int n);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self);

@@ -38,13 +38,6 @@ HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int 
     (void)solution_lay_out(self, n_head, n_tail, room);
 }
 
-HSEP_API int hsep_solution_valid(const void *block, hsep_int n_head, hsep_int n_tail, hsep_int room)
-{
-    hsep_solution got;
-    return HSEP_LAID_OUT(got, block, solution_lay_out(&got, n_head, n_tail, room)) && got.factored <= got.n_head &&
-           got.waiting <= got.room && got.begun <= 1 && got.finished <= 1 && got.completed <= 1;
-}
-
 /* The rows of the factor behind the head. */
 static hsep_real *solution_tail(hsep_solution *self)
 {

@@ -60,7 +60,6 @@ HSEP_ASSERT_WORDS(hsep_solution, 19);
 /* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
 HSEP_API hsep_real hsep_solution_size(hsep_int n_head, hsep_int n_tail, hsep_int room);
 HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room);
-HSEP_API int hsep_solution_valid(const void *block, hsep_int n_head, hsep_int n_tail, hsep_int room);
 
 /* Give up the rows and the factor so far; the next solution has not begun. */
 HSEP_API void hsep_solution_reset(hsep_solution *self);

@@ -6,7 +6,6 @@ static const double clock_tolerance = 0.05; /* of T_s: importers' times may be w
 static const double clock_noticed = 1e-3;   /* of T_s: deviations beyond it are warned of */
 static const double clock_spacings = 8.0;   /* of doubles at t: a few roundings of the importer's arithmetic */
 static const double clock_split = 134217729.0; /* 2^27 + 1, splits a double into two halves (Veltkamp 1968) */
-static const double clock_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
 
 static double clock_resolution(double t) { return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t)); }
 
@@ -74,10 +73,4 @@ HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_c
     step->first = latched ? self->T_s - self->since : 0.0;
     step->inside = step->n_latched > 1 - latched; /* where it is not read yet, the last instant is the step's start */
     return 1;
-}
-
-HSEP_API int hsep_clock_valid(const hsep_clock *self)
-{
-    return self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 && (double)self->k < clock_samples_max &&
-           self->since >= 0.0 && self->since <= self->T_s && fabs(self->carry) <= self->since && isfinite(self->end);
 }

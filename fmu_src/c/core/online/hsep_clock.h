@@ -52,7 +52,4 @@ HSEP_API int hsep_clock_latched(const hsep_clock *self);
  * step->after. Fails, and returns 0, if t is not where the last step ended. */
 HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step);
 
-/* Whether the fields of a clock from a state are in range. */
-HSEP_API int hsep_clock_valid(const hsep_clock *self);
-
 #endif

@@ -83,10 +83,6 @@ HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *pa
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
-/* Whether a block, in any alignment and of hsep_predictor_block_size(parameters) bytes, is a valid state for these
- * parameters at sample k: hsep_predictor_block_init would lay it out so, and every index lies within it. */
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_int k);
-
 /* The residual model, and its parameters. */
 HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);

@@ -105,28 +105,3 @@ HSEP_API void hsep_predictor_block_init(
         hsep_start_init((hsep_start *)hsep_at(self, self->motion), &model);
     }
 }
-
-HSEP_API int hsep_predictor_block_valid(const void *block, const hsep_predictor_parameters *parameters, hsep_int k)
-{
-    hsep_predictor got;
-    memcpy(&got, block, sizeof got);
-    (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
-    const hsep_real sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
-    int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
-        k % got.Np < got.n_published && got.n_physics <= got.Np && got.divergence <= HSEP_DIVERGES_X_DM &&
-        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
-        hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np, got.n) &&
-        (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &model)) &&
-        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
-        hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
-    const hsep_real residuals[2] = {got.residual, got.held};
-    const int missing = isnan(got.next) && parameters->averaging.averaging;
-    sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX) &&
-            (missing || hsep_within(&got.next, 1, HSEP_PREDICTION_MAX));
-    for (int i = 0; i < 4; i++) {
-        sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
-    }
-    return sound;
-}

@@ -35,13 +35,6 @@ HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *s
     hsep_regression_init(hsep_paper_regression(self), self->features, settings->lambda);
 }
 
-HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *settings)
-{
-    hsep_paper got;
-    return HSEP_LAID_OUT(got, block, paper_lay_out(&got, settings)) &&
-           hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features);
-}
-
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias)
 {
     const hsep_real *w = hsep_at_const(self, self->weights), *w_x = w + 1;

@@ -32,7 +32,6 @@ HSEP_ASSERT_WORDS(hsep_paper, 6);
 
 HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
-HSEP_API int hsep_paper_valid(const void *block, const hsep_predictor_settings *settings);
 
 HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);
 

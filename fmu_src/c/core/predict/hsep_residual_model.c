@@ -46,14 +46,6 @@ HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_
     }
 }
 
-HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_residual_model got;
-    return HSEP_LAID_OUT(got, block, residual_lay_out(&got, parameters)) && got.learning <= 1 &&
-           (got.averaged ? hsep_averaged_valid(hsep_at_bytes(block, got.averaged), parameters)
-                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
-}
-
 /* Gram matrix of a factor of the averaged model. */
 static hsep_gram *residual_gram(hsep_residual_model *self, hsep_int factor)
 {

@@ -25,7 +25,6 @@ HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters
 /* Fill the block, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_residual_init(
     hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
-HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* The implementation; NULL if it is the other one. */
 HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);

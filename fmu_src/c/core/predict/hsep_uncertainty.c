@@ -42,13 +42,6 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_in
     self->factor = self->ratio = 1.0;
 }
 
-HSEP_API int hsep_uncertainty_valid(const void *block, hsep_int Np, hsep_int n)
-{
-    hsep_uncertainty got;
-    return HSEP_LAID_OUT(got, block, uncertainty_lay_out(&got, Np, n)) && hsep_uncertainty_sound(&got) &&
-           hsep_within(&got.least, 1, HSEP_PREDICTION_MAX) && got.least >= 0.0;
-}
-
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
 {
     return hsep_in_ranges(self->theta, HSEP_N_UNCERTAINTY, uncertainty_ranges);

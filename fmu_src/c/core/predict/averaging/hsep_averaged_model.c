@@ -105,26 +105,6 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
     }
 }
 
-HSEP_API int hsep_averaged_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_averaged got;
-    int sound = HSEP_LAID_OUT(got, block, averaged_lay_out(&got, parameters)) &&
-                (got.leading == HSEP_ARX_RESIDUAL || got.leading == HSEP_ARX_COMMAND) && got.followed <= got.Np &&
-                got.known <= got.followed && got.reach.known <= 1 &&
-                hsep_within(&got.reach.farthest, 1, HSEP_PREDICTION_MAX) && got.settled <= 1 &&
-                hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters) &&
-                hsep_command_valid(hsep_at_bytes(block, got.command), parameters) &&
-                hsep_recall_valid(hsep_at_bytes(block, got.recall), parameters);
-    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
-        sound = sound && hsep_warm_start_valid(hsep_at_bytes(block, got.evidence[i]), averaged_n_features(&got, i));
-    }
-    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
-        const hsep_expert_shape shape = averaged_shape(&got, i);
-        sound = sound && got.predicted[i] <= 1 && hsep_expert_valid(hsep_at_bytes(block, got.experts[i]), &shape);
-    }
-    return sound;
-}
-
 HSEP_API int hsep_averaged_doubts(hsep_averaged *self)
 {
     return hsep_warm_start_earlier(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL))->n_rows > 0.0;

@@ -97,7 +97,6 @@ HSEP_ASSERT_WORDS(
 HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start);
-HSEP_API int hsep_averaged_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Parts of the block; of the experts not hold. */
 static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)

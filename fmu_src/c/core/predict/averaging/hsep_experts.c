@@ -53,13 +53,6 @@ HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape
     }
 }
 
-HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape)
-{
-    hsep_expert got;
-    return HSEP_LAID_OUT(got, block, expert_lay_out(&got, shape)) &&
-           hsep_solution_valid(hsep_at_bytes(block, got.solution), shape->p, shape->n_static, shape->room);
-}
-
 /* Least sum of squares that counts, of targets whose squares have a sum. */
 static hsep_real expert_resolved(hsep_real square)
 {

@@ -60,7 +60,6 @@ HSEP_API void hsep_residual_scale_follow(
 
 HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
-HSEP_API int hsep_expert_valid(const void *block, const hsep_expert_shape *shape);
 
 static inline hsep_solution *hsep_expert_solution(hsep_expert *self)
 {

@@ -67,17 +67,6 @@ HSEP_API void hsep_disturbances_init(
     }
 }
 
-HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_disturbances got;
-    int sound = HSEP_LAID_OUT(got, block, disturbances_lay_out(&got, parameters));
-    for (hsep_int i = 0; i < 2 * got.count; i++) {
-        const void *filter = hsep_at_bytes(block, got.filters + i * got.filter_words);
-        sound = sound && hsep_physics_valid(filter, parameters->n_modes, parameters->settings->dead_time);
-    }
-    return sound;
-}
-
 HSEP_API void hsep_disturbances_begin_in_motion(
     hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale)
 {
@@ -317,12 +306,6 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_paramete
         const hsep_real age = i > 0 ? (hsep_real)(i - 1) / (hsep_real)self->p : 0.0;
         hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_AVERAGING_LAST_LAG, age));
     }
-}
-
-HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_command got;
-    return HSEP_LAID_OUT(got, block, command_lay_out(&got, parameters));
 }
 
 HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature)

@@ -61,7 +61,6 @@ HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parame
 /* Fill the block, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
-HSEP_API int hsep_disturbances_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Begin in motion, which went on as the n samples of the first window begin, (n,) m each. */
 HSEP_API void hsep_disturbances_begin_in_motion(
@@ -114,7 +113,6 @@ HSEP_ASSERT_WORDS(hsep_command, 8);
 HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest. */
 HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters);
-HSEP_API int hsep_command_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
 HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature);

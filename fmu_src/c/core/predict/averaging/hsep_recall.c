@@ -34,14 +34,6 @@ HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters
     self->lag = self->n;
 }
 
-HSEP_API int hsep_recall_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_recall got;
-    return HSEP_LAID_OUT(got, block, recall_lay_out(&got, parameters)) && got.heard < got.Np &&
-           got.oldest < got.stride && got.newest < got.size + got.stride && got.compared < got.size + got.stride &&
-           got.lag >= got.n && (got.lag == got.n || got.lag < got.size) && (got.remembered < got.size || got.size == 0);
-}
-
 /* Compare the latched change with those first ... last - 1 samples before it. */
 static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last)
 {

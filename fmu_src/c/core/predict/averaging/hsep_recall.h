@@ -36,7 +36,6 @@ HSEP_ASSERT_WORDS(hsep_recall, 16);
 HSEP_API hsep_real hsep_recall_size(const hsep_residual_parameters *parameters);
 /* Fill the block, at rest. */
 HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters *parameters);
-HSEP_API int hsep_recall_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
 HSEP_API void hsep_recall_hear(hsep_recall *self, hsep_real command);

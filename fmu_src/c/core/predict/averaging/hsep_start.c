@@ -56,14 +56,6 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *
     hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 
-HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters *parameters)
-{
-    hsep_start got;
-    return HSEP_LAID_OUT(got, block, start_lay_out(&got, parameters)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->settings->dead_time) &&
-           hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_states);
-}
-
 /* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
  * measurement is late. */
 static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_int count)

@@ -27,7 +27,6 @@ HSEP_ASSERT_WORDS(hsep_start, 11);
 
 HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters);
 HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters);
-HSEP_API int hsep_start_valid(const void *block, const hsep_residual_parameters *parameters);
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */
 HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[]);

@@ -20,14 +20,6 @@ HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n)
     hsep_gram_init(hsep_warm_start_earlier(self), n);
 }
 
-HSEP_API int hsep_warm_start_valid(const void *block, hsep_int n)
-{
-    hsep_warm_start got;
-    return HSEP_LAID_OUT(got, block, warm_start_lay_out(&got, n)) &&
-           hsep_gram_valid(hsep_at_bytes(block, got.of_run), n) &&
-           hsep_gram_valid(hsep_at_bytes(block, got.earlier), n);
-}
-
 HSEP_API hsep_real hsep_warm_start_n_rows(hsep_warm_start *self)
 {
     return hsep_warm_start_of_run(self)->n_rows + hsep_warm_start_earlier(self)->n_rows;

@@ -14,7 +14,6 @@ HSEP_ASSERT_WORDS(hsep_warm_start, 2);
 /* Bytes of the block, counted as a number so that no size can overflow; n: features. */
 HSEP_API hsep_real hsep_warm_start_size(hsep_int n);
 HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n);
-HSEP_API int hsep_warm_start_valid(const void *block, hsep_int n);
 
 static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self)
 {
