@@ -104,7 +104,7 @@ def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, val
     if values.get("averaging"):
         assert_agreement(new_stream, 150 if values.get("Np") == 1 else 650, values, 1e-12, path="spiral")
     else:
-        assert_agreement(new_stream, 900, values, 1e-11)
+        assert_agreement(new_stream, 700, values, 1e-11)
 
 
 def faulty(k: int, x_meas: float, last: float) -> float:
