@@ -95,3 +95,25 @@ def test_another_run_begins_at_rest_and_remembers() -> None:
     np.testing.assert_array_equal(found, residuals[:20])
     assert before == 0.0
     assert alike == 1.0
+
+
+def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None:
+    """Commands that were known ahead at the end of a run are not part of the next one."""
+    rng = np.random.default_rng(5)
+    path, residuals = np.cumsum(rng.normal(size=140)), rng.normal(size=100)
+    memory = Memory.init(SIZE, 20)
+    for k in range(0, 100, 20):
+        memory = memory.hear(path[k : k + 60], 20).remember(residuals[k : k + 20])
+    path -= path[0]
+    memory = memory.restart()
+    for k in range(0, 60, 20):
+        memory = memory.hear(path[k : k + 20], 20).remember(residuals[k : k + 20])
+    recalled, before, _ = memory.hear(path[60:80], 20).recalled(20)
+    np.testing.assert_array_equal(recalled, residuals[60:80])
+    assert before == residuals[59]
+
+
+def test_another_run_begins_without_a_residual() -> None:
+    memory = Memory.init(SIZE, 20).hear(np.arange(20.0), 20).remember(np.full(20, 3.0)).restart()
+    assert memory.residuals[-1] == 0.0
+    np.testing.assert_array_equal(memory.residuals[-21:-1], 3.0)

@@ -56,9 +56,16 @@ class Memory:
         return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), 0.0, 0)
 
     def restart(self) -> Memory:
-        """Return the memory at the beginning of another run, at rest at its start."""
-        here = self.commands - self.commands[-1]
-        return replace(self, commands=here, distances=np.zeros_like(self.distances), moved=0.0, n_ahead=0)
+        """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
+
+        Commands that were known ahead and never measured are forgotten: each command stands beside its residual.
+        """
+        n_measured = max(len(self.commands) - self.n_ahead, 0)
+        unknown = np.full(len(self.commands) - n_measured, self.commands[0])
+        commands = np.concatenate((unknown, self.commands[:n_measured]))
+        commands = np.append(commands[1:], commands[-1]) - commands[-1]
+        residuals = np.append(self.residuals[1:], 0.0)[: len(self.residuals)]  # also with no memory
+        return Memory(commands, residuals, np.zeros_like(self.distances), 0.0, 0)
 
     def hear(self, path: Array, Np: int) -> Memory:
         """Return the memory that knows the commands ahead, ``(m,)``, m."""
