@@ -62,7 +62,9 @@ console = _WholeLines(emoji=False, markup=False, highlight=False)
 
 
 def print_judged(judged: Judged, title: str, verdict: str) -> None:
-    """Print the errors of a replay, and what they mean."""
+    """Print the errors of a replay, what they mean, and what the controller says of itself."""
+    from ..fitting.advice import OF_ITSELF
+
     head, rows = judged.figures()
     table = Table(head[0], title=title, box=box.SIMPLE, pad_edge=False)
     for column in head[1:]:
@@ -71,6 +73,8 @@ def print_judged(judged: Judged, title: str, verdict: str) -> None:
         table.add_row(*row)
     console.print(table)
     console.print(verdict)
+    if said := judged.of_the_controller():
+        console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
 def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:
@@ -177,7 +181,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
         for one in listed:
             n = "" if one.n_samples is None else str(one.n_samples)
             interval = "" if one.interval is None else f"{one.interval:.9g}"
-            table.add_row(one.name, one.unit, n, interval, roles.get(one.role, ""))
+            table.add_row(one.name, one.unit, n, interval, roles.get(one.role, one.role.replace("_", " ")))
         console.print(table)
         missing = [role for role in ("x_d", "x") if role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):

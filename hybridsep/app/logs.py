@@ -60,6 +60,7 @@ def backtest(
     from ..fitting.replay import Recording, knew, replay
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
+    from ..logs.controller import controller_of
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..predict.predictor import HybridPredictor
@@ -98,7 +99,7 @@ def backtest(
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     scores, words = replayed.backtest, whole_log_words(warm=weights is not None, known=known)
-    judged = Judged(replayed, read.T_s, shown, "the whole log", known=known)
+    judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, controller=controller_of([read]))
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)
     for path in saved:
@@ -113,7 +114,7 @@ def backtest(
     verdict = str(replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples))
     if as_json:
         figures = {name.replace("_um", f"_u{axis.unit}"): value for name, value in scores.summary().items()}
-        more = {"findings": findings_table(findings), "advice": recommendation(judged)}
+        more = {"findings": findings_table(findings), "advice": recommendation(judged), "controller": judged.controller}
         print_json({**figures, "judged": replayed.judgement(), "verdict": verdict, **more})
         return
     console.print(f"{log.name}: {extent([read])}")

@@ -13,11 +13,12 @@ from ..base.metrics import rms_ratio
 from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
+from ..logs.controller import Controller
 from ..logs.log import Log
 from ..logs.units import DisplayUnits
 from .replay import Replay
 
-__all__ = ["Judged", "extent", "peers_in_words", "recommendation", "whole_log_words"]
+__all__ = ["OF_ITSELF", "Judged", "extent", "peers_in_words", "recommendation", "whole_log_words"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
@@ -25,6 +26,9 @@ _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the la
 _STANDSTILL = 1e-3
 """Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
 
+
+OF_ITSELF = "What the controller says of itself"
+"""Heading of :meth:`Judged.of_the_controller`."""
 
 _KNOWN = (
     "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log of the axis."
@@ -52,6 +56,8 @@ class Judged:
         Whether the log's first half had too little motion to identify the axis from.
     known : bool
         Whether the predictor had been trained with the log.
+    controller : Controller, optional
+        What the controller says of itself; None where the logs have none of its signals.
     """
 
     replay: Replay
@@ -62,11 +68,16 @@ class Judged:
     period: str = ""
     unidentified: bool = False
     known: bool = False
+    controller: Controller | None = None
 
     @cached_property
     def unit(self) -> tuple[float, str]:
         """Factor and name of the unit in which errors are shown."""
         return self.shown.error(self.replay.rms()[0])
+
+    def of_the_controller(self) -> list[str]:
+        """Return what the controller says of itself, in words; none where it says nothing."""
+        return self.controller.lines(self.shown, self.replay.Np) if self.controller else []
 
     def figures(self) -> tuple[list[str], list[list[str]]]:
         """Return head and rows of a table of the errors over the test samples."""

@@ -24,6 +24,7 @@ from ..identify.model import IdentifiedModel, machine_of
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
 from ..logs.checks import Finding, checked
+from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
 from ..machines.machine import Machine
 from ..machines.text import machine_text
@@ -222,6 +223,7 @@ class Fit:
             "plant": plain(self.plant),
             "tracking": plain(self.tracking) or {},
             "judged": plain(self.judged.replay.judgement()),
+            "controller": plain(self.judged.controller) or {},
         }
 
     def _comments(self) -> list[str]:
@@ -333,6 +335,7 @@ def fit(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,
         period=period,
+        controller=controller_of(logs),
         unidentified=any(one.startswith(TOO_LITTLE) for one in found.findings),
     )
     progress("fitted", 1.0)

@@ -15,7 +15,7 @@ from ..evaluate.reversals import friction_table, reversal_curve
 from ..identify.model import IdentifiedModel
 from ..logs.checks import Finding
 from ..logs.log import Log
-from .advice import Judged, extent, peers_in_words, recommendation
+from .advice import OF_ITSELF, Judged, extent, peers_in_words, recommendation
 from .choice import WORTH, Tried, WindowErrors
 
 __all__ = [
@@ -43,6 +43,9 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     report = Report(title, f"{names} · {extent(logs)} · look-ahead {Np} samples, {look_ahead:.4g} ms")
     report.paragraph(recommendation(judged), "verdict")
     _write_figures(report, judged, heading, how)
+    if said := judged.of_the_controller():
+        report.heading(OF_ITSELF)
+        report.bullets(said)
     if not np.isnan(judged.replay.errors()[0]).all():  # else nothing judges
         _write_time(report, judged)
         _write_horizon(report, judged)

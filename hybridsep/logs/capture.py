@@ -9,12 +9,13 @@ import numpy as np
 
 from ..base.errors import LogError, first_line
 from ..base.signals import Array
+from .names import SIGNALS, axes_of
 from .source import ArraysSource
 
 __all__ = ["CaptureSource"]
 
 _SIGNALS = b'"SignalListHFData"'
-_COUNTER, _COMMANDED, _MEASURED = "CYCLE", "DES_POS", "ENC_POS"
+_COUNTER = "CYCLE"
 _TIME = "t"
 """Name of the time column, which is made from the counter of cycles."""
 
@@ -55,14 +56,13 @@ class CaptureSource(ArraysSource):
         if _COUNTER in self._columns:
             self._columns[_TIME] = 1e-3 * cycle * (self._columns[_COUNTER] - self._columns[_COUNTER][:1])
             self.names.append(_TIME)
-        pairs = {name: name.replace(_COMMANDED, _MEASURED, 1) for name in names if name.startswith(f"{_COMMANDED}|")}
-        self.axes = {axes[x_d]: (x_d, x) for x_d, x in pairs.items() if x in self._columns}
+        self.axes = {axes[x_d]: (x_d, x) for x_d, x in axes_of(names).values()}
         moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(self._columns[x_d]) != 0.0]
         self.axis = moving[0] if moving else ""
         self.assumed_units = {
             name: "deg" if axis.upper().startswith(_ROTARY) else "mm"
             for name, axis in axes.items()
-            if name.split("|")[0] in (_COMMANDED, _MEASURED)
+            if name.split("|")[0] in ("ENC_POS", *SIGNALS.values())
         }
         self.roles = {"t": _TIME} if _TIME in self._columns else {}
 

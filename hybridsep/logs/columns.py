@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import LogError, brief, listed
-from .names import ROLES, axes_of, known_names
+from .names import ROLES, axes_of, known_names, signals_of
 from .source import Block, Source, sample_number
 from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["COUNT", "Column", "channels", "choose_columns", "side_by_side"]
+__all__ = ["COUNT", "Column", "channels", "choose_columns", "side_by_side", "signal_columns"]
 
 COUNT = "such as unit='0.1um' (--unit 0.1um)"
 """Example of the unit of a log in encoder counts, for messages."""
@@ -88,6 +88,16 @@ def choose_columns(
             f"{x.unit.name}; both must be lengths or both angles"
         )
     return found
+
+
+def signal_columns(source: Source, columns: Mapping[str, Column]) -> dict[str, Column]:
+    """Return the columns of a controller's own signals beside a pair, by what they are; in its unit if they state none.
+
+    Of formats whose columns have rates of their own there are none.
+    """
+    found = {} if source.times else signals_of(source.names, columns["x"].name)
+    units = {what: position_unit(_stated(source, name)) or columns["x_d"].unit for what, name in found.items()}
+    return {what: Column(name, units[what], True) for what, name in found.items()}
 
 
 def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tuple[dict[str, str | None], list[str]]:
@@ -220,7 +230,7 @@ class Channel:
 
     name: str
     unit: str = ""  # as the file states it, or the format's convention; empty if there is none
-    role: str = ""  # what it is read as without a word of the user's, ``"t"``, ``"x_d"`` or ``"x"``; empty otherwise
+    role: str = ""  # what it is read as without a word of the user's, ``"t"``, ``"x_d"``, ``"x"`` or a signal
     n_samples: int | None = None  # number of its times, where it has times
     interval: float | None = None  # their mean interval, s
 
@@ -229,9 +239,15 @@ def channels(source: Source) -> list[Channel]:
     """Return a file's columns with their units, roles, samples and intervals, as far as they can be told."""
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
-        roles.update((name, role) for role, name in _positions(source, {}, None)[0].items())
+        pair = _positions(source, {}, None)[0]
+        roles.update((name, what) for what, name in signals_of(source.names, pair["x"] or "").items())
+        roles.update((name, role) for role, name in pair.items())
     with suppress(LogError):
-        roles[source.times.get(next(iter(roles), None) or "") or _name(source, "t", None) or _only_clock(source)] = "t"
+        roles[
+            source.times.get(next((name for name, role in roles.items() if role == "x_d"), None) or "")
+            or _name(source, "t", None)
+            or _only_clock(source)
+        ] = "t"
     t = next((name for name, role in roles.items() if role == "t"), None)
     extents = {clock: _extent(source, clock) for clock in {*source.times.values(), t} if clock is not None}
     units = {**source.assumed_units, **source.units}

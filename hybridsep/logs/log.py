@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,8 +15,9 @@ from ..base.errors import LogError, brief
 from ..base.settings import check
 from ..base.signals import Array
 from .arrays import TableSource
-from .columns import Column, choose_columns, side_by_side
+from .columns import Column, choose_columns, side_by_side, signal_columns
 from .formats import open_source
+from .names import SIGNALS
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
 from .source import Block, Source
 from .times import given_times, recorded_times
@@ -70,6 +71,9 @@ class Log:
         Interval between them, s; ``T_s`` if left out.
     columns : tuple of str
         Names of the columns of the commanded and of the measured position.
+    signals : mapping of str to (n,) array, m or rad
+        What the controller itself says beside the pair, as far as its recorder has it, by the names of
+        :data:`hybridsep.logs.names.SIGNALS`: ``"planned_position"``, ``"following_error"``.
     """
 
     t: Array
@@ -85,6 +89,7 @@ class Log:
     n_recorded: int = 0
     T_recorded: float = 0.0
     columns: tuple[str, str] = ("x_d", "x")
+    signals: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def shown(self) -> DisplayUnits:
@@ -95,7 +100,8 @@ class Log:
         """Return each stretch without a gap as a log of its own."""
         ends = (*self.starts[1:], len(self.t))
         pieces = [slice(start, end) for start, end in zip(self.starts, ends, strict=True)]
-        return [replace(self, t=self.t[s], x_d=self.x_d[s], x_meas=self.x_meas[s], starts=(0,)) for s in pieces]
+        whole = Samples(self.t, self.x_d, self.x_meas, self.T_s, signals=self.signals)
+        return [replace(self, **whole.at(piece)._asdict()) for piece in pieces]
 
 
 def read_log(
@@ -150,15 +156,21 @@ def read_log(
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
     source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
     _check_twins(source, chosen)
+    chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
     read = _checked(path, block, chosen)
+    signals = {
+        what: chosen[what].unit.factor * read[what]
+        for what in SIGNALS
+        if what in chosen and not np.isnan(read[what]).all()
+    }
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
     time = chosen.get("t")
     if time is None:
         times = given_times(len(x_d), given or 0.0)  # given, as there is no time
     else:
         times = recorded_times(path, time.name, read["t"], time.unit.factor, stated=time.stated, given=given)
-    samples, remarks = Samples(times.t, x_d, x_meas, times.T_s, times.starts), list(times.remarks)
+    samples, remarks = Samples(times.t, x_d, x_meas, times.T_s, times.starts, signals), list(times.remarks)
     si = chosen["x_d"].unit.si
     for change, wanted in (
         (whole_turns, si == "rad"),
@@ -184,6 +196,7 @@ def read_log(
         n_recorded=len(x_d),
         T_recorded=times.T_s,
         columns=(chosen["x_d"].name, chosen["x"].name),
+        signals=samples.signals,
     )
 
 
@@ -203,7 +216,7 @@ def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[st
     if n < 2:
         raise LogError(f"{path}: a log needs at least 2 samples, got {n or 'none'}")
     for role, column in columns.items():
-        wrong = np.isinf(read[role]) if role == "x" else ~np.isfinite(read[role])
+        wrong = ~np.isfinite(read[role]) if role in ("t", "x_d") else np.isinf(read[role])
         if wrong.any():
             i = int(np.argmax(wrong))
             raise LogError(f"{path}, {block.where(i)}: column {brief(column.name)} must be finite, got {read[role][i]}")

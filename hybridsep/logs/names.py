@@ -7,16 +7,27 @@ from collections.abc import Mapping, Sequence
 
 from .units import stated_unit
 
-__all__ = ["ROLES", "axes_of", "known_names", "n_known"]
+__all__ = ["ROLES", "SIGNALS", "axes_of", "known_names", "n_known", "signals_of"]
 
 ROLES = ("t", "x_d", "x")
 """Time, commanded and measured position."""
+
+SIGNALS: Mapping[str, str] = {
+    "planned_position": "DES_POS",
+    "loop_command": "CTRL_POS",
+    "following_error": "CTRL_DIFF",
+    "contour_deviation": "CONT_DEV",
+}
+"""What a SINUMERIK says of an axis beside its measured position, and its names: the position that its interpolator
+planned, that which enters the position loop, later and interpolated, the measured one's distance from the latter, and
+its deviation from the contour."""
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
-        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "des_pos", "q_d",
+        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos", "des_pos",
+        "q_d",
     ),
     "x": (
         "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
@@ -67,14 +78,20 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
             (commanded if kinds[0] else measured).setdefault(axis, name)
             if is_position:
                 whole["x_d" if kinds[0] else "x"].append(name)
-    found = {
-        axis: (x_d, measured.get(axis) or positions[axis])
-        for axis, x_d in commanded.items()
-        if axis in measured or axis in positions
-    }
+    measured = {**positions, **measured}
+    found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
+    # A compensation is added to what enters the position loop; what was planned is another instant's
+    found = {axis: (signals_of(names, x).get("loop_command", x_d), x) for axis, (x_d, x) in found.items()}
     if not found and [len(names) for names in whole.values()] == [1, 1]:  # the only ones, whatever their axis
         return {"": (whole["x_d"][0], whole["x"][0])}
     return found
+
+
+def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:
+    """Return the columns of :data:`SIGNALS` of the axis of a measured position: ``CTRL_DIFF|1`` of ``ENC_POS|1``."""
+    _, mark, axis = stated_unit(measured)[0].partition("|")
+    plain = {stated_unit(name)[0]: name for name in names}
+    return {what: plain[own] for what, word in SIGNALS.items() if (own := f"{word}{mark}{axis}") in plain}
 
 
 def _axis(name: str) -> str:

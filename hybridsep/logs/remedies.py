@@ -7,6 +7,7 @@ they are.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,7 @@ class Samples(NamedTuple):
     x_meas: Array  # (n,), m or rad: measured ones, NaN where missing
     T_s: float  # sampling interval, s
     starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
+    signals: Mapping[str, Array] = {}  # (n,) each, m or rad: what the controller says beside them
 
     def segments(self) -> list[Samples]:
         """Return each segment by itself."""
@@ -53,7 +55,8 @@ class Samples(NamedTuple):
 
     def at(self, which: slice | Indices) -> Samples:
         """Return some of the samples; the segments remain where they are."""
-        return self._replace(t=self.t[which], x_d=self.x_d[which], x_meas=self.x_meas[which])
+        signals = {what: values[which] for what, values in self.signals.items()}
+        return self._replace(t=self.t[which], x_d=self.x_d[which], x_meas=self.x_meas[which], signals=signals)
 
 
 def whole_turns(given: Samples) -> tuple[Samples, str]:
@@ -167,11 +170,11 @@ def resampled(given: Samples) -> tuple[Samples, str]:
     for part in given._replace(starts=tuple(starts)).segments():
         n = int((part.t[-1] - part.t[0]) / T_s + 1e-6) + 1
         t = part.t[0] + T_s * np.arange(n)
-        x_d, x_meas = (np.interp(t, part.t, x) for x in (part.x_d, part.x_meas))
+        x_d, x_meas, *signals = (np.interp(t, part.t, x) for x in (part.x_d, part.x_meas, *part.signals.values()))
         after = np.clip(np.searchsorted(part.t, t), 1, len(part.t) - 1)
         apart = np.minimum(np.abs(part.t[after] - t), np.abs(t - part.t[after - 1]))
         x_meas[apart > T_s / 2] = np.nan
-        parts.append(Samples(t, x_d, x_meas, T_s))
+        parts.append(Samples(t, x_d, x_meas, T_s, signals=dict(zip(part.signals, signals, strict=True))))
     said = f"taken at even times, {T_s:g} s apart, linearly between samples; gaps of up to {_BRIDGED} have rows"
     return _joined(parts), f"{said} without measurement (--resample)"
 
@@ -179,4 +182,5 @@ def resampled(given: Samples) -> tuple[Samples, str]:
 def _joined(parts: list[Samples]) -> Samples:
     starts = np.cumsum([0, *(len(part.t) for part in parts[:-1])])
     t, x_d, x_meas = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    return Samples(t, x_d, x_meas, parts[0].T_s, tuple(starts.tolist()))
+    signals = {what: np.concatenate([part.signals[what] for part in parts]) for what in parts[0].signals}
+    return Samples(t, x_d, x_meas, parts[0].T_s, tuple(starts.tolist()), signals)

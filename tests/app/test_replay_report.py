@@ -35,6 +35,23 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
 
 
 @pytest.mark.slow
+def test_what_a_controller_says_is_printed_and_written(hybridsep: Run, tmp_path: Path) -> None:
+    n, page = 1000, tmp_path / "page.html"
+    x_d, x = commanded()[:n], measured(0)[:n]
+    rows = zip(x_d[5:], x_d[:-5], x[:-5], x_d[:-5] - x[:-5], strict=True)
+    text = "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+    log = tmp_path / "log.csv"
+    log.write_text(f"DES_POS|1,CTRL_POS|1,ENC_POS|1,CTRL_DIFF|1\n{text}")
+    replayed = ("backtest", log, *MACHINE, "--T_s", "0.001", "--unit", "m")
+    assert json.loads(hybridsep(*replayed, "--json")[1])["controller"]["look_ahead"] == 5
+    status, out, err = hybridsep(*replayed, "--report", page)
+    assert status == 0, err
+    for shown in (out, page.read_text(encoding="utf-8")):
+        assert "What the controller says of itself" in shown
+        assert "leads the command of the position loop (CTRL_POS) by 5 samples (5 ms)" in shown
+
+
+@pytest.mark.slow
 def test_a_warm_start_is_said(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     saved = tmp_path / "learned.state"
     assert hybridsep("backtest", log, *MACHINE, "--save", saved)[0] == 0
