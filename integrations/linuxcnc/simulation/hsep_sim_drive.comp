@@ -15,7 +15,8 @@ variable double v;
 variable unsigned seed = 1;
 variable int begun;
 variable rtapi_s64 at;
-function _ fp;
+function read fp "what is measured at the begin of a period: before what uses it";
+function write fp "motion under the command: after what commands it";
 license "BSD";
 author "the authors of hybridsep";
 ;;
@@ -34,9 +35,8 @@ static double drive_noise(unsigned *state)
     return sum;
 }
 
-FUNCTION(_)
+FUNCTION(read)
 {
-    const double w = 2.0 * 3.14159265358979323846 * fn, h = 1e-9 * (double)period / SUBSTEPS;
     const rtapi_s64 now = rtapi_get_time(); /* ns */
     if (!begun) {
         x = cmd;
@@ -45,9 +45,13 @@ FUNCTION(_)
         overruns += 1;
     }
     at = now;
-    /* What is measured at the begin of the period, then its motion under the command */
     pos = x;
     fb = resolution * floor((x + noise * drive_noise(&seed)) / resolution + 0.5);
+}
+
+FUNCTION(write)
+{
+    const double w = 2.0 * 3.14159265358979323846 * fn, h = 1e-9 * (double)period / SUBSTEPS;
     for (int i = 0; i < SUBSTEPS; i++) { /* semi-implicit Euler */
         const double deviation = friction * tanh(v / 0.05);
         v += h * (w * w * (cmd - x - deviation) - 2.0 * zeta * w * v);
