@@ -1,8 +1,8 @@
 /* hsep: prediction and pre-compensation of a feed drive's servo error, for C99 and C++11. README.md says how to use it.
  *
  * A predictor, or a compensator, is a block of memory that the caller provides: aligned for hsep_real, of the size that
- * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state. Nothing judges bytes that
- * were changed: keep a checksum with what is stored.
+ * hsep_*_size returns. It is plain data without pointers: a copy of its bytes is a saved state. Nothing judges bytes
+ * that were changed: keep a checksum with what is stored.
  *
  * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
  * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.

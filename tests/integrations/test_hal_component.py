@@ -18,7 +18,10 @@ from hybridsep.base.signals import Array
 from hybridsep.machines.machine import Machine
 
 X = ROOT / "integrations" / "linuxcnc" / "simulation" / "x.toml"
-"""250 mm/s, 2500 mm/s², 10 000 m/s³; look-ahead 60 periods of 1 ms."""
+"""250 mm/s, 2500 mm/s², 10 000 m/s³; 1 kHz."""
+
+PREVIEW = ("compensator.preview=60",)
+"""Look-ahead in the tests, periods: shorter than the machine's, so that they are."""
 
 V, A = 0.25, 2.5e-3
 """Its limits, mm a period and mm a period²."""
@@ -35,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def changed(folder: Path, name: str, *changes: tuple[str, str], source: Path = X) -> Machine:
     """Return a machine with parts of its file's text replaced."""
     text = source.read_text(encoding="utf-8")
-    for old, new in (('name = "x"', f'name = "{name}"'), *changes):
+    for old, new in (('name = "x"', f'name = "{name}"'), ("preview = 100", "preview = 60"), *changes):
         assert old in text or name in text
         text = text.replace(old, new)
     path = folder / f"{name}.toml"
@@ -99,7 +102,7 @@ def assert_no_step(run: Run) -> None:
 
 @pytest.mark.parametrize(("faster", "enable"), [(0.95, True), (2.2, True), (4.0, False)])
 def test_a_rapid_is_followed_late(folder: Path, faster: float, enable: bool) -> None:
-    run = Run(Component(load_machine(X), folder))
+    run = Run(Component(load_machine(X, PREVIEW), folder))
     run.pins["enable"] = enable
     run.stay(100)
     for to in (120.0, 0.0):
@@ -166,7 +169,7 @@ def test_a_trip_fades_in_motion_and_ends_with_reset(folder: Path) -> None:
 
 @pytest.mark.parametrize(("cmd", "said"), [(math.nan, "finite, got nan"), (2e6, "within ±1000 m, got 2000")])
 def test_a_command_that_is_none_is_held(folder: Path, cmd: float, said: str) -> None:
-    run = Run(Component(load_machine(X), folder))
+    run = Run(Component(load_machine(X, PREVIEW), folder))
     run.stay(100)
     run.move(30.0, V)
     for _ in range(100):
@@ -181,7 +184,7 @@ def test_a_command_that_is_none_is_held(folder: Path, cmd: float, said: str) -> 
 
 
 def test_a_fault_is_said_once_and_ends_with_reset(folder: Path) -> None:
-    run = Run(Component(load_machine(X), folder))
+    run = Run(Component(load_machine(X, PREVIEW), folder))
     run.stay(100)
     run.move(30.0, V)
     run.component.break_model()
@@ -198,7 +201,7 @@ def test_a_fault_is_said_once_and_ends_with_reset(folder: Path) -> None:
 
 
 def test_reset_in_motion_waits_for_rest(folder: Path) -> None:
-    run = Run(Component(load_machine(X), folder))
+    run = Run(Component(load_machine(X, PREVIEW), folder))
     run.stay(100)
     run.move(10.0, V)
     run.step(10.0, reset=True)
@@ -212,7 +215,7 @@ def test_reset_in_motion_waits_for_rest(folder: Path) -> None:
 @pytest.mark.parametrize(("model", "before"), [("SepCompensator", 0), ("SepCompensator", 1), ("HybridPredictor", 1)])
 def test_another_origin_moves_out_at_once(folder: Path, model: str, before: int) -> None:
     """Homing to an index, at a constant velocity: LinuxCNC answers to the feedback, in the same period or the next."""
-    run = Run(Component(load_machine(X), folder, model))
+    run = Run(Component(load_machine(X, PREVIEW), folder, model))
     run.stay(100)
     for k in range(400):
         jumped = -17.0 if k >= 300 else 0.0
@@ -229,7 +232,7 @@ def test_another_origin_moves_out_at_once(folder: Path, model: str, before: int)
 
 
 def test_a_jump_of_one_of_them_is_no_origin(folder: Path) -> None:
-    run = Run(Component(load_machine(X), folder))
+    run = Run(Component(load_machine(X, PREVIEW), folder))
     run.stay(100)
     run.stay(50)
     run.origin = 5.0
@@ -263,7 +266,7 @@ def test_a_rotary_axis_turns_on(folder: Path) -> None:
 
 
 def test_nothing_but_numbers_is_written(folder: Path) -> None:
-    component = Component(load_machine(X), folder)
+    component = Component(load_machine(X, PREVIEW), folder)
     for cmd, fb, active in ((math.nan, math.nan, False), (math.nan, math.nan, True), (math.inf, 3.0, False)):
         assert np.isfinite(component.step(cmd, fb, active=active)).all()
     assert component.step(math.nan, 3.0, active=False)[OUT] == pytest.approx(3.0)
@@ -273,11 +276,11 @@ def test_nothing_but_numbers_is_written(folder: Path) -> None:
     assert np.isfinite(shown).all()
     assert np.max(np.abs(np.diff(shown[:, OUT], prepend=3.0))) <= V
     assert shown[-1, OUT] == pytest.approx(4.0)
-    late = Component(load_machine(X), folder)
+    late = Component(load_machine(X, PREVIEW), folder)
     shown = np.array([late.step(4.0 if k else math.nan, 3.0) for k in range(500)])
     assert shown[0, OUT] == pytest.approx(3.0)
     assert np.max(np.abs(np.diff(shown[:, OUT]))) <= V
-    component = Component(load_machine(X), folder)
+    component = Component(load_machine(X, PREVIEW), folder)
     component.step(4.0, 4.0)
     component.set(scale=0.0)
     assert component.step(4.0, 4.0)[OUT] == pytest.approx(4.0)

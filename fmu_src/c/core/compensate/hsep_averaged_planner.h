@@ -112,9 +112,9 @@ typedef struct {
 } hsep_averaged_before;
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
- * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples that the plan leaves as they are, and the late ones before them.
- * Cost: as hsep_averaged_forecast; a late measurement adds late^2 / 2 multiply-adds for each expert, here and in the
- * last part, for variances. */
+ * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples
+ * that the plan leaves as they are, and the late ones before them. Cost: as hsep_averaged_forecast; a late
+ * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
 HSEP_API void hsep_averaged_planner_begin(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
     int warm);
