@@ -83,7 +83,7 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
 
 @pytest.mark.slow
 def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
-    x_d = command()[:2200]
+    x_d = command()[:1000]
     x = simulate(stage(), x_d, T_S)
     change_max = 0.3 * float(np.abs(x_d - x).max())
     limits = {"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max}
@@ -98,7 +98,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
         predictor={"Np": 50},
         drive_limits=limits,
     )
-    found = expected_tracking(machine, [Recording(x_d, x, 1000)], lambda _: None)
+    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert [one.name for one in found.effects] == ["a_max", "j_max", "change_max"]
     sizes = {one.name: [one.error[factor].rms for factor in FACTORS] for one in found.effects}

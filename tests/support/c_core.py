@@ -7,6 +7,7 @@ import hashlib
 import os
 import struct
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -110,9 +111,13 @@ def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, 
 
     def build(folder: Path) -> None:
         folder.mkdir()
-        for source in compiled:
+
+        def compile_one(source: str) -> None:
             target = folder / f"{Path(source).stem}.o"
             run_compiler([*flags, *include_flags(), "-c", source, "-o", target], command=command)
+
+        with ThreadPoolExecutor() as pool:  # other processes may wait for them
+            list(pool.map(compile_one, compiled))
 
     folder = built_once(_shared() / f"objects_{key}", build)
     return [str(folder / f"{Path(source).stem}.o") for source in compiled]
