@@ -8,8 +8,6 @@
 #include "hsep_model.h"
 #include "hsep_plant.h"
 
-#include <stddef.h>
-
 #if defined(HSEP_MODEL_FEED_DRIVE)
 
 #define HSEP_DRIVE(function) hsep_feed_drive_##function

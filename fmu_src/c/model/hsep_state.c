@@ -3,7 +3,6 @@
 #include "hsep_check.h"
 #include "hsep_table.h"
 
-#include <math.h>
 #include <stdint.h>
 #include <string.h>
 

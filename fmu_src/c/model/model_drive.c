@@ -13,7 +13,6 @@
 #include "hsep_state.h"
 
 #include <math.h>
-#include <string.h>
 
 static const double drive_seed_max = 2147483647.0;
 static const double drive_time_tolerance = 0.5; /* of a step: rounding of the importer's times */

@@ -14,8 +14,6 @@
 #include "hsep_table.h"
 #include "hsep_weights.h"
 
-#include <string.h>
-
 typedef struct {
     hsep_state_header header;
     hsep_inputs inputs;

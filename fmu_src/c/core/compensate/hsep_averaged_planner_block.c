@@ -1,4 +1,4 @@
-/* Memory of a planner on the residual model with averaging: its layout, beginning and check. */
+/* Memory of a planner on the residual model with averaging: its layout and beginning. */
 #include "hsep_averaged_planner.h"
 
 #include "hsep_math.h"

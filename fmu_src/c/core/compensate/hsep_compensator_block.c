@@ -1,7 +1,6 @@
-/* Memory of a compensator: its layout, beginning and check. */
+/* Memory of a compensator: its layout and beginning. */
 #include "hsep_compensator.h"
 
-#include "hsep_math.h"
 #include "hsep_range.h"
 
 #include <stddef.h>

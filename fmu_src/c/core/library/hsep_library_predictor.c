@@ -1,4 +1,4 @@
-/* The library's predictor: its size, beginning and check from the settings; the rest is hsep_predictor.c's. */
+/* The library's predictor: its size and beginning from the settings; the rest is hsep_predictor.c's. */
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
 #include "hsep_predictor.h"

@@ -12,8 +12,6 @@
 
 #include "hsep_real.h"
 
-#include <string.h>
-
 /* Fail to compile unless a condition holds; name: unique among all files. */
 #define HSEP_ASSERT(name, condition) typedef char hsep_assert_##name[(condition) ? 1 : -1]
 

@@ -1,6 +1,5 @@
 #include "hsep_paper.h"
 
-#include "hsep_math.h"
 #include "hsep_vector.h"
 
 #include <string.h>

@@ -3,7 +3,6 @@
 #include "hsep_range.h"
 
 #include <stddef.h>
-#include <string.h>
 
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int residual_parts = 25;

@@ -1,4 +1,4 @@
-/* State of an averaged residual model: its layout, beginning and check, and what it has learned. */
+/* State of an averaged residual model: its layout and beginning, and what it has learned. */
 #include "hsep_averaged_model.h"
 
 #include "hsep_math.h"

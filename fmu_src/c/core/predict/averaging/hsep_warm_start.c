@@ -2,6 +2,8 @@
 
 #include "hsep_math.h"
 
+#include <string.h>
+
 /* Set what follows from the number of features; return the bytes of the block. */
 static hsep_real warm_start_lay_out(hsep_warm_start *self, hsep_int n)
 {
