@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 from html import escape
 from statistics import NormalDist
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "ErrorSize",
     "batch_rms",
     "coverage",
     "hold",
@@ -33,6 +35,20 @@ __all__ = [
     "shares",
     "shown_figure",
 ]
+
+
+@dataclass(frozen=True)
+class ErrorSize:
+    """RMS and largest magnitude of the samples of an error that are known, m or rad; NaN if there are none."""
+
+    rms: float
+    largest: float
+
+    @classmethod
+    def of(cls, error: Array) -> ErrorSize:
+        """Return the size of ``(n,)`` samples, NaN where they are not known."""
+        known = error[~np.isnan(error)]
+        return cls(rms(known), largest(known)) if known.size else cls(math.nan, math.nan)
 
 
 def rms(error: ArrayLike) -> float:

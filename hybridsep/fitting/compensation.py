@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
-from ..base.metrics import known_rms, peak_derivatives
+from ..base.metrics import ErrorSize, peak_derivatives
 from ..base.settings import DRIVE_LIMIT_ENTRIES, CompensatorSettings, Limits
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..logs.units import DisplayUnits
@@ -20,7 +20,6 @@ from .replay import Recording, beginnings
 __all__ = [
     "LIMITS_WORDS",
     "MARGINS",
-    "ErrorSize",
     "LimitEffect",
     "Tracking",
     "binding_words",
@@ -45,6 +44,9 @@ LIMITS_WORDS = (
 
 _SAID = 0.001
 """Share of the samples from which on a limit that binds is said: fewer cost nothing that could be seen."""
+
+_CHANGED = ("acceleration", "jerk", "change_max")
+"""Entries of ``[drive_limits]`` whose cost is said."""
 
 FACTORS = (0.5, 1.0, 2.0)
 """By which each limit is changed, one at a time, to say what it costs."""
@@ -100,20 +102,6 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
             return {}
         found[name] = min(float(f"{value:.4g}"), float(declared.maximum or value))
     return {**found, "estimated": True}
-
-
-@dataclass(frozen=True)
-class ErrorSize:
-    """RMS and largest of commanded minus measured position, m; NaN where it is not known."""
-
-    rms: float
-    largest: float
-
-    def words(self, shown: DisplayUnits) -> str:
-        """Return both with their unit."""
-        if math.isnan(self.rms):
-            return "not known"
-        return f"{shown.words(self.rms, '.4g')} (largest {shown.words(self.largest, '.4g')})"
 
 
 @dataclass(frozen=True)
@@ -174,18 +162,18 @@ class Tracking:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         lines = [
-            f"Tracking error (commanded minus measured, RMS): {self.none.words(shown)} as recorded; with the "
-            f"compensator about {self.hybrid.words(shown)} by the hybrid, with which the FMU starts, and about "
-            f"{self.physics.words(shown)} by the physics model (compensate = physics).",
+            f"Tracking error (commanded minus measured, RMS): {_words(self.none, shown)} as recorded; with the "
+            f"compensator about {_words(self.hybrid, shown)} by the hybrid, with which the FMU starts, and about "
+            f"{_words(self.physics, shown)} by the physics model (compensate = physics).",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
         for effect in self.effects:
-            each = ", ".join(f"{factor:g} ×: {error.words(shown)}" for factor, error in effect.error.items())
+            each = ", ".join(f"{factor:g} ×: {_words(error, shown)}" for factor, error in effect.error.items())
             lines.append(f"{effect.name} {each}.")
         if self.advised:
             options = " ".join(f"--{name} {value:.4g}" for name, value in self.advised.items())
             lines.append(
-                f"If the drive allows it: {options}, with which about {self.advised_error.words(shown)} is left."
+                f"If the drive allows it: {options}, with which about {_words(self.advised_error, shown)} is left."
             )
         return [
             *lines,
@@ -196,54 +184,68 @@ class Tracking:
         ]
 
 
+def _words(error: ErrorSize, shown: DisplayUnits) -> str:
+    """Return RMS and largest error with their unit."""
+    if math.isnan(error.rms):
+        return "not known"
+    return f"{shown.words(error.rms, '.4g')} (largest {shown.words(error.largest, '.4g')})"
+
+
 def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
     allowed = machine.compensator_settings
-    judged = {
-        model: _expected(machine, replace(allowed, compensate=model), recordings) for model in ("physics", "hybrid")
-    }
+    settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
+    judged = {model: _expected(machine, one, recordings) for model, one in settings.items()}
     progress(0.5)
     bound = {
         model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
         for model, one in judged.items()
         if one is not None and len(one.x_d)
     }
-    effects: list[LimitEffect] = []
+    effects: tuple[LimitEffect, ...] = ()
     advised: dict[str, float] = {}
     advised_error = _size(None)
-    hybrid = replace(allowed, compensate="hybrid")
     if any(share >= _SAID for share in bound.get("hybrid", {}).values()):
         first = beginnings(recordings, _EFFECTS_MAX)
-        now, entries = _size(_expected(machine, hybrid, first)), ("acceleration", "jerk", "change_max")
-        for i, entry in enumerate(entries, start=1):
-            errors = {
-                factor: now if factor == 1.0 else _size(_expected(machine, _scaled(hybrid, entry, factor), first))
-                for factor in FACTORS
-            }
-            effects.append(LimitEffect(DRIVE_LIMIT_ENTRIES[entry].name, errors))
-            progress(0.5 + 0.4 * i / len(entries))
-        wanted = hybrid
-        for entry, effect in zip(entries, effects, strict=True):
-            if effect.advised != 1.0:
-                wanted = _scaled(wanted, entry, effect.advised)
-                advised[effect.name] = _limit(wanted, entry)
+        effects, wanted = _limit_effects(machine, settings["hybrid"], first, lambda done: progress(0.5 + 0.4 * done))
+        values = _limits_of(wanted)
+        advised = {effect.name: values[effect.name] for effect in effects if effect.advised != 1.0}
         if advised:
             advised_error = _size(_expected(machine, wanted, first))
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     return Tracking(
-        none=ErrorSize(known_rms(without), float(np.nanmax(np.abs(without), initial=0.0))),
+        none=ErrorSize.of(without),
         physics=_size(judged["physics"]),
         hybrid=_size(judged["hybrid"]),
         limits=bound,
-        effects=tuple(effects),
+        effects=effects,
         advised=advised,
         advised_error=advised_error,
         change_max=allowed.change_max,
         following_error_max=allowed.following_error_max,
     )
+
+
+def _limit_effects(
+    machine: Machine,
+    settings: CompensatorSettings,
+    recordings: Sequence[Recording],
+    progress: Callable[[float], object],
+) -> tuple[tuple[LimitEffect, ...], CompensatorSettings]:
+    """Return what each limit costs, and the settings with those that are advised."""
+    now, wanted, effects = _size(_expected(machine, settings, recordings)), settings, []
+    for i, entry in enumerate(_CHANGED, start=1):
+        errors = {
+            factor: now if factor == 1.0 else _size(_expected(machine, _scaled(settings, entry, factor), recordings))
+            for factor in FACTORS
+        }
+        effects.append(LimitEffect(DRIVE_LIMIT_ENTRIES[entry].name, errors))
+        wanted = _scaled(wanted, entry, effects[-1].advised)
+        progress(i / len(_CHANGED))
+    return tuple(effects), wanted
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
@@ -259,24 +261,21 @@ def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Se
 
 
 def _size(found: Expected | None) -> ErrorSize:
-    if found is None or not len(found.compensated):
-        return ErrorSize(math.nan, math.nan)
-    return ErrorSize(known_rms(found.compensated), float(np.nanmax(np.abs(found.compensated), initial=0.0)))
+    return ErrorSize.of(np.empty(0) if found is None else found.compensated)
 
 
-def _limit(settings: CompensatorSettings, entry: str) -> float:
-    value = settings.change_max if entry == "change_max" else getattr(settings.limits, entry)
-    assert value is not None
-    return float(value)
+def _limits_of(settings: CompensatorSettings) -> dict[str, float]:
+    """Return the drive's limits by the names of their options."""
+    assert settings.limits is not None
+    assert settings.change_max is not None
+    return {**settings.limits.to_fmi(), "change_max": settings.change_max}
 
 
 def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> CompensatorSettings:
     """Return the settings with a limit of ``[drive_limits]`` times a factor."""
-    value = factor * _limit(settings, entry)
-    if entry == "change_max":
-        return replace(settings, change_max=value)
-    assert settings.limits is not None
-    return replace(settings, limits=replace(settings.limits, **{entry: value}))
+    part: Any = settings if entry == "change_max" else settings.limits
+    changed = replace(part, **{entry: factor * getattr(part, entry)})
+    return changed if part is settings else replace(settings, limits=changed)
 
 
 def binding_words(shares: Mapping[str, float]) -> str:

@@ -8,21 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.metrics import known_rms
+from ..base.metrics import ErrorSize
 from ..base.signals import Array
 from .log import Log
 from .names import SIGNALS
 from .units import DisplayUnits
 
-__all__ = ["Controller", "Size", "controller_of"]
-
-
-@dataclass(frozen=True)
-class Size:
-    """Root mean square and largest magnitude of a signal, m or rad."""
-
-    rms: float
-    largest: float
+__all__ = ["Controller", "controller_of"]
 
 
 @dataclass(frozen=True)
@@ -37,24 +29,24 @@ class Controller:
         Samples by which the planned position leads the measured one: transport, interpolation and drive together.
     look_ahead : int, optional
         Samples by which it leads the command of the position loop.
-    behind_plan, without_delay : Size, optional
+    behind_plan, without_delay : ErrorSize, optional
         Planned minus measured position, and the same with the planned one taken ``delay`` samples later.
-    following_error, contour_deviation : Size, optional
+    following_error, contour_deviation : ErrorSize, optional
         As the controller computes them.
     """
 
     T_s: float
     delay: int | None = None
     look_ahead: int | None = None
-    behind_plan: Size | None = None
-    without_delay: Size | None = None
-    following_error: Size | None = None
-    contour_deviation: Size | None = None
+    behind_plan: ErrorSize | None = None
+    without_delay: ErrorSize | None = None
+    following_error: ErrorSize | None = None
+    contour_deviation: ErrorSize | None = None
 
     def lines(self, shown: DisplayUnits, Np: int) -> list[str]:
         """Return what the figures mean for a look-ahead of ``Np`` samples, in words."""
 
-        def words(size: Size) -> str:
+        def words(size: ErrorSize) -> str:
             return f"{shown.words(size.rms, '.4g')} RMS, {shown.words(size.largest, '.4g')} at most"
 
         def time(n: int) -> str:
@@ -105,13 +97,12 @@ def controller_of(logs: Sequence[Log]) -> Controller | None:
             n, left = n + 1, now
         return n - 1
 
-    def size(values: Array) -> Size:
-        return Size(known_rms(values), float(np.nanmax(np.abs(values))))
-
-    found: dict[str, Size] = {}
+    found: dict[str, ErrorSize] = {}
     delay = lead("planned_position", "x")
     if delay is not None:
-        found["behind_plan"], found["without_delay"] = (size(behind("planned_position", "x", n)) for n in (0, delay))
+        found["behind_plan"], found["without_delay"] = (
+            ErrorSize.of(behind("planned_position", "x", n)) for n in (0, delay)
+        )
     for what in there & {"following_error", "contour_deviation"}:
-        found[what] = size(np.concatenate([part[what] for part in parts]))
+        found[what] = ErrorSize.of(np.concatenate([part[what] for part in parts]))
     return Controller(logs[0].T_s, delay, lead("planned_position", "loop_command"), **found)
