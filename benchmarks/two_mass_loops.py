@@ -26,6 +26,7 @@ from two_mass.plant import TwoMassDrive
 
 from hybridsep.base.metrics import largest, peak_derivatives, rms
 from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -110,11 +111,8 @@ def _learn(recipe: Recipe, x_d: Array, x: Array, folder: Path) -> None:
     """Write the weights that a run without compensation leaves."""
     settings, _, _ = settings_of(recipe)
     predictor = HybridPredictor(recipe.model, settings, start=float(x_d[0]))
-    quantum, Np = recipe.encoder.quantum, settings.Np
-    measured = quantum * np.round((x + recipe.noise[: len(x)]) / quantum)
-    for k in range(0, len(x_d) // Np * Np, Np):
-        predictor.predict(x_d[k : k + Np])
-        predictor.update(measured[k : k + Np])
+    quantum, n = recipe.encoder.quantum, len(x_d) // settings.Np * settings.Np  # whole windows
+    backtest(predictor, x_d[:n], quantum * np.round((x[:n] + recipe.noise[:n]) / quantum))
     (folder / "weights.bin").write_bytes(weights_file(predictor))
 
 

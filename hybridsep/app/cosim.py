@@ -155,7 +155,10 @@ def _two_axes(
     meant = read_path(path, limits, machines[0].T_s, unit)
     runs, steps = [], count()
     with tempfile.TemporaryDirectory() as temporary, progress_bar(as_json) as advance:
-        say = lambda what: advance(what, next(steps) / (2 + 2 * len(COMPENSATED)))  # noqa: E731
+
+        def say(what: str) -> None:
+            advance(what, next(steps) / (2 + 2 * len(COMPENSATED)))
+
         for name, axis, command in zip("XY", machines, meant.axes, strict=True):
             folder = Path(temporary, name)
             plant = build_here(axis, "FeedDrive", folder, flavour)

@@ -290,7 +290,7 @@ class CompensatorSettings(Settings):
     ``preview`` is ``2·Np`` or 200, whichever is more, if left out, and ``spacing`` 2, or 1 where that does not divide
     ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; ``no_reversal`` has no effect
     without them, and plans of a model with ``averaging`` follow the friction and may turn. ``change_max``, None for no
-    bound, is about twice the servo error without compensation: hybrid plans that ask for far more end for the run
+    bound, is about twice the servo error without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.newton.runs_away`); ``following_error_max`` about 1.3 times the largest one
     (:class:`~hybridsep.online.monitor.Monitor`).
     """

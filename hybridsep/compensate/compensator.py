@@ -102,7 +102,7 @@ class SepCompensator:
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
-        # Windows that the averaged model does not plan: now, and after the next plan that runs away
+        # Windows that the averaged model does not plan: now, and after the next plan that runs away; rounded as in C
         self._paused, self._pause = 0, max(1, int(RETRY / (predictor.Np * predictor.T_s) + 0.5))
         self.monitor = Monitor(
             samples_before(self.settings.measurement_timeout, self.T_s), self.settings.following_error_max
