@@ -95,7 +95,10 @@ class NpzSource(ArraysSource):
 
 
 class MatSource(ArraysSource):
-    """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; in structs they are called ``struct.field``."""
+    """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; in structs they are called ``struct.field``.
+
+    A complex vector ``H`` is there as ``H.real`` and ``H.imag`` too.
+    """
 
     format = "MATLAB"
     endings = (".mat",)
@@ -133,6 +136,9 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from _fields(f"{name}.{field}", value[field].reshape(-1)[0])
     else:
         yield name, value
+        if getattr(getattr(value, "dtype", None), "kind", "") == "c":  # a frequency response
+            yield f"{name}.real", value.real
+            yield f"{name}.imag", value.imag
 
 
 class ParquetSource(ArraysSource):

@@ -17,6 +17,7 @@ from recorders import write_parquet
 from scipy import io, sparse
 
 from hybridsep.base.errors import LogError
+from hybridsep.logs.formats import open_source
 from hybridsep.logs.log import read_log
 
 DATA = columns()
@@ -92,6 +93,12 @@ def test_structs(tmp_path: Path) -> None:
         read_log(tmp_path / "log.mat")
     names = {role: f"rec.{role}" for role in ("t", "x_d", "x")}
     assert len(read_log(tmp_path / "log.mat", columns=names).t) == 50
+
+
+def test_complex_vectors_are_two_columns(tmp_path: Path) -> None:
+    io.savemat(tmp_path / "frf.mat", {"H": np.array([1 + 2j, 3 - 4j])})
+    values = open_source(tmp_path / "frf.mat").read(["H.real", "H.imag"]).columns
+    np.testing.assert_array_equal(values, [[1, 3], [2, -4]])
 
 
 @pytest.mark.parametrize(
