@@ -120,19 +120,21 @@ class Line:
         """Draw it into its panel."""
         edges = (self.y,) if self.upper is None else (self.y, self.upper)
         places = drawn_places(_COLUMNS, *edges)
-        x, *drawn = (np.asarray(values, dtype=np.float64)[places] for values in (self.x, *edges))
+        x, y, *upper = (np.asarray(values, dtype=np.float64)[places] for values in (self.x, *edges))
         width = 1.3 if len(places) == np.size(self.y) else 1.0
-        styles: list[dict[str, Any]] = [{"mode": "lines", "line": {"color": self.colour, "width": width}}]
+        style: dict[str, Any] = {"mode": "lines", "line": {"color": self.colour, "width": width}}
         if self.points:
-            styles = [{"mode": "markers", "marker": {"color": self.colour, "size": 5}}]
-        elif self.upper is not None:
-            edge = {"mode": "lines", "line": {"width": 0, "color": self.colour}, "hoverinfo": "skip"}
-            red, green, blue = (int(self.colour[i : i + 2], 16) for i in (1, 3, 5))
-            styles = [edge, {**edge, "fill": "tonexty", "fillcolor": f"rgba({red}, {green}, {blue}, 0.18)"}]
-        for y, style in zip(drawn, styles, strict=True):
-            shown = bool(self.name) and style is styles[-1]
-            common = {"name": self.name, "legendgroup": self.name, "showlegend": shown}
-            figure.add_scatter(x=x, y=y, row=self.panel + 1, col=1, **common, **style)
+            style = {"mode": "markers", "marker": {"color": self.colour, "size": 5}}
+        elif upper:
+            edge, fill = (f"rgba{(*bytes.fromhex(self.colour[1:]), alpha)}" for alpha in (0.3, 0.18))
+            style = {"mode": "lines", "line": {"width": 1, "color": edge}, "fill": "toself", "fillcolor": fill}
+            ends = np.flatnonzero(np.diff(np.isfinite(y + upper[0]), prepend=False, append=False)).reshape(-1, 2)
+            x, y = (  # a closed line around each stretch without a gap
+                np.concatenate([[], *((*there[i:j], *back[i:j][::-1], np.nan) for i, j in ends)])
+                for there, back in ((x, x), (y, upper[0]))
+            )
+        common = {"name": self.name, "legendgroup": self.name, "showlegend": bool(self.name)}
+        figure.add_scatter(x=x, y=y, row=self.panel + 1, col=1, **common, **style)
 
 
 @dataclass(frozen=True)

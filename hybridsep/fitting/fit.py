@@ -44,6 +44,7 @@ from .report import (
     write_other_windows,
     write_settings,
     write_use,
+    write_validation,
 )
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ class Fit:
         write_other_windows(report, self.windows, judged)
         write_findings(report, self.logs, self.findings)
         write_identification(report, self.identification, judged)
+        write_validation(report, self.identification, judged)
         write_settings(report, self.choice, judged)
         if self.tracking is not None:
             report.heading("Compensation")

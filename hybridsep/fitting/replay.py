@@ -16,6 +16,7 @@ from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
+from ..identify.output_error import delayed
 from ..logs.checks import resolution
 from ..predict.predictor import HybridPredictor
 
@@ -263,6 +264,18 @@ class Replay:
         x_pb = self.backtest.x_pb
         both = np.stack((self._compared, self.backtest.x_h)) - x_pb
         return [(x_pb[span], both[:, span]) for span in self._spans if span.stop - span.start > 1]
+
+    def modelled(self, *, tested: bool = False) -> list[tuple[Array, Array, Array]]:
+        """Return commands, positions and the physics model's errors of the same instants, (n,) each, m.
+
+        One of each recording, NaN where a measurement is missing; all samples, or the ``tested`` ones.
+        """
+        errors, found = self._compared - self._predictions[0], []
+        for one, span in zip(self.recordings, self._spans, strict=True):
+            rows = np.stack((delayed(one.x_d, self.delay), self._compared[span], errors[span]))
+            x_d, x, e = rows[:, self._judged[span]] if tested else rows
+            found.append((x_d, x, e))
+        return found
 
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""

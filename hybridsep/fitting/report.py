@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..base.metrics import coverage
@@ -13,6 +15,7 @@ from ..base.signals import Array
 from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..evaluate.reversals import friction_table, reversal_curve
 from ..identify.model import IdentifiedModel
+from ..identify.validation import FrequencyResponse, ResidualTest, frequency_response, model_response, residual_test
 from ..logs.checks import Finding
 from ..logs.log import Log
 from .advice import OF_ITSELF, Judged, extent, peers_in_words, recommendation
@@ -25,6 +28,7 @@ __all__ = [
     "write_other_windows",
     "write_settings",
     "write_use",
+    "write_validation",
 ]
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")
@@ -101,6 +105,84 @@ def write_identification(report: Report, found: IdentifiedModel, judged: Judged)
         report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
         report.paragraph("RMS of the simulated position within the training half.", "dim")
     report.bullets(found.findings)
+
+
+def write_validation(report: Report, found: IdentifiedModel, judged: Judged) -> None:
+    """Write the model's Bode plot over the response of the whole log, and tests of its residual over the test samples.
+
+    A section of which the log has too few samples in a row, or no motion, is left out.
+    """
+    replay, model, T_s = judged.replay, found.model, judged.T_s
+    if (log := frequency_response(replay.modelled(), T_s, model, found.input_hold)) is not None:
+        report.heading("Bode plot")
+        report.chart(_bode_plot(log, partial(model_response, model, T_s, found.input_hold)))
+    if (test := residual_test(replay.modelled(tested=True), replay.Np)) is not None:
+        report.heading("Residual of the physics model")
+        report.chart(_correlations(test, 1e3 * T_s))
+
+
+def _bode_plot(log: FrequencyResponse, model: Callable[[Array], NDArray[np.complex128]]) -> Chart:
+    f, known = log.f, log.known
+    limit = float(f[known].max(initial=0.0))
+    drawn = np.union1d(*(space(f[0], min(f[-1], 4.0 * limit or f[-1]), 600) for space in (np.geomspace, np.linspace)))
+    curve, ratio = model(drawn), np.where(known, log.G / log.expected, np.nan)
+    angle, off = np.unwrap(np.angle(curve)), np.abs(ratio)
+    half = np.minimum(log.half, 0.5)  # no more is known
+    turned = np.interp(f, drawn, angle) + np.angle(ratio)  # on the model's turn
+    edges = off * (1.0 - half), off, off * (1.0 + half)
+    panels = (
+        (20.0 * np.log10(np.abs(curve)), 20.0 * np.log10(np.abs(log.expected) * edges)),
+        (np.degrees(angle), np.degrees((turned - half, turned, turned + half))),
+    )
+    above = f"above {limit:.3g} Hz" if limit else "at any frequency"
+    tested = drawn < limit
+    lines = [Line("", f, log.coherence, _COMMAND, panel=2)]
+    for panel, (of_model, (low, y, high)) in enumerate(panels):
+        names = ("",) * 4 if panel else ("95 % interval", "log", "model", f"model, not tested: no power {above}")
+        lines += [
+            Line(names[0], f, low, HYBRID, upper=high, panel=panel),
+            Line(names[1], f, y, HYBRID, points=True, panel=panel),
+            Line(names[2], drawn[tested], of_model[tested], PHYSICS, panel=panel),
+            Line(names[3], drawn[~tested], of_model[~tested], HOLD, panel=panel),
+        ]
+    how = (
+        f"Measured over commanded position of the whole log, {log.n_segments} segments of {1.0 / f[0]:.3g} s, drawn "
+        f"where the command has power enough to tell it to 25 %. It has none {above} to test the model."
+    )
+    if limit:
+        worst = int(np.nanargmax(np.abs(ratio - 1.0)))
+        decibels: Array = 20.0 * np.log10(off)
+        how += (
+            f" Below, the log differs from the model by {np.nanmedian(np.abs(decibels)):.2g} dB in the median, and "
+            f"most at {f[worst]:.3g} Hz, by {decibels[worst]:+.2g} dB and {np.degrees(np.angle(ratio[worst])):+.2g}°."
+        )
+    return Chart("frequency [Hz]", ("magnitude [dB]", "phase [°]", "coherence γ²"), lines, how, x_log=True)
+
+
+def _correlations(test: ResidualTest, T_s: float) -> Chart:
+    """Return the correlations, ``T_s`` in ms."""
+    lag: Array = T_s * np.arange(float(len(test.autocorrelation)))
+    band, of_command = np.full(len(lag), test.band), test.command_band
+    box = f"(Ljung-Box {test.ljung_box:.3g} over {len(lag) - 1} lags, 99 % of white ones: {test.of_white:.3g})"
+    most = int(np.argmax(np.abs(test.with_command) - of_command))
+    r, limit = test.with_command[most], of_command[most]
+    words = [
+        f"The residual may be white {box}: a hybrid has nothing to learn of its past."
+        if test.ljung_box <= test.of_white
+        else f"The residual is not white {box}: its past tells its future, which is what the hybrid learns.",
+        "It may be independent of the command: what is left is noise or disturbance."
+        if abs(r) <= limit
+        else f"It depends on the command (correlation {r:.2g} at {lag[most]:.3g} ms, where chance has ± {limit:.2g}): "
+        "friction, or dynamics that the model lacks.",
+        "The second panel is of residual and commanded velocity after a filter that makes the residual white.",
+    ]
+    lines = [
+        Line("99 % of white residuals", lag, -band, HOLD, upper=band),
+        Line("with itself", lag, test.autocorrelation, PHYSICS),
+        Line("99 % of residuals independent of the command", lag, -of_command, HYBRID, upper=of_command, panel=1),
+        Line("with the commanded velocity before it", lag, test.with_command, HYBRID, panel=1),
+    ]
+    return Chart("lag [ms]", ("correlation",) * 2, lines, " ".join(words))
 
 
 def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> None:

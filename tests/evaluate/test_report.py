@@ -90,11 +90,18 @@ def test_of_a_long_line_the_extremes_are_drawn() -> None:
     y[31_234], y[100] = 7.0, np.nan
     band = Line("band", t, -np.ones(len(t)), "#010203", upper=np.ones(len(t)), panel=1)
     figure = Chart("t [s]", ("y [µm]", "e [µm]"), [Line("y", t, y, "#123456"), band]).figure()
-    assert [(trace.name, trace.showlegend) for trace in figure.data] == [("y", True), ("band", False), ("band", True)]
-    assert figure.data[2].fillcolor == "rgba(1, 2, 3, 0.18)"
-    assert [trace.yaxis for trace in figure.data] == ["y", "y2", "y2"]
+    assert [(trace.name, trace.showlegend) for trace in figure.data] == [("y", True), ("band", True)]
+    assert figure.data[1].fillcolor == "rgba(1, 2, 3, 0.18)"
+    assert [trace.yaxis for trace in figure.data] == ["y", "y2"]
     assert len(figure.data[0].y) <= 1202
     assert np.nanmax(figure.data[0].y) == 7.0
+
+
+def test_a_band_with_a_gap_is_one_outline_a_stretch() -> None:
+    upper = np.array([1.0, 1.0, np.nan, 1.0])
+    (band,) = Chart("f [Hz]", ("γ²",), [Line("band", [1, 2, 3, 4], -upper, "#010203", upper=upper)]).figure().data
+    np.testing.assert_array_equal(band.x, [1, 2, 2, 1, np.nan, 4, 4, np.nan])
+    np.testing.assert_array_equal(band.y, [-1, -1, 1, 1, np.nan, -1, 1, np.nan])
 
 
 @given(n=st.integers(1, 3000), columns=st.integers(1, 300), n_lines=st.integers(1, 2), seed=st.integers(0, 9))
