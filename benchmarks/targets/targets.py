@@ -217,7 +217,7 @@ def program(
     target: Target, sources: Sequence[Path], folder: Path, *, plain_math: bool = False, options: Sequence[str] = ()
 ) -> Path:
     """Compile a program for a board, with headers in its folder; return it."""
-    flags = [*_FLAGS, *_STRICT, *(_PLAIN if plain_math else ()), f"-I{HERE}", "-I.", *options]
+    flags = [*_FLAGS, *_STRICT, *(_PLAIN if plain_math else ()), f"-I{HERE}", f"-I{folder}", *options]
     given = [*sources, HERE / target.board, *([HERE / "plain_math.c"] if plain_math else [])]
     _run([*target.compiler, *flags, *given, *_linked(target), "-o", "program"], folder)
     return folder / "program"
