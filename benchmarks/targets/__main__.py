@@ -1,6 +1,6 @@
 """Text, data, block, stack and instructions of the C library on processors of controllers.
 
-    python -m benchmarks.targets [--target m7 ...] [--windows 60] [--readme]
+    python -m benchmarks.targets [--target m7 ...] [--windows 60] [--recall 8192] [--readme]
 
 Replays a run of the paper's drive, cold and warm, on each processor: x86-64 here, the others in qemu's emulation of
 whole machines without an operating system, so that the numbers depend on the compiler, its library of mathematics and
@@ -42,11 +42,11 @@ _HEAD = (
 )
 
 
-def row(target: Target, kind: str, size: tuple[int, int], windows: int, folder: Path) -> list[str]:
+def row(target: Target, kind: str, size: tuple[int, int], windows: int, recall: int, folder: Path) -> list[str]:
     """Return the cells of a row; numbers of instructions are in thousands."""
     replays: dict[bool, Replay] = {}
     for warm in (False, True):
-        case = Case(kind, *size, windows, warm)
+        case = Case(kind, *size, windows, warm, recall)
         replays[warm] = replay(target, build(target, case, folder / f"warm_{int(warm)}"))
         if replays[warm].began != 0:
             raise RuntimeError(f"{target.name}: the weights were refused")
@@ -73,6 +73,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--target", action="append", choices=TARGETS, help="a processor; all of them if left out")
     parser.add_argument("--windows", type=int, default=60, help="windows of each replay")
+    parser.add_argument("--recall", type=int, default=Case.recall, help="samples of the memory; 0: none")
     parser.add_argument("--readme", action="store_true", help="write the table into fmu_src/c/README.md")
     options = parser.parse_args()
     rows = []
@@ -87,7 +88,8 @@ def main() -> int:
             for kind in KINDS:
                 for size in SIZES:
                     windows = min(options.windows, _FEW_WINDOWS) if target.slow else options.windows
-                    rows.append(row(target, kind, size, windows, Path(name) / f"{key}_{kind}_{size[0]}"))
+                    folder = Path(name) / f"{key}_{kind}_{size[0]}"
+                    rows.append(row(target, kind, size, windows, options.recall, folder))
                     print(" | ".join(rows[-1]), flush=True)
     if options.readme:
         text = README.read_text(encoding="utf-8")

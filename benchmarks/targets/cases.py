@@ -43,6 +43,8 @@ class Case:
         Windows that are replayed.
     warm : bool
         Whether it begins with what was learned in a run before.
+    recall : int
+        Samples of the memory.
     """
 
     kind: str
@@ -50,10 +52,11 @@ class Case:
     p: int
     windows: int
     warm: bool = False
+    recall: int = PredictorSettings().recall
 
 
 def _predictor(case: Case) -> HybridPredictor:
-    settings = PredictorSettings(Np=case.Np, p=case.p, q=3)
+    settings = PredictorSettings(Np=case.Np, p=case.p, q=3, recall=case.recall)
     return HybridPredictor(load_machine("spring_mass_damper").model, settings)
 
 

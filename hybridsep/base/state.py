@@ -72,7 +72,9 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)
     if version != VERSION:
-        raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
+        raise StateError(
+            f"the saved state has format version {version}, this library reads version {VERSION}: train again"
+        )
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
         raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
     body = memoryview(blob)[_PREFIX.size + length : -_CRC.size]

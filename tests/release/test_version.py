@@ -57,5 +57,20 @@ def test_every_file_that_states_the_version_states_the_same() -> None:
         ("pyproject.toml", r'^version = "(.+)"$'),
         ("CITATION.cff", r"^version: (.+)$"),
         ("fmu_src/c/CMakeLists.txt", r"^  VERSION (.+)$"),
+        ("conda/recipe.yaml", r'^  version: "(.+)"$'),
     ):
         assert re.findall(form, (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE) == [__version__]
+
+
+def test_condas_recipe_asks_for_what_the_wheel_asks_for() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    needed = re.search(r"^dependencies = \[(.+?)^\]", project, re.MULTILINE | re.DOTALL)
+    recipe = re.search(
+        r"^  run:\n(.+?)^tests:", (ROOT / "conda/recipe.yaml").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    assert needed
+    assert recipe
+    wheel = re.findall(r'^    "([\w-]+)([^";]+)', needed[1], re.MULTILINE)
+    conda = re.findall(r"^ +(?:- |then: )([\w-]+) ([^\n(]+)$", recipe[1], re.MULTILINE)
+    names = {"matplotlib-base": "matplotlib"}
+    assert sorted(wheel) == sorted((names.get(name, name), bounds) for name, bounds in conda if name != "python")

@@ -116,7 +116,9 @@ HSEP_API hsep_status hsep_weights_load(
     }
 #endif
     if (!taken && message[0] == '\0') {
-        hsep_message_add(message, WEIGHTS_FILE " must be a factor of learned rows; it is damaged or truncated");
+        hsep_message_add(
+            message, WEIGHTS_FILE " must be what this version has learned; "
+                                  "it is damaged, truncated or another version's: train again");
     }
     return taken ? HSEP_OK : HSEP_REFUSED;
 }
