@@ -291,7 +291,7 @@ class CompensatorSettings(Settings):
     ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; ``no_reversal`` has no effect
     without them, and plans of a model with ``averaging`` follow the friction and may turn. ``change_max``, None for no
     bound, is about twice the servo error without compensation: hybrid plans that ask for far more pause
-    (:func:`~hybridsep.compensate.newton.runs_away`); ``following_error_max`` about 1.3 times the largest one
+    (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
     (:class:`~hybridsep.online.monitor.Monitor`).
     """
 

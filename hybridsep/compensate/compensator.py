@@ -30,7 +30,7 @@ from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .planning import RETRY, AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
+from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis, direct_samples
 
@@ -102,8 +102,7 @@ class SepCompensator:
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
-        # Windows that the averaged model does not plan: now, and after the next plan that runs away; rounded as in C
-        self._paused, self._pause = 0, max(1, int(RETRY / (predictor.Np * predictor.T_s) + 0.5))
+        self._planning.restart(predictor.T_s)
         self.monitor = Monitor(
             samples_before(self.settings.measurement_timeout, self.T_s), self.settings.following_error_max
         )
@@ -219,8 +218,7 @@ class SepCompensator:
         preview = Preview(command, self._x_d_before[-3:], self._delta_before, self._previous_plan)
         fades = self.monitor.is_tripped or self.monitor.is_lost
         compensate = SepState.OFF if fades else self.compensate
-        most = min(compensate, SepState.PHYSICS) if self._paused else compensate
-        chosen = self._planning.choose(predictor, preview, most)
+        chosen = self._planning.choose(predictor, preview, compensate)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
@@ -264,10 +262,7 @@ class SepCompensator:
         self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
         self._x_d_before = x_d[-len(self._x_d_before) :]
         self._state_before = pending.state
-        if pending.runs_away:
-            self._paused, self._pause = self._pause, 2 * self._pause
-        else:
-            self._paused = max(0, self._paused - 1)
+        self._planning.follow(runs_away=pending.runs_away)
         self._pending = None
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
@@ -287,8 +282,8 @@ class SepCompensator:
             "settings": self.settings.as_table(),
             "lead_in": self.lead_in,
             "state_before": int(self._state_before),
-            "paused": self._paused,
-            "pause": self._pause,
+            "paused": self._planning.paused,
+            "pause": self._planning.pause,
             "pending": pending and [int(pending.state), int(pending.runs_away), pending.prediction.n_warm_up],
         }
         arrays = {
@@ -319,7 +314,7 @@ class SepCompensator:
         compensator.predictor = kept  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
         compensator._state_before = SepState(saved.whole("state_before", SepState.HYBRID))
-        compensator._paused, compensator._pause = saved.whole("paused"), saved.whole("pause")
+        compensator._planning.paused, compensator._planning.pause = saved.whole("paused"), saved.whole("pause")
         n, Np = len(compensator._previous_plan), predictor.Np
         compensator.monitor = restored(compensator.monitor, saved)
         compensator._previous_plan, compensator._delta_before = (

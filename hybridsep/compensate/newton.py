@@ -33,7 +33,7 @@ from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve, solve_again
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "is_better", "runs_away"]
+__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "is_better"]
 
 _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
@@ -297,30 +297,6 @@ _LENGTHS = (1.0, 0.3)
 _GAIN, _LEAST_GAIN = 1e-3, 1e-9
 """Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
 rounding tells apart are equal."""
-
-
-_AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
-"""A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
-model's plan by this share of a window, and may leave this RMS error then, relative to the largest change."""
-
-
-def runs_away(delta: Array, of_physics: Array, error: float, change_max: float) -> bool:
-    """Return whether a plan asks for a larger change than compensation is made for: its model is wrong then.
-
-    A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
-    fall into a second state with an error many times larger, and stays in it when compensation ends.
-
-    Parameters
-    ----------
-    delta, of_physics : (Np,) arrays, m
-        Changes of the command by the plan, and by the physics model's.
-    error : float, m
-        RMS error that the plan leaves, by its own model.
-    change_max : float, m
-        Largest change of the command.
-    """
-    shares = [float(np.mean(np.abs(change) > _AT_BOUND * change_max)) for change in (delta, of_physics)]
-    return error > _LEFT * change_max and shares[0] - shares[1] > _BOUND_SHARE
 
 
 def is_better(cost: float, other: float) -> bool:

@@ -20,7 +20,7 @@ from ..online.look_ahead import SepState
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
-from .newton import TOLERANCE, AveragedPlanner, PlanModel, is_better, runs_away
+from .newton import TOLERANCE, AveragedPlanner, PlanModel, is_better
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
@@ -34,6 +34,7 @@ __all__ = [
     "Preview",
     "PublishedPosition",
     "has_stable_poles",
+    "runs_away",
 ]
 
 
@@ -129,6 +130,8 @@ class Planning(ABC):
         Leading samples of a window in which a plan follows the last one.
     ALWAYS : bool
         Whether every plan follows the last one there; else only plans that the drive's limits bound.
+    paused, pause : int
+        Windows that the residual model does not plan: now, and after its next plan that runs away.
     """
 
     PINNED: ClassVar[int]
@@ -141,6 +144,17 @@ class Planning(ABC):
         self.preview, self.spacing = settings.preview, settings.spacing
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
+
+    def restart(self, T_s: float) -> None:
+        """Begin another run, with a sampling interval in s: nothing is paused."""
+        self.paused, self.pause = 0, max(1, int(RETRY / (self.Np * T_s) + 0.5))  # rounded as in C
+
+    def follow(self, *, runs_away: bool) -> None:
+        """Count a window that followed its plan."""
+        if runs_away:
+            self.paused, self.pause = self.pause, 2 * self.pause
+        else:
+            self.paused = max(0, self.paused - 1)
 
     def adopt(self, bounds: DriveBounds, settings: CompensatorSettings) -> None:
         """Plan within other bounds from the next window on; ``preview`` and ``spacing`` are the same."""
@@ -250,6 +264,10 @@ def has_stable_poles(w_e: Array) -> bool:
     return True
 
 
+_AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
+"""A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
+model's plan by this share of a window, and may leave this RMS error then, relative to the largest change."""
+
 RETRY = 0.5
 """Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
 each further one of a run."""
@@ -257,6 +275,27 @@ each further one of a run."""
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
+
+
+def runs_away(delta: Array, of_physics: Array, error: float, change_max: float | None) -> bool:
+    """Return whether a plan asks for a larger change than compensation is made for: its model is wrong then.
+
+    A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
+    fall into a second state with an error many times larger, and stays in it when compensation ends.
+
+    Parameters
+    ----------
+    delta, of_physics : (Np,) arrays, m
+        Changes of the command by the plan, and by the physics model's.
+    error : float, m
+        RMS error that the plan leaves, by its own model.
+    change_max : float, m, optional
+        Largest change of the command.
+    """
+    if change_max is None:
+        return False
+    shares = [float(np.mean(np.abs(change) > _AT_BOUND * change_max)) for change in (delta, of_physics)]
+    return error > _LEFT * change_max and shares[0] - shares[1] > _BOUND_SHARE
 
 
 class AveragedPlanning(Planning):
@@ -281,17 +320,18 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
-            of_physics, runs_away = planner.cost(physics), False
-            if most is SepState.HYBRID:
+            of_physics, is_away, values = planner.cost(physics), False, self.basis.values[: self.Np]
+            if most is SepState.HYBRID and not self.paused:
                 bounds = self.limits(preview, may_turn=True)
                 hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(cost, of_physics):
-                    runs_away = self._runs_away(hybrid, physics, cost)
-                    if not runs_away:
+                    deltas, error = (values @ hybrid, values @ physics), math.sqrt(cost / self.preview)
+                    is_away = runs_away(*deltas, error, self.settings.change_max)
+                    if not is_away:
                         return ChosenPlan(SepState.HYBRID, hybrid, scales)
             if is_better(planner.cost_of_previous(previous_plan), of_physics):
-                return ChosenPlan(SepState.OFF, previous_plan, scales, runs_away)
-        return ChosenPlan(SepState.PHYSICS, physics, scales, runs_away)
+                return ChosenPlan(SepState.OFF, previous_plan, scales, is_away)
+        return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.
@@ -303,12 +343,6 @@ class AveragedPlanning(Planning):
         if most is SepState.HYBRID:
             return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
         return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
-
-    def _runs_away(self, hybrid: Array, physics: Array, cost: float) -> bool:
-        change_max, values = self.settings.change_max, self.basis.values[: self.Np]
-        if change_max is None:
-            return False
-        return runs_away(values @ hybrid, values @ physics, math.sqrt(cost / self.preview), change_max)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
         """Return the averaged model over the preview, with the scales of the remainder of the last plan."""

@@ -18,8 +18,8 @@ from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettin
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.newton import PlanModel, runs_away
-from hybridsep.compensate.planning import RETRY
+from hybridsep.compensate.newton import PlanModel
+from hybridsep.compensate.planning import RETRY, runs_away
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run

@@ -382,7 +382,7 @@ static hsep_real averaged_planner_bounded(
     const hsep_int count = HSEP_N_DECIDED + self->n;
     hsep_real bounded = 0.0;
     for (hsep_int k = 0; k < self->Np; k++) {
-        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_NEWTON_AT_BOUND;
+        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_PLANNING_AT_BOUND;
     }
     return bounded / (hsep_real)self->Np;
 }
@@ -396,7 +396,7 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
     const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * splines->share[0];
     const hsep_real longer = averaged_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
                              averaged_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
-    return error > HSEP_NEWTON_LEFT && longer > HSEP_NEWTON_BOUND_SHARE;
+    return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
 }
 
 /* Take the plan whose cost is lowest. */
