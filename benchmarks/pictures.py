@@ -70,9 +70,10 @@ def demonstration(folder: Path, chromium: str) -> Made:
 
 
 def demonstrated(summary: dict[str, Any]) -> Figures:
-    """Return the tracking errors of the staircase, µm, from the demonstration's ``summary.json``."""
+    """Return the tracking errors of the staircase, RMS and largest, µm, from the demonstration's ``summary.json``."""
     cases = summary["staircase"]["compensation"]
-    return {key: rounded(case["tracking_rms_um"]) for key, case in cases.items()}
+    sizes = {"": "tracking_rms_um", ", largest": "tracking_max_um"}
+    return {key + of: rounded(case[size]) for key, case in cases.items() for of, size in sizes.items()}
 
 
 def fitted(folder: Path, chromium: str) -> Made:
@@ -89,10 +90,14 @@ def fitted(folder: Path, chromium: str) -> Made:
 
 
 def judged_figures(judged: dict[str, Any]) -> Figures:
-    """Return the errors on the second half of the example log, µm, from the entry ``judged`` of ``fit.json``."""
-    best_of_arx = min(rms for name, rms in judged["peers"].items() if name.startswith("ARX"))
-    found = {"physics": judged["rms_pb"], "hold": judged["rms_hold"], "arx": best_of_arx, "hybrid": judged["rms_h"]}
-    return {key: rounded(1e6 * rms) for key, rms in found.items()}
+    """Return RMS and largest errors on the second half of the example log, µm, from ``judged`` of ``fit.json``."""
+    arx = min((rms, name) for name, rms in judged["peers"].items() if name.startswith("ARX"))
+    three = {"physics model": judged["rms_pb"], "hold": judged["rms_hold"], arx[1]: arx[0], "hybrid": judged["rms_h"]}
+    sizes = [(rms, judged["largest"][name]) for name, rms in three.items()]
+    named = zip(("physics", "hold", "arx", "hybrid"), sizes, strict=True)
+    return {
+        key + of: rounded(1e6 * one) for key, size in named for of, one in zip(("", ", largest"), size, strict=True)
+    }
 
 
 MAKERS: dict[tuple[str, ...], Callable[[Path, str], Made]] = {

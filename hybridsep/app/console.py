@@ -19,7 +19,7 @@ from rich.table import Table
 
 from ..base.errors import ParameterError, brief
 from ..base.files import plain
-from ..base.metrics import shown_figure
+from ..base.metrics import rms_ratio, shown_figure
 
 if TYPE_CHECKING:
     from ..cosim.run import Run
@@ -89,11 +89,12 @@ def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] |
     if as_json:
         print_json({**summary, "verdict": str(verdict_of(run))})
         return
-    table = Table(title=f"{title}: RMS prediction error in µm against the measured position", box=box.SIMPLE)
-    names = {"physics": "rms_pb_um", "hold": "rms_hold_um", "hybrid": "rms_h_um", "× hold": "ratio_to_hold"}
-    for column in names:
+    table = Table("", title=f"{title}: prediction error in µm against the measured position", box=box.SIMPLE)
+    for column in ("physics", "hold", "hybrid", "× hold"):
         table.add_column(column, justify="right", no_wrap=True)
-    table.add_row(*(shown_figure(summary[name]) for name in names.values()))
+    for label, size in (("RMS", "rms"), ("largest", "max")):
+        figures = [summary[f"{size}_{name}_um"] for name in ("pb", "hold", "h")]
+        table.add_row(label, *map(shown_figure, figures), shown_figure(rms_ratio(figures[2], figures[1])))
     console.print(table)
     console.print(str(verdict_of(run)))
 

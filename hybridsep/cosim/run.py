@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.files import written_text, written_whole
 from ..base.metrics import (
+    ErrorSize,
     batch_rms,
     hold,
     html_table,
@@ -183,19 +184,16 @@ class Run:
         return self.prediction_figures() if self.kind == PREDICTOR else self.tracking_figures()
 
     def prediction_figures(self) -> dict[str, float | int]:
-        """Return RMS errors in µm over the whole trajectory, against the measured position unless named true."""
-        known = ~np.isnan(self.x_meas)
-        rms_pb, rms_hold, rms_h = (rms((self.x_meas - x)[known]) for x in (self.x_pb, self.x_hold, self.x_h))
+        """Return RMS and largest errors, µm, over the whole trajectory, of the measured position unless named true."""
+        pb, hold, h = (ErrorSize.of(self.x_meas - x) for x in (self.x_pb, self.x_hold, self.x_h))
         return {
-            "rms_pb_um": 1e6 * rms_pb,
-            "rms_hold_um": 1e6 * rms_hold,
-            "rms_h_um": 1e6 * rms_h,
-            "reduction_percent": reduction_percent(rms_h, rms_pb),
-            "ratio_to_hold": rms_ratio(rms_h, rms_hold),
+            **{f"rms_{name}_um": 1e6 * one.rms for name, one in (("pb", pb), ("hold", hold), ("h", h))},
+            **{f"max_{name}_um": 1e6 * one.largest for name, one in (("pb", pb), ("hold", hold), ("h", h))},
+            "reduction_percent": reduction_percent(h.rms, pb.rms),
+            "ratio_to_hold": rms_ratio(h.rms, hold.rms),
             "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
             "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
             "servo_error_rms_um": 1e6 * rms(self.error),
-            "max_h_um": 1e6 * largest((self.x_meas - self.x_h)[known]),
             "n_samples": len(self.t),
         }
 

@@ -37,12 +37,13 @@ def compensation_table(summary: Summary) -> Table:
     if "spiral_x" in summary:
         wanted["spiral, contour"] = ("spiral_x", "contour_rms_um")
     rows = [
-        (label, *(shown_figure(summary[name]["compensation"][kind][figure]) for kind in kinds))
+        (text, *(shown_figure(summary[name]["compensation"][kind][one]) for kind in kinds))
         for label, (name, figure) in wanted.items()
+        for text, one in ((label, figure), (" largest", figure.replace("rms", "max")))
     ]
     contour = "; contour: X and Y" if "spiral_x" in summary else ""
     return Table(
-        "Compensation: tracking error, RMS in µm of the true position",
+        "Compensation: tracking error, RMS and largest in µm of the true position",
         f"off: not compensated; cold: learns in this run; warm: weights of an earlier run{contour}; {_seeds(summary)}",
         tuple(kind.replace("_", " ") for kind in kinds),
         rows,
@@ -53,14 +54,17 @@ def prediction_table(summary: Summary) -> Table:
     """Return the prediction errors of the paper's model."""
     rows = []
     for name, case in summary.items():
-        rows.append((name, *_figures(case), _printed(PRINTED[name])))
+        paper = PRINTED[name]
+        printed = f"{paper['rms_pb_um']:g}→{paper['rms_h_um']:g}, {paper['reduction_percent']:g} %"
+        rows.append((name, *_figures(case), printed))
+        rows.append((" largest", *_sizes(case, "max"), "", "", ""))
         rows += [
             (f" {part.replace('_', ' ')}", *_figures(case[part]), "")
             for part in ("friction_alone", "stiffness_alone")
             if part in case
         ]
     return Table(
-        "The paper's model (averaging = false): prediction error, RMS in µm",
+        "The paper's model (averaging = false): prediction error, RMS and largest in µm",
         "against the measured position; × hold: relative to holding the last residual; paper: physics → hybrid, "
         f"reduction, as printed there; {_seeds(summary)}",
         ("physics", "hold", "hybrid", "reduction", "× hold", "paper"),
@@ -73,15 +77,14 @@ def _seeds(summary: Summary) -> str:
     return "noise seed 0" if n == 1 else f"staircase: mean of {n} noise seeds"
 
 
+def _sizes(case: Mapping[str, Any], size: str) -> list[str]:
+    """Return the errors of physics, hold and hybrid as text, ``rms`` or ``max``."""
+    return [shown_figure(case[f"{size}_{name}_um"]) for name in ("pb", "hold", "h")]
+
+
 def _figures(case: Mapping[str, Any]) -> list[str]:
-    """Return physics, hold, hybrid, reduction and ratio to hold of a case as text, a dash where there is no figure."""
-    figures = [shown_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, shown_figure(case.get("reduction_percent"), " %"), shown_figure(case.get("ratio_to_hold"))]
-
-
-def _printed(case: Mapping[str, float]) -> str:
-    """Return the paper's figures of a case as text, empty if there are none."""
-    return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
+    """Return physics, hold, hybrid, reduction and ratio to hold of a case as text."""
+    return [*_sizes(case, "rms"), shown_figure(case["reduction_percent"], " %"), shown_figure(case["ratio_to_hold"])]
 
 
 _PICTURES = {

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import SignalError
-from ..base.metrics import known_rms, rms_ratio
+from ..base.metrics import ErrorSize, known_rms, rms_ratio
 from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
@@ -152,6 +152,8 @@ class Judgement:
         Best of physics model, hold and peers.
     ratio : float
         The hybrid's RMS relative to its.
+    largest : mapping
+        Name of each that did not diverge, as in :meth:`Replay.scored` → its largest error, m.
     n_windows : int
     verdict : str
         In words.
@@ -163,6 +165,7 @@ class Judgement:
     peers: Mapping[str, float | str]
     best: str
     ratio: float
+    largest: Mapping[str, float]
     n_windows: int
     verdict: str
 
@@ -295,7 +298,8 @@ class Replay:
         rms_pb, rms_hold, rms_h = self.rms()
         peers: dict[str, float | str] = {one.name: "diverged" if one.diverged else one.rms for one in scored[2:-1]}
         ratio = rms_ratio(rms_h, best.rms, self.least)
-        return Judgement(rms_pb, rms_hold, rms_h, peers, best.name, ratio, verdict.n_windows, str(verdict))
+        most = {one.name: ErrorSize.of(one.errors).largest for one in scored if not one.diverged}
+        return Judgement(rms_pb, rms_hold, rms_h, peers, best.name, ratio, most, verdict.n_windows, str(verdict))
 
     @cached_property
     def _spans(self) -> list[slice]:

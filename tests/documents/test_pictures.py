@@ -27,7 +27,7 @@ def test_a_picture_is_the_one_that_was_made(name: str) -> None:
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
 def test_the_words_below_the_compensated_staircase_are_its_figures(page: str) -> None:
     (words,) = re.findall(r"!\[(Tracking error[^\]]*88[^\]]*)\]", (ROOT / page).read_text(encoding="utf-8"))
-    for printed, figure in zip(re.findall(r"\d+\.\d", words), figures("staircase_compensated.png"), strict=True):
+    for printed, figure in zip(re.findall(r"\d+\.\d", words), figures("staircase_compensated.png")[::2], strict=True):
         assert float(printed) == pytest.approx(figure, abs=0.051), "the picture's own legend has a decimal"
 
 
