@@ -77,8 +77,8 @@ def print_judged(judged: Judged, title: str, verdict: str) -> None:
         console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
-def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] | None = None) -> None:
-    """Print the figures of a run: its prediction errors, or its tracking errors and the ``limits`` that bind them."""
+def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, Any] | None = None) -> None:
+    """Print the figures of a run: prediction errors, or tracking errors and what ``limits`` says binds them."""
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
 
@@ -100,13 +100,13 @@ def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, float] |
 
 
 def _print_tracking(
-    summary: Mapping[str, float | int], as_json: bool, title: str, limits: Mapping[str, float] | None
+    summary: Mapping[str, float | int], as_json: bool, title: str, limits: Mapping[str, Any] | None
 ) -> None:
     """Print tracking errors, change of the command and its peaks."""
     from ..fitting.compensation import binding_words
 
     if as_json:
-        print_json({**summary, **({} if limits is None else {"limits_that_bind": limits})})
+        print_json({**summary, **(limits or {})})
         return
     table = Table(title=title)
     for column in ("", "RMS [µm]", "max [µm]"):
@@ -125,7 +125,7 @@ def _print_tracking(
         f"not compensated {summary['share_off']:.1%}, tripped {summary['share_tripped']:.1%} of the samples"
     )
     if limits is not None:
-        console.print(binding_words(limits))
+        console.print(binding_words(limits["limits_that_bind"]))
 
 
 def print_contours(figures: Mapping[str, Mapping[str, float]], as_json: bool, title: str) -> None:

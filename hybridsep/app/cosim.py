@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +13,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import COMMANDS, DEFAULT_MACHINE
-from ..base.settings import PARAMETERS, Limits, check
+from ..base.settings import PARAMETERS, CompensatorSettings, Limits, check
 from .options import (
     TRAJECTORIES,
     CompensateOption,
@@ -75,11 +75,14 @@ def cosim(
             raise ParameterError("-m, --trajectory, --compensate, --predictor, --plant and --weights are for one axis")
         _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
         return
+    from ..base.metrics import ErrorSize
     from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
+    from ..fitting.compensation import COSTS_MAX, limit_costs
     from ..fmi.archive import build_here, default_flavour
+    from ..logs.units import shown_in
     from ..machines.machine import load_machine, machine_path
-    from .console import RUNS, check_outputs, print_run, print_written, progress_bar
+    from .console import RUNS, check_outputs, console, print_run, print_written, progress_bar
 
     if figure is not None:
         from ..evaluate.figures import prediction_figure, tracking_figure
@@ -96,25 +99,35 @@ def cosim(
     check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)
     title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
     values = {} if compensate is None else {"compensate": PARAMETERS["compensate"].to_fmi(compensate)}
+    limits, costs = None, None
     with tempfile.TemporaryDirectory() as folder, progress_bar(as_json) as advance:
+        controller = predictor or build_here(axis, model, Path(folder), flavour, weights=weights)
+        drive = plant or build_here(axis, "FeedDrive", Path(folder), flavour)
         run = cosimulate(
-            predictor or build_here(axis, model, Path(folder), flavour, weights=weights),
-            plant or build_here(axis, "FeedDrive", Path(folder), flavour),
-            command,
+            *(controller, drive, command),
             controller_values=values,
             progress=lambda k, n: advance("co-simulation", k / n),
         )
+        if predictor is None and compensate not in (None, "off"):
+            settings = replace(axis.compensator_settings, compensate=compensate)
+            limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, settings)
+
+            def error_of(changed: CompensatorSettings) -> ErrorSize:
+                found = cosimulate(controller, drive, command[:COSTS_MAX], controller_values=changed.to_fmi())
+                return ErrorSize.of(found.error)
+
+            if limits:
+                costs = limit_costs(settings, error_of, lambda done: advance("what limits cost", done))
     if out is not None:
         run.save(out)
     if figure is not None and compensate is None:
         prediction_figure(run, title, figure)
     elif figure is not None:
         tracking_figure({str(compensate): run}, title, figure)
-    limits = None
-    if compensate is not None and predictor is None:
-        limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, axis.compensator_settings)
-    print_run(run, as_json, title, limits)
+    print_run(run, as_json, title, None if limits is None else {"limits_that_bind": limits, "limit_costs": costs})
     if not as_json:
+        for line in () if costs is None else costs.lines(shown_in(axis.unit), "--set drive_limits.{entry}="):
+            console.print(line)
         print_written(out, figure)
 
 

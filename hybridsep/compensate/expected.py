@@ -21,21 +21,22 @@ from .compensator import SepCompensator
 __all__ = ["Expected", "expected_errors", "limits_that_bind"]
 
 
-_BINDS = 0.99
-"""Share of a limit from which on a sample of a command counts as bound by it."""
+_BINDS, _SAID = 0.99, 0.001
+"""Share of a limit from which on a sample of a command counts as bound by it, and share of the samples from which on a
+limit counts: fewer cost nothing that could be seen."""
 
 
 def limits_that_bind(x_d: Array, x_dm: Array, T_s: float, settings: CompensatorSettings) -> dict[str, float]:
     """Return which limits bind a modified command ``(n,)``, m: the share of the samples, 0 … 1, by the limit's name.
 
-    Names are as in FMUs, such as ``change_max``; limits that bind nowhere are left out.
+    Names are as in FMUs, such as ``change_max``; limits that bind in fewer than 0.1 % are left out.
     """
     limits = () if settings.limits is None else settings.limits.to_fmi().items()
     sizes = [(name, np.abs(np.diff(x_dm, i)) / T_s**i, limit) for i, (name, limit) in enumerate(limits, start=1)]
     if settings.change_max is not None:
         sizes.append(("change_max", np.abs(x_dm - x_d), settings.change_max))
-    n = {name: int(np.count_nonzero(size >= _BINDS * limit)) for name, size, limit in sizes}
-    return {name: count / len(x_d) for name, count in n.items() if count}
+    shares = {name: np.count_nonzero(size >= _BINDS * limit) / len(x_d) for name, size, limit in sizes}
+    return {name: share for name, share in shares.items() if share >= _SAID}
 
 
 class Expected(NamedTuple):

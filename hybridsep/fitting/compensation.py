@@ -18,14 +18,16 @@ from ..machines.machine import Machine
 from .replay import Recording, beginnings
 
 __all__ = [
+    "COSTS_MAX",
     "LIMITS_WORDS",
     "MARGINS",
-    "LimitEffect",
+    "LimitCosts",
     "Tracking",
     "binding_words",
     "drive_limits",
     "estimated_limits",
     "expected_tracking",
+    "limit_costs",
 ]
 
 MARGINS = np.array([1.25, 2.0, 5.0])
@@ -42,9 +44,6 @@ LIMITS_WORDS = (
 )
 """What the limits of :func:`estimated_limits` are."""
 
-_SAID = 0.001
-"""Share of the samples from which on a limit that binds is said: fewer cost nothing that could be seen."""
-
 _CHANGED = ("acceleration", "jerk", "change_max")
 """Entries of ``[drive_limits]`` whose cost is said."""
 
@@ -54,8 +53,8 @@ FACTORS = (0.5, 1.0, 2.0)
 _GAIN, _COST = 0.05, 0.01
 """Relative gain from which on a limit twice as large is advised, and cost up to which half of one is."""
 
-_EFFECTS_MAX = 4000
-"""Samples over which that is tried: eight runs."""
+COSTS_MAX = 4000
+"""Leading samples over which that is tried: eight runs."""
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -105,27 +104,60 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
 
 
 @dataclass(frozen=True)
-class LimitEffect:
-    """Tracking error to be expected with one of the drive's limits changed.
+class LimitCosts:
+    """What the drive's limits cost a compensator.
 
     Attributes
     ----------
-    name : str
-        Of the limit, such as ``a_max``.
-    error : mapping
-        Factor → :class:`ErrorSize`, with this limit alone times a factor.
+    effects : mapping
+        Name of a limit, such as ``a_max`` → factor → :class:`ErrorSize` with this limit alone times the factor.
+    advised : mapping
+        Name → value of the limits that are advised in their place, SI; empty where none is.
+    advised_error : ErrorSize
+        With these.
     """
 
-    name: str
-    error: Mapping[float, ErrorSize]
+    effects: Mapping[str, Mapping[float, ErrorSize]]
+    advised: Mapping[str, float]
+    advised_error: ErrorSize
 
-    @property
-    def advised(self) -> float:
-        """Factor: 2 where that takes away a part of the error; of ``change_max`` ½ where it costs nothing."""
-        half, one, two = (self.error[factor].rms for factor in FACTORS)
-        if two < (1.0 - _GAIN) * one:
-            return 2.0
-        return 0.5 if self.name == "change_max" and half < (1.0 + _COST) * one else 1.0
+    def lines(self, shown: DisplayUnits, option: str = "--{name} ") -> list[str]:
+        """Return a line for each limit and, last, the advised ones to paste, each after an ``option`` of its name."""
+        lines = [f"Over the first {COSTS_MAX} samples at most, with each limit times a factor:"]
+        for name, errors in self.effects.items():
+            each = ", ".join(f"{factor:g} ×: {_words(error, shown)}" for factor, error in errors.items())
+            lines.append(f"{name} {each}.")
+        if self.advised:
+            entries = {one.name: entry for entry, one in DRIVE_LIMIT_ENTRIES.items()}
+            paste = (f"{option.format(name=one, entry=entries[one])}{v:.4g}" for one, v in self.advised.items())
+            left = _words(self.advised_error, shown)
+            lines.append(f"If the drive allows it: {' '.join(paste)}, with which about {left} is left.")
+        return lines
+
+
+def limit_costs(
+    settings: CompensatorSettings,
+    error_of: Callable[[CompensatorSettings], ErrorSize],
+    progress: Callable[[float], object],
+) -> LimitCosts:
+    """Return what each limit of the drive costs, of the tracking errors with other settings.
+
+    A limit twice as large is advised where that takes away a part of the error, ``change_max`` of half the size where
+    that costs nothing.
+    """
+    now, wanted, effects = error_of(settings), settings, {}
+    for i, entry in enumerate(_CHANGED[: 2 if settings.change_max is None else 3], start=1):
+        errors = {one: now if one == 1.0 else error_of(_scaled(settings, entry, one)) for one in FACTORS}
+        half, two = errors[0.5].rms, errors[2.0].rms
+        if two < (1.0 - _GAIN) * now.rms:
+            wanted = _scaled(wanted, entry, 2.0)
+        elif entry == "change_max" and half < (1.0 + _COST) * now.rms:
+            wanted = _scaled(wanted, entry, 0.5)
+        effects[DRIVE_LIMIT_ENTRIES[entry].name] = errors
+        progress(i / len(_CHANGED))
+    before, after = settings.to_fmi(), wanted.to_fmi()
+    advised = {name: float(after[name]) for name in effects if after[name] != before[name]}
+    return LimitCosts(effects, advised, error_of(wanted) if advised else now)
 
 
 @dataclass(frozen=True)
@@ -138,12 +170,8 @@ class Tracking:
         As measured, and estimates with each model; NaN without a test sample, or where a plan diverges.
     limits : mapping
         Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
-    effects : tuple of LimitEffect
-        With the hybrid, over the first samples of each log; empty where no limit binds it.
-    advised : mapping
-        Name → value of the limits that are advised in their place, SI; empty where none is.
-    advised_error : ErrorSize
-        Over the same samples.
+    costs : LimitCosts, optional
+        With the hybrid, over the first samples of each log; None where no limit binds it.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
     """
@@ -152,9 +180,7 @@ class Tracking:
     physics: ErrorSize
     hybrid: ErrorSize
     limits: Mapping[str, Mapping[str, float]]
-    effects: tuple[LimitEffect, ...]
-    advised: Mapping[str, float]
-    advised_error: ErrorSize
+    costs: LimitCosts | None
     change_max: float | None
     following_error_max: float
 
@@ -167,16 +193,9 @@ class Tracking:
             f"{_words(self.physics, shown)} by the physics model (compensate = physics).",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
-        for effect in self.effects:
-            each = ", ".join(f"{factor:g} ×: {_words(error, shown)}" for factor, error in effect.error.items())
-            lines.append(f"{effect.name} {each}.")
-        if self.advised:
-            options = " ".join(f"--{name} {value:.4g}" for name, value in self.advised.items())
-            lines.append(
-                f"If the drive allows it: {options}, with which about {_words(self.advised_error, shown)} is left."
-            )
         return [
             *lines,
+            *(self.costs.lines(shown) if self.costs is not None else ()),
             "Where the measured following error is above following_error_max = "
             f"{shown.words(self.following_error_max, '.4g')} for three samples in a row, the compensator trips: its "
             "change of the command fades until reset.",
@@ -204,16 +223,14 @@ def expected_tracking(
         for model, one in judged.items()
         if one is not None and len(one.x_d)
     }
-    effects: tuple[LimitEffect, ...] = ()
-    advised: dict[str, float] = {}
-    advised_error = _size(None)
-    if any(share >= _SAID for share in bound.get("hybrid", {}).values()):
-        first = beginnings(recordings, _EFFECTS_MAX)
-        effects, wanted = _limit_effects(machine, settings["hybrid"], first, lambda done: progress(0.5 + 0.4 * done))
-        values = _limits_of(wanted)
-        advised = {effect.name: values[effect.name] for effect in effects if effect.advised != 1.0}
-        if advised:
-            advised_error = _size(_expected(machine, wanted, first))
+    costs = None
+    if bound.get("hybrid"):
+        first = beginnings(recordings, COSTS_MAX)
+        costs = limit_costs(
+            settings["hybrid"],
+            lambda one: _size(_expected(machine, one, first)),
+            lambda done: progress(0.5 + 0.4 * done),
+        )
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     return Tracking(
@@ -221,31 +238,10 @@ def expected_tracking(
         physics=_size(judged["physics"]),
         hybrid=_size(judged["hybrid"]),
         limits=bound,
-        effects=effects,
-        advised=advised,
-        advised_error=advised_error,
+        costs=costs,
         change_max=allowed.change_max,
         following_error_max=allowed.following_error_max,
     )
-
-
-def _limit_effects(
-    machine: Machine,
-    settings: CompensatorSettings,
-    recordings: Sequence[Recording],
-    progress: Callable[[float], object],
-) -> tuple[tuple[LimitEffect, ...], CompensatorSettings]:
-    """Return what each limit costs, and the settings with those that are advised."""
-    now, wanted, effects = _size(_expected(machine, settings, recordings)), settings, []
-    for i, entry in enumerate(_CHANGED, start=1):
-        errors = {
-            factor: now if factor == 1.0 else _size(_expected(machine, _scaled(settings, entry, factor), recordings))
-            for factor in FACTORS
-        }
-        effects.append(LimitEffect(DRIVE_LIMIT_ENTRIES[entry].name, errors))
-        wanted = _scaled(wanted, entry, effects[-1].advised)
-        progress(i / len(_CHANGED))
-    return tuple(effects), wanted
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
@@ -264,13 +260,6 @@ def _size(found: Expected | None) -> ErrorSize:
     return ErrorSize.of(np.empty(0) if found is None else found.compensated)
 
 
-def _limits_of(settings: CompensatorSettings) -> dict[str, float]:
-    """Return the drive's limits by the names of their options."""
-    assert settings.limits is not None
-    assert settings.change_max is not None
-    return {**settings.limits.to_fmi(), "change_max": settings.change_max}
-
-
 def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> CompensatorSettings:
     """Return the settings with a limit of ``[drive_limits]`` times a factor."""
     part: Any = settings if entry == "change_max" else settings.limits
@@ -280,7 +269,7 @@ def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> Compens
 
 def binding_words(shares: Mapping[str, float]) -> str:
     """Return which limits bind a compensated command, and in which share of its samples, in words."""
-    each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items() if share >= _SAID)
+    each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items())
     if not each:
         return "No limit binds the compensated command."
     return f"Limits bind the compensated command: {each} of the samples; within larger ones less error would be left."

@@ -100,20 +100,21 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     )
     found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
     assert found.limits["hybrid"]["change_max"] > 0.1
-    assert [one.name for one in found.effects] == ["a_max", "j_max", "change_max"]
-    sizes = {one.name: [one.error[factor].rms for factor in FACTORS] for one in found.effects}
+    assert found.costs is not None
+    assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
+    sizes = {name: [errors[factor].rms for factor in FACTORS] for name, errors in found.costs.effects.items()}
     half, one, two = sizes["change_max"]
     assert half > 1.2 * one > 1.5 * two
     assert sizes["j_max"] == pytest.approx([one] * 3, rel=0.05)  # it does not bind
-    assert found.advised == {"change_max": pytest.approx(2 * change_max)}
-    assert found.advised_error.rms == two
+    assert found.costs.advised == {"change_max": pytest.approx(2 * change_max)}
+    assert found.costs.advised_error.rms == two
     said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))))
     assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
 @pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.033}, 15), (0.0022, {}, 0.5)])
-def test_cosim_says_which_limit_binds(
+def test_cosim_says_which_limit_binds_and_what_it_costs(
     hybridsep: Run, tmp_path: Path, change_max: float, bound: dict[str, float], most: float
 ) -> None:
     text = (LOOPS / "axis.toml").read_text(encoding="utf-8")
@@ -126,6 +127,12 @@ def test_cosim_says_which_limit_binds(
     found = json.loads(out)
     assert found["limits_that_bind"] == pytest.approx(bound, abs=1e-3)
     assert found["tracking_rms_um"] < most
+    assert (found["limit_costs"] is not None) == bool(bound)
+    if bound:
+        assert found["limit_costs"]["advised"] == {"change_max": 0.002}
+        one, two = (found["limit_costs"]["effects"]["change_max"][factor] for factor in ("1.0", "2.0"))
+        assert two["rms"] < 0.1 * one["rms"]
+        assert two["largest"] < 0.5 * one["largest"]
     words = "Limits bind the compensated command: change_max in 3.3 % of the samples; within larger ones less error"
     assert binding_words(bound).startswith(words if bound else "No limit binds the compensated command.")
 
