@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))  # mathml
+sys.path.insert(0, str(Path(__file__).resolve().parent))  # mathml, try_page
 
 from hybridsep import __version__
 
@@ -13,7 +13,7 @@ project = "hybridsep"
 author = "the authors of hybridsep"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml", "try_page"]
 exclude_patterns = ["**/.*", "experiments/*"]  # evidence/experiments.md sums them up
 myst_enable_extensions = ["amsmath", "attrs_block", "deflist", "dollarmath"]
 myst_heading_anchors = 3

@@ -34,7 +34,7 @@ def test_the_c_files_are_formatted() -> None:
     assert command, "clang-format is missing: pip install -e '.[test]'"
     files = [
         path
-        for folder in ("fmu_src", "tests", "benchmarks", "integrations")
+        for folder in ("fmu_src", "tests", "benchmarks", "integrations", "docs")
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in SUFFIXES
     ]

@@ -72,6 +72,10 @@ def test_no_page_loads_anything_from_elsewhere(site: Path, pages: dict[str, Page
         assert not re.search(r"(fetch|open|import)\(\s*['\"`][^)]*https?://", path.read_text(encoding="utf-8")), path
 
 
+def test_the_page_for_a_log_is_beside_it(site: Path) -> None:
+    assert all((site / "try" / name).stat().st_size > 1000 for name in ("index.html", "hsep.wasm.js", "example.csv"))
+
+
 def test_the_reference_has_every_public_name(pages: dict[str, Page]) -> None:
     anchors = {anchor.rpartition(".")[2] for anchor in pages["reference/api"].anchors}
     assert set(hybridsep.__all__) - {"HybridSepError", "__version__"} <= anchors

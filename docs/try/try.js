@@ -1,0 +1,287 @@
+// Prediction errors of a log that is dropped on the page: physics model, hold, ARX, hybrid. Positions are in m or rad.
+"use strict";
+
+const UNITS = { // factor to m or rad; name of its errors' unit, and their factor
+  m: [1, "µm", 1e6], mm: [1e-3, "µm", 1e6], "µm": [1e-6, "µm", 1e6], in: [0.0254, "µm", 1e6],
+  rad: [1, "µrad", 1e6], deg: [Math.PI / 180, "mdeg", 180e3 / Math.PI],
+};
+const TIMES = { s: 1, ms: 1e-3, "µs": 1e-6 };
+const NAMES = { // in small letters, by precedence; hybridsep/logs/names.py has more of them
+  t: "t time timestamp zeit",
+  x_d: "x_d xd x_ref x_cmd x_set x_des reference setpoint command commanded pos_cmd des_pos",
+  x: "x_meas x x_m x_act measured actual feedback pos_act act_pos enc_pos",
+};
+const DEAD_TIMES = 21; // samples: 0 to 20 are tried
+const ARX_LAGS = [20, 40];
+const FAR = 10; // largest distances from the start, beyond which a prediction diverges
+const COLOURS = { "physics model": "#999", hold: "#e69f00", ARX20: "#cc79a7", ARX40: "#d55e00", hybrid: "#0b84d8" };
+const at = (id) => document.getElementById(id);
+const pause = () => new Promise((done) => setTimeout(done));
+
+/** What is wrong with a log, for the user. */
+class LogError extends Error {}
+
+/** Names and rows of texts of a CSV; lines that begin with # are comments. */
+function parse(text) {
+  const lines = text.split(/\r?\n/).filter((line) => line.trim() && !line.startsWith("#"));
+  const separator = [";", "\t", ","].find((one) => lines[0]?.includes(one));
+  const cells = lines.map((line) => line.split(separator).map((cell) => cell.trim().replace(/^"(.*)"$/, "$1")));
+  if (!separator || cells[0].every((cell) => !isNaN(cell.replace(",", "."))))
+    throw new LogError("the first row must name the columns, such as t,x_d,x");
+  return { names: cells[0], rows: cells.slice(1), decimal: separator === "," ? "." : "," };
+}
+
+/** A name without its unit, in small letters; and the unit: x [mm], x (mm) or x_mm. */
+const plain = (name) => name.toLowerCase().replace(/(\s*[\[(].*|_(mm?|[uµ]m|[mu]?s))$/, "").replace(/[\s.-]+/g, "_");
+const stated = (name) => /[\[(_]([^\[(_]+?)[\])]?$/.exec(name)?.[1].replace(/[uμ](?=[ms])/, "µ").replace("°", "deg");
+
+function column({ names, rows, decimal }, j, factor) {
+  return Float64Array.from(rows, (row, i) => {
+    const cell = (row[j] ?? "").replace(decimal, ".");
+    if (cell === "" || !isFinite(cell))
+      throw new LogError(`row ${i + 1}, ${names[j]}: "${cell}" is no number; hybridsep fit reads logs with gaps`);
+    return factor * cell;
+  });
+}
+
+/** Sampling interval of times, s. */
+function interval(t) {
+  const steps = t.slice(1).map((one, i) => one - t[i]), T_s = steps.slice().sort()[steps.length >> 1];
+  const wrong = steps.findIndex((step) => !(T_s > 0 && Math.abs(step - T_s) <= 0.5 * T_s));
+  if (wrong < 0) return (t[t.length - 1] - t[0]) / steps.length;
+  const [here, usual] = [steps[wrong], T_s].map((one) => Number(one.toPrecision(4)));
+  throw new LogError(`row ${wrong + 2}: the time changes by ${here} s, elsewhere by ${usual} s; cut the log there`);
+}
+
+/** Variance of the first n residuals of ω² / (s² + 2ζωs + ω²), over a zero-order hold, from rest at the first command. */
+function misfit({ f_n, zeta, dead_time }, T_s, x_d, x, n) {
+  if (!(f_n * T_s > 1e-5 && f_n * T_s < 0.45 && zeta > 0.02 && zeta < 20)) return Infinity;
+  const omega = 2 * Math.PI * f_n, s = zeta * omega, d = omega * Math.sqrt(Math.abs(zeta * zeta - 1)) || 1e-9;
+  const [C, S] = zeta > 1 ? [Math.cosh(d * T_s), Math.sinh(d * T_s) / d] : [Math.cos(d * T_s), Math.sin(d * T_s) / d];
+  const decay = Math.exp(-s * T_s), a = decay * (C + S * s), b = decay * S, c = -b * omega * omega, e = decay * (C - S * s);
+  let sum = 0, squares = 0;
+  for (let k = 0, y = 0, v = 0; k < n; k++) {
+    const error = x[k] - x_d[0] - y, u = x_d[Math.max(k - dead_time, 0)] - x_d[0]; // exp(A T_s) = [a b; c e]
+    [sum, squares, y, v] = [sum + error, squares + error * error, u + a * (y - u) + b * v, c * (y - u) + e * v];
+  }
+  return squares / n - (sum / n) ** 2;
+}
+
+/** The mode of least misfit: for each dead time a search over ln f_n and ln ζ from three beginnings. */
+async function identify(T_s, x_d, x, n) {
+  let best = [Infinity];
+  for (let dead_time = 0; dead_time < DEAD_TIMES; dead_time++) {
+    for (const f of [0.005, 0.02, 0.08]) {
+      let found = [Infinity, { f_n: f / T_s, zeta: 0.7, dead_time }];
+      for (let step = 0.5; step > 0.005; ) {
+        const before = found;
+        for (const [i, j] of [[step, 0], [-step, 0], [0, step], [0, -step]]) {
+          const mode = { f_n: before[1].f_n * Math.exp(i), zeta: before[1].zeta * Math.exp(j), dead_time };
+          const error = misfit(mode, T_s, x_d, x, n);
+          if (error < found[0]) found = [error, mode];
+        }
+        if (found === before) step /= 2;
+      }
+      if (found[0] < best[0]) best = found;
+    }
+    await pause();
+  }
+  return best[1];
+}
+
+/** Predictions by physics model and hybrid, of the C library, each window before it is learned: two (n,) arrays. */
+async function hybrid(mode, Np, p, T_s, x_d, x, progress) {
+  const module = Uint8Array.from(atob(MODULE), (c) => c.charCodeAt(0)), n = x.length;
+  const library = (await WebAssembly.instantiate(module)).instance.exports;
+  library._initialize();
+  const room = library.room(4 * n), places = [0, 1, 2, 3].map((i) => room + 8 * i * n);
+  const refused = library.begin(Np, p, mode.dead_time, T_s, mode.f_n, mode.zeta, x_d[0]);
+  if (refused) {
+    const text = new Uint8Array(library.memory.buffer, refused), name = text.subarray(0, text.indexOf(0));
+    const what = new TextDecoder().decode(name);
+    throw new LogError(`${what} is out of its range: T_s = ${T_s} s, Np = ${Np}, p = ${p}, which must be ≤ Np`);
+  }
+  const view = (i) => new Float64Array(library.memory.buffer, places[i], n);
+  view(0).set(x_d);
+  view(1).set(x);
+  for (let k = 0; k < n + Np; k += 1000) {
+    if (!library.play(k, Math.min(k + 1000, n + Np), n, Np, ...places))
+      throw new LogError(`the prediction diverges before row ${k + 1000}; try a smaller p`);
+    progress(k / n);
+    await pause();
+  }
+  return [view(2).slice(), view(3).slice()];
+}
+
+/** Add a row to a triangular factor by Givens rotations; the row is spent. */
+function rotate(R, row) {
+  for (let i = 0; i < R.length; i++) {
+    if (row[i] === 0) continue;
+    const r = Math.hypot(R[i][i], row[i]), c = R[i][i] / r, s = row[i] / r;
+    for (let j = i; j < R.length; j++) [R[i][j], row[j]] = [c * R[i][j] + s * row[j], c * row[j] - s * R[i][j]];
+  }
+}
+
+/** Coefficients of least squares; where n rows leave them open, a penalty of their rounding's size takes the least. */
+function solution(R, n) {
+  const m = R.length - 1, w = new Float64Array(m), factor = R.map((row) => row.slice());
+  const small = 2.3e-16 * n * Math.max(...R.map((row, i) => Math.abs(row[i])));
+  for (let i = 0; i < m; i++) rotate(factor, Float64Array.from(factor, (_, j) => (j === i ? small : 0)));
+  for (let i = m - 1; i >= 0; i--) {
+    w[i] = factor[i][m];
+    for (let j = i + 1; j < m; j++) w[i] -= factor[i][j] * w[j];
+    w[i] /= factor[i][i];
+  }
+  return w;
+}
+
+/** y(k) = Σ a_i y(k−i) + Σ b_j [x_d(k−j) − x_d(k−j−1)] + c, y = x − x_d: predictions from row first on, NaN before. */
+async function arx(lags, Np, first, x_d, x, progress) {
+  const n = x.length, m = 2 * lags + 2, y = x.map((one, k) => one - x_d[k]), predicted = new Float64Array(n).fill(NaN);
+  const R = Array.from({ length: m + 1 }, () => new Float64Array(m + 1));
+  const far = FAR * x.reduce((most, one, k) => Math.max(most, Math.abs(one - x_d[0]), Math.abs(x_d[k] - x_d[0])), 0);
+  const row = (past, k) => {
+    const found = new Float64Array(m + 1);
+    for (let i = 1; i <= lags; i++) found[i - 1] = past[k - i];
+    for (let j = 0; j <= lags; j++) found[lags + j] = x_d[k - j] - x_d[k - j - 1];
+    found[m - 1] = 1;
+    return found;
+  };
+  for (let begin = 0; begin < n; begin += Np) {
+    const end = Math.min(begin + Np, n);
+    if (begin >= first) { // a free run over the window
+      const w = solution(R, begin), run = y.slice(0, end);
+      for (let k = begin; k < end; k++) {
+        const known = row(run, k);
+        run[k] = w.reduce((sum, one, i) => sum + one * known[i], 0);
+        if (!(Math.abs(run[k]) <= far)) return predicted.fill(NaN);
+        predicted[k] = x_d[k] + run[k];
+      }
+    }
+    for (let k = Math.max(begin, lags + 1); k < end; k++) {
+      const known = row(y, k);
+      known[m] = y[k];
+      rotate(R, known);
+    }
+    progress(begin / n);
+    if (begin / Np % 10 === 0) await pause();
+  }
+  return predicted;
+}
+
+/** The mode, the first row that is scored, and the predictions by name. */
+async function predict({ x_d, x, T_s, Np, p }, say) {
+  const n = x.length, first = Math.floor(n / 2 / Np) * Np, last = (k) => k - k % Np - 1;
+  if (n < 10 * Np || first <= 2 * ARX_LAGS.at(-1))
+    throw new LogError(`${n} rows are too few: ten windows of Np = ${Np} are needed, and 200; lower Np`);
+  if (x_d.subarray(0, first).every((one) => one === x_d[0])) throw new LogError("no command moves in the first half");
+  say("physics model", 0);
+  const mode = await identify(T_s, x_d, x, first);
+  const [x_pb, x_h] = await hybrid(mode, Np, p, T_s, x_d, x, (done) => say("hybrid", done));
+  const hold = x_pb.map((one, k) => (k < Np ? one : one + x[last(k)] - x_pb[last(k)]));
+  const predictions = { "physics model": x_pb, hold };
+  for (const lags of ARX_LAGS)
+    predictions[`ARX${lags}`] = await arx(lags, Np, first, x_d, x, (done) => say(`ARX${lags}`, done));
+  return { mode, first, predictions: { ...predictions, hybrid: x_h } };
+}
+
+/** RMS and largest error over rows; NaN where nothing is predicted. */
+function score(x, predicted, begin, end) {
+  const errors = x.slice(begin, end).map((one, i) => Math.abs(one - predicted[begin + i]));
+  const squares = errors.reduce((sum, e) => sum + e * e, 0), max = errors.reduce((a, b) => Math.max(a, b));
+  return { rms: Math.sqrt(squares / errors.length), max };
+}
+
+/** Errors of the windows on a logarithmic axis, as SVG. */
+function plot({ x, Np, first, predictions, unit: [, unit, factor] }, what) {
+  const n = Math.ceil(x.length / Np), names = Object.keys(predictions), lines = names.map((name) =>
+    Array.from({ length: n }, (_, i) => factor * score(x, predictions[name], i * Np, (i + 1) * Np)[what]));
+  const shown = lines.flat().filter((e) => e > 0);
+  const low = shown.reduce((a, b) => Math.min(a, b)), high = shown.reduce((a, b) => Math.max(a, b));
+  const X = (i) => (60 + 830 * i / n).toFixed(1), half = X(first / Np);
+  const Y = (e) => (280 - 270 * Math.log(Math.max(e, low) / low) / Math.log(high / low)).toFixed(1);
+  let svg = `<path d="M${half} 10V280"/><text x="${half}" y="300" text-anchor="middle">scored from here</text>` +
+    `<text x="60" y="300">window 1</text><text x="890" y="300" text-anchor="end">${n}</text>` +
+    `<text transform="translate(14 145) rotate(-90)" text-anchor="middle">${unit}</text>`;
+  for (let decade = Math.floor(Math.log10(low)); decade <= Math.log10(high); decade++)
+    for (const tick of [1, 2, 5].map((one) => Number(`${one}e${decade}`)).filter((one) => one >= low && one <= high))
+      svg += `<path d="M60 ${Y(tick)}H890"/><text x="52" y="${Y(tick)}" dy="4" text-anchor="end">${tick}</text>`;
+  lines.forEach((e, j) => {
+    const points = e.map((one, i) => (one >= 0 ? `${X(i + 0.5)},${Y(one)} ` : ""));
+    svg += `<polyline points="${points.join("")}" stroke="${COLOURS[names[j]]}"/>`;
+  });
+  at("plot").innerHTML = svg;
+}
+
+let log, shown, runs = 0;
+
+function tell(error, status = "") {
+  [at("error").textContent, at("status").textContent] = [error, status];
+  at("result").hidden = !shown;
+}
+
+async function run() {
+  const turn = ++runs, begun = performance.now(), value = (id) => Number(at(id).value), t = at("t").value;
+  const say = (what, done) => {
+    if (turn !== runs) throw new LogError("another run has begun");
+    tell("", `${what} … ${Math.round(100 * done)} %`);
+  };
+  shown = null;
+  try {
+    if (!at("form").checkValidity()) throw new LogError("choose commanded and measured position, and their unit");
+    const unit = UNITS[at("unit").value], [x_d, x] = ["x_d", "x"].map((id) => column(log, value(id), unit[0]));
+    const T_s = t ? interval(column(log, t, TIMES[stated(log.names[t])] ?? 1)) : 1e-3 * value("T_s");
+    const given = { x_d, x, T_s, unit, Np: value("Np"), p: value("p") }, found = await predict(given, say);
+    shown = { ...given, ...found };
+    show((performance.now() - begun) / 1e3);
+  } catch (error) {
+    if (turn === runs) tell(error instanceof LogError ? error.message : `the page fails: ${error}`);
+  }
+}
+
+function show(seconds) {
+  const { x, first, predictions, unit, mode, Np, T_s } = shown, names = Object.keys(predictions);
+  const scores = names.map((name) => score(x, predictions[name], first, x.length));
+  const best = scores.reduce((a, b) => (b.rms < a.rms ? b : a));
+  const cell = (e) => `<td>${isNaN(e) ? "diverges" : `${(unit[2] * e).toPrecision(3)} ${unit[1]}`}</td>`;
+  at("rows").innerHTML = scores.map((one, i) => `<tr${one === best ? ' class="best"' : ""}><td>` +
+    `<i style="background:${COLOURS[names[i]]}"></i>${names[i]}</td>${cell(one.rms)}${cell(one.max)}</tr>`).join("");
+  const [f_n, zeta, span] = [mode.f_n, mode.zeta, 1e3 * Np * T_s].map((one) => one.toPrecision(3));
+  at("model").textContent = `${f_n} Hz, damping ${zeta}, ${mode.dead_time} samples of dead time`;
+  tell("", `${x.length} rows, windows of ${Np} samples, ${span} ms; computed in ${seconds.toFixed(1)} s`);
+  plot(shown, at("what").value);
+}
+
+async function open(file) {
+  shown = null;
+  try {
+    log = parse(await file.text());
+  } catch (error) {
+    return tell(`${file.name}: ${error.message}`);
+  }
+  for (const [role, known] of Object.entries(NAMES)) {
+    const place = known.split(" ").map((name) => log.names.findIndex((one) => plain(one) === name)).find((j) => j >= 0);
+    const none = role === "t" ? [new Option("none", "")] : [];
+    at(role).replaceChildren(...none, ...log.names.map((name, j) => new Option(name, j)));
+    at(role).value = place ?? "";
+  }
+  at("unit").value = stated(log.names[at("x_d").value] ?? "") ?? "";
+  at("form").hidden = false;
+  return run();
+}
+
+function drop(event, over) {
+  event.preventDefault();
+  at("drop").className = over;
+}
+
+at("unit").replaceChildren(...Object.keys(UNITS).map((name) => new Option(name)));
+at("file").onchange = (event) => event.target.files[0] && open(event.target.files[0]);
+at("form").onsubmit = (event) => { event.preventDefault(); run(); };
+at("what").onchange = () => plot(shown, at("what").value);
+document.ondragover = (event) => drop(event, "over");
+document.ondragleave = (event) => drop(event, "");
+document.ondrop = (event) => {
+  drop(event, "");
+  if (event.dataTransfer.files[0]) open(event.dataTransfer.files[0]);
+};
