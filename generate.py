@@ -8,22 +8,17 @@ from __future__ import annotations
 
 import ast
 import itertools
-import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
-from hybridsep.base.settings import PARAMETERS, PredictorSettings
-from hybridsep.base.state import leaves
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.compensate import newton, planning, qp, splines
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
-from hybridsep.model.physics import ModalModel
 from hybridsep.predict import uncertainty
 from hybridsep.predict.averaging import experts, features, model, recall, stacking, start
 from hybridsep.predict.averaging.constants import CONSTANTS
@@ -63,7 +58,7 @@ PLACES = (
 )
 """Constants without a prefix in C."""
 
-OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "_LEAST_SHARE", "_MOST_SHARE", "REGRESSIONS")
+OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "REGRESSIONS")
 """Constants of these modules that C has not."""
 
 
@@ -148,11 +143,6 @@ def constants_header() -> str:
     defines = [_experts(), *_defines(PREDICTIONS)]
     averaging = [f"#define HSEP_AVERAGING_{name.upper()} {_number(value)}" for name, value in asdict(CONSTANTS).items()]
     defines.append("\n".join(["/* hybridsep/predict/averaging/constants.py */", *averaging]))
-    settings = PredictorSettings(period=1.0)
-    averaged = model.AveragedModel.init(settings, ModalModel.spring_mass_damper(1.0, 1.0, 1.0).discretise(settings.T_s))
-    records = {"LEARNED": averaged.learned, "UNCERTAINTY": uncertainty.Uncertainty.init(1.0)}
-    ranges = [f"#define HSEP_{name}_RANGES {_ranges_of(record)}" for name, record in records.items()]
-    defines.append("\n".join(["/* Least, most and count of the numbers that are learned, in their order. */", *ranges]))
     return _constants("HSEP_PREDICT_CONSTANTS_H", "predictions and their errors", defines)
 
 
@@ -219,18 +209,6 @@ def _declared(module: ModuleType) -> list[str]:
             nodes = ast.walk(statement.targets[0])
             names += [one.id for one in nodes if isinstance(one, ast.Name) and one.id.isupper()]
     return [name for name in names if name not in OF_LIBRARY]
-
-
-def _ranges_of(record: Any) -> str:
-    """Return the ranges of a record's numbers, each with how many numbers in a row have it."""
-    each = [
-        (float(least), float(most))
-        for leaf in leaves(record)
-        for _, least, most in np.broadcast(leaf.value, leaf.least, leaf.most)
-    ]
-    runs = [(bounds, len(list(same))) for bounds, same in itertools.groupby(each)]
-    text = ", ".join(f"{{{_number(least)}, {_number(most)}, {n}}}" for (least, most), n in runs)
-    return " \\\n    ".join(["", *textwrap.wrap(text, 112)])[1:]
 
 
 def _initialiser(value: Any) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 from hybridsep.base.clock import check_communication_point, check_step_size
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import check_position
-from hybridsep.base.state import Saved
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
@@ -60,11 +59,10 @@ class FeedDrivePy(slave.TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Restore the plant's state and the position in the noise sequence."""
-        saved = Saved("drive", meta, {}, {})
         plant, encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
-        plant.restore(saved.numbers("plant", len(plant.state())))
-        encoder.n_draws, x_meas = saved.whole("n_draws"), saved.real("x_meas")
-        self.plant, self.encoder, self.x_meas, self.end = plant, encoder, x_meas, saved.real("end")
+        plant.restore(meta["plant"])
+        encoder.n_draws = meta["n_draws"]
+        self.plant, self.encoder, self.x_meas, self.end = plant, encoder, meta["x_meas"], meta["end"]
 
     def _new_plant(self) -> Drive:
         values = self.values

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
 from ..base.signals import as_measured, as_published, as_samples
-from ..base.state import Saved, arrays_of, pack, restored, unpack
+from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
 from ..online.look_ahead import LookAhead, PublishedWindow, SepState
 from ..online.monitor import Monitor
@@ -306,44 +306,25 @@ class SepCompensator:
         StateError
             If the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
-        saved = Saved(_KIND, *unpack(_KIND, blob))
-        predictor = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
-        kept = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
-        with saved.consistent():
-            compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
-        compensator.predictor = kept  # the constructor has restarted the other one
-        compensator.lead_in = saved.whole("lead_in")
-        compensator._state_before = SepState(saved.whole("state_before", SepState.HYBRID))
-        compensator._planning.paused, compensator._planning.pause = saved.whole("paused"), saved.whole("pause")
-        n, Np = len(compensator._previous_plan), predictor.Np
-        compensator.monitor = restored(compensator.monitor, saved)
-        compensator._previous_plan, compensator._delta_before = (
-            saved.array("previous_plan", n),
-            saved.array("delta_before", 3),
-        )
-        compensator._x_d_before = saved.array("x_d_before", len(compensator._x_d_before), finite=False)
-        if saved.field("pending") is not None:
-            state, runs_away, n_warm_up = saved.numbers("pending", 3)
-            if (
-                state not in range(SepState.TRIPPED)
-                or runs_away not in (0, 1)
-                or n_warm_up not in range(Np + 1)
-                or kept.n_pending != Np
-            ):
-                raise saved.error("the pending window must be planned and predicted")
-            # A hybrid prediction that is not used may diverge.
-            prediction = Prediction(
-                saved.array("x_pb", Np),
-                saved.array("e_h", Np, finite=False),
-                saved.array("x_h_std", Np),
-                int(n_warm_up),
-            )
-            compensator._pending = PendingPlan(
-                saved.array("coefficients", n),
-                saved.array("delta", Np),
-                saved.array("x_d", Np),
-                prediction,
-                SepState(int(state)),
-                runs_away == 1,
-            )
+        meta, arrays, parts = unpack(_KIND, blob)
+        with restoring(_KIND):
+            predictor, kept = (HybridPredictor.from_bytes(parts["predictor"], disturbances) for _ in range(2))
+            compensator = cls(predictor, CompensatorSettings.from_table(meta["settings"]))
+            compensator.predictor = kept  # the constructor has restarted the other one
+            compensator.lead_in, compensator._state_before = meta["lead_in"], SepState(meta["state_before"])
+            compensator._planning.paused, compensator._planning.pause = meta["paused"], meta["pause"]
+            compensator.monitor = restored(compensator.monitor, arrays)
+            compensator._previous_plan, compensator._delta_before = arrays["previous_plan"], arrays["delta_before"]
+            compensator._x_d_before = arrays["x_d_before"]
+            if meta["pending"]:
+                state, runs_away, n_warm_up = meta["pending"]
+                prediction = Prediction(arrays["x_pb"], arrays["e_h"], arrays["x_h_std"], n_warm_up)
+                compensator._pending = PendingPlan(
+                    arrays["coefficients"],
+                    arrays["delta"],
+                    arrays["x_d"],
+                    prediction,
+                    SepState(state),
+                    bool(runs_away),
+                )
         return compensator

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ..base.settings import PredictorSettings
-from ..base.state import Saved
 from ..model.physics import ModalModel, Mode
 from ..online.look_ahead import LookAhead, Planner
 from ..online.look_ahead_inputs import LookAheadInputs
@@ -74,10 +73,6 @@ class LookAheadSlave(TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
-        state = Saved("look-ahead", meta, {}, {})
-        *others, x_meas = state.numbers("inputs", LookAheadInputs.STATE_SIZE)
-        inputs = LookAheadInputs.from_state([*others, math.nan if state.flag("missing") else x_meas])
-        look_ahead = LookAhead.from_bytes(blob, self.model_type)
-        if inputs.clock.T_s != self.values["T_s"] or (inputs.clock.k != look_ahead.k and not look_ahead.diverged):
-            raise state.error("its clock must count the samples of this look-ahead")
-        self.look_ahead, self.inputs = look_ahead, inputs
+        *others, x_meas = meta["inputs"]
+        self.inputs = LookAheadInputs.from_state([*others, math.nan if meta["missing"] else x_meas])
+        self.look_ahead = LookAhead.from_bytes(blob, self.model_type)

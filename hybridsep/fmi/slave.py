@@ -24,7 +24,7 @@ from pythonfmu.enums import Fmi2Status
 from ..base.errors import FmuError, HybridSepError, SignalError, StateError
 from ..base.settings import PARAMETERS
 from ..base.signals import check_position
-from ..base.state import Saved, pack, unpack
+from ..base.state import pack, restoring, unpack
 from .variables import FmuTable, Variable
 
 __all__ = ["TableSlave"]
@@ -200,27 +200,19 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         return pack("fmu", meta, {}, core)
 
     def _set_fmu_state(self, state: bytes) -> None:
-        saved = Saved("fmu", *unpack("fmu", state))
-        if saved.text("content") != self.content:
+        meta, _, parts = unpack("fmu", state)
+        if meta["content"] != self.content:
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
-        running, terminated, values = saved.flag("running"), saved.flag("terminated"), saved.table("values")
-        start_time, stop_time = saved.real("start_time"), saved.number_or_none("stop_time")
-        if values.keys() != self.values.keys() or not all(
-            type(value) in (int, float, bool) for value in values.values()
-        ):
-            raise saved.error("it must have a number for each input and parameter")
-        before = self.values
-        self.values = values
+        before, self.values = self.values, meta["values"]
         try:
-            if running:
-                self.restore_core(saved.table("core"), saved.part("core"))
+            if meta["running"]:
+                with restoring("fmu"):
+                    self.restore_core(meta["core"], parts["core"])
         except StateError:
             self.values = before
             raise
-        except (HybridSepError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            self.values = before
-            raise saved.error(str(error)) from error
-        self.running, self.terminated, self.start_time, self.stop_time = running, terminated, start_time, stop_time
+        self.running, self.terminated = meta["running"], meta["terminated"]
+        self.start_time, self.stop_time = meta["start_time"], meta["stop_time"]
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import SignalError, StateError
+from ..base.errors import StateError
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
-from ..base.state import numbers_of, unsound, with_numbers
+from ..base.state import numbers_of, with_numbers
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
@@ -102,14 +102,8 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     if learned.keys() != settings.keys() or n_learned != ends[0] or len(body) - start != 8 * ends[-1]:
         raise StateError(_DAMAGED)
     numbers, *factors = np.split(np.frombuffer(body, "<f8", offset=start), ends[:-1])
-    found = with_numbers(like, numbers)
     regressions = tuple(_regression(one, size) for one, size in zip(factors, sizes, strict=True))
-    if unsound((found, regressions)) is not None:
-        raise StateError(_DAMAGED)
-    try:
-        predictor.take_over(*found, regressions)
-    except SignalError:
-        raise StateError(_DAMAGED) from None
+    predictor.take_over(*with_numbers(like, numbers), regressions)
 
 
 def _regression(numbers: Array, size: int) -> RidgeRegression:

@@ -22,8 +22,8 @@ import numpy as np
 
 from ..base.errors import SignalError
 from ..base.settings import samples_before
-from ..base.signals import POSITION_MAX, Array, as_measured, check_position
-from ..base.state import Saved, pack, unpack
+from ..base.signals import Array, check_position
+from ..base.state import pack, restoring, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .monitor import Monitor
@@ -400,39 +400,23 @@ class LookAhead:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        saved = Saved(_KIND, *unpack(_KIND, blob))
+        meta, arrays, parts = unpack(_KIND, blob)
         look_ahead = cls.__new__(cls)
-        look_ahead.k = saved.whole("k")
-        look_ahead._hold(model_type.from_bytes(saved.part("model")))
-        Np = look_ahead.Np
-        look_ahead.unit = saved.text("unit")
-        if look_ahead.unit not in POSITION_MAX:
-            raise saved.error(f"unit must be m or rad, got {look_ahead.unit!r}")
-        with saved.consistent():
-            look_ahead.start = saved.real("start")
-            check_position("start", look_ahead.start, unit=look_ahead.unit)
-        look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
-        look_ahead.diverged = saved.text("diverged")
-        look_ahead._sums = np.abs(saved.array("sums", 4))
-        look_ahead._residual = float(saved.array("residual", 1)[0])
-        late = look_ahead.predictor.settings.n_late
-        look_ahead._compared = saved.array("compared", 4, late + Np)
-        look_ahead._ahead = saved.array("ahead", look_ahead.delay)
-        look_ahead._measured = saved.array("measured", Np, finite=not look_ahead.may_miss)
-        coming = saved.array("next", 1, finite=not look_ahead.may_miss)
-        look_ahead._next = float(coming[0])
-        with saved.consistent():
-            as_measured(look_ahead._measured, "measured")
-            as_measured(coming, "next")
-        look_ahead.window = PublishedWindow(
-            **{name: saved.array(name, Np) for name in PublishedWindow.SIGNALS},
-            state=saved.whole("state"),
-            n_warm_up=saved.whole("n_warm_up", Np),
-            n_followed=saved.whole("n_followed", Np),
-            state_before=saved.whole("state_before"),
-        )
-        if not (look_ahead.planner.is_planned or look_ahead.diverged):
-            raise saved.error("the current window must be predicted, and planned if there is a planner")
+        with restoring(_KIND):
+            look_ahead._hold(model_type.from_bytes(parts["model"]))
+            for name in ("unit", "start", "k", "diverged"):
+                setattr(look_ahead, name, meta[name])
+            look_ahead._first_scored, look_ahead._n_scored = meta["first_scored"], meta["n_scored"]
+            look_ahead._sums, look_ahead._compared = arrays["sums"], arrays["compared"]
+            look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
+            look_ahead._residual, look_ahead._next = float(arrays["residual"][0]), float(arrays["next"][0])
+            look_ahead.window = PublishedWindow(
+                **{name: arrays[name] for name in PublishedWindow.SIGNALS},
+                state=meta["state"],
+                n_warm_up=meta["n_warm_up"],
+                n_followed=meta["n_followed"],
+                state_before=meta["state_before"],
+            )
         return look_ahead
 
     @property

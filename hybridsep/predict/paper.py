@@ -64,11 +64,6 @@ class PaperModel:
         """Last measured residual, m."""
         return float(self.e_pb[-1])
 
-    @property
-    def is_sound(self) -> bool:
-        """Whether the numbers, which are in range, fit each other."""
-        return self.regression.is_sound
-
     def restart(self) -> PaperModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept."""
         return replace(self, x_pb=np.zeros_like(self.x_pb), e_pb=np.zeros_like(self.e_pb))

@@ -7,7 +7,7 @@ recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -19,7 +19,7 @@ from ..base.errors import ParameterError, SignalError, StateError
 from ..base.files import written_whole
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
-from ..base.state import Saved, arrays_of, pack, restored, unpack
+from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
 from .averaging.features import Disturbance
@@ -166,15 +166,8 @@ class HybridPredictor:
         learned, regressions : Learned and tuple of RidgeRegression
             Of its residual model.
         uncertainty : Uncertainty
-
-        Raises
-        ------
-        SignalError
-            If it is inconsistent. Nothing is changed.
         """
         residual = self.residual.take_over(learned, regressions)
-        if not residual.is_sound:
-            raise SignalError("what was learned must be in range, and its factors triangles")
         self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
 
     @one_blas_thread
@@ -388,47 +381,31 @@ class HybridPredictor:
         StateError
             If the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
-        saved = Saved(_KIND, *unpack(_KIND, blob))
-        if (n := saved.whole("n_disturbances")) != len(disturbances):
-            raise StateError(
-                f"the saved predictor was learned with {n} disturbances of the user's own, got {len(disturbances)}: "
-                "they are functions, which neither a state nor an FMU holds; in Python give them as disturbances="
-            )
-        with saved.consistent():
-            settings = PredictorSettings.from_table(saved.table("settings"))
-            n_features = settings.p + (0 if settings.averaging else settings.q)
-            if n_features**2 > sum(array.size for array in saved.arrays.values()):  # before that much is allocated
-                raise saved.error(f"p = {settings.p} and q = {settings.q} must be those of its factors")
-            model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
-            predictor = cls(model, settings, disturbances=disturbances)
-            if saved.flag("planned"):
+        meta, arrays, _ = unpack(_KIND, blob)
+        with restoring(_KIND):
+            if (n := meta["n_disturbances"]) != len(disturbances):
+                raise StateError(
+                    f"the saved predictor was learned with {n} disturbances of the user's own, got {len(disturbances)}:"
+                    " they are functions, which neither a state nor an FMU holds; in Python give them as disturbances="
+                )
+            model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
+            predictor = cls(model, PredictorSettings.from_table(meta["settings"]), disturbances=disturbances)
+            if meta["planned"]:
                 predictor.plan_ahead()
-            predictor.state = restored(predictor.state, saved)
-            if not predictor.residual.is_sound:
-                raise saved.error("factors must be triangles, and what was learned from them in range")
-            if predictor.start is not None:
-                as_samples([predictor.start], "start")
-        if saved.field("pending_start") is not None:
-            predictor.pending = predictor._pending(saved)
+            predictor.state = restored(predictor.state, arrays)
+            if meta["pending_start"] is not None:
+                predictor.pending = predictor._pending(meta["pending_start"], arrays)
         return predictor
 
-    def _pending(self, saved: Saved) -> PredictedWindow:
-        """Return the predicted window; StateError if it is inconsistent."""
-        x_d, scales, residual = saved.array("pending_x_d", None), None, self.residual
-        if not len(self.state.late) < len(x_d):
-            raise saved.error("the pending window must have samples")
-        if residual.n_scaled:
-            velocity, *others = saved.array("pending_scales", 4).tolist()
-            scales = FeatureScales(velocity, saved.array("pending_largest", residual.n_scaled), *others)
-            if min(velocity, *others, *scales.largest) < 0.0:
-                raise saved.error("the scales of the pending window must be ≥ 0")
-        x_pb, path = saved.array("pending_x_pb", len(x_d)), saved.array("pending_path", None)
-        window = ResidualWindow(x_d, x_pb, saved.real("pending_start"), path)
+    def _pending(self, start: float, arrays: Mapping[str, Array]) -> PredictedWindow:
+        """Return the predicted window of a saved state."""
+        scales = None
+        if "pending_scales" in arrays:
+            velocity, *others = arrays["pending_scales"].tolist()
+            scales = FeatureScales(velocity, arrays["pending_largest"], *others)
+        window = ResidualWindow(arrays["pending_x_d"], arrays["pending_x_pb"], start, arrays["pending_path"])
         with np.errstate(all="ignore"):
-            forecast = residual.forecast(window, scales)
-            if residual.may_miss and not np.isfinite(forecast.e_h).all():
-                raise saved.error("the prediction of the pending window must be finite")
-            return self._with_error(forecast)
+            return self._with_error(self.residual.forecast(window, scales))
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""

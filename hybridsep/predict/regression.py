@@ -11,7 +11,7 @@ ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of const
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -22,7 +22,6 @@ from scipy.linalg import lapack
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
-from ..base.state import bounded
 
 __all__ = ["PenalisedSolution", "RidgeRegression", "lags"]
 
@@ -90,7 +89,7 @@ class RidgeRegression:
     """
 
     factor: Array
-    n_rows: float = field(metadata=bounded())
+    n_rows: float
 
     @classmethod
     def init(cls, n_features: int, lam: float) -> RidgeRegression:
@@ -136,12 +135,6 @@ class RidgeRegression:
         """Sum of the squares of the targets, m²."""
         column = self.factor[:, -1]
         return float(column @ column)
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether the factor is a finite triangle without a 0 on the diagonal of ``R``."""
-        finite = bool(np.isfinite(self.factor).all())
-        return finite and bool(np.diag(self.factor)[:-1].all()) and not np.tril(self.factor, -1).any()
 
     def update(self, rows: ArrayLike, target: ArrayLike) -> RidgeRegression:
         """Return the regression with a block of rows more.

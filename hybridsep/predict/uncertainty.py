@@ -17,7 +17,7 @@ tails are heavier than normal, so that 50 % cover a little more and 95 % a littl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,6 @@ from scipy.signal import lfilter
 
 from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
-from ..base.state import bounded
 
 __all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
 
@@ -111,11 +110,11 @@ class Uncertainty:
         Recent mean square of the residual; 0 before the first window.
     """
 
-    theta: Array = field(metadata=bounded(_THETA_LEAST, _THETA_MOST))
-    evidence: Array = field(metadata=bounded())
-    factor: float = field(metadata=bounded(1.0 / _FACTOR_MAX, _FACTOR_MAX))
-    ratio: float = field(metadata=bounded(1.0 / _RATIO_MAX, _RATIO_MAX))
-    recent: float = field(metadata=bounded())
+    theta: Array
+    evidence: Array
+    factor: float
+    ratio: float
+    recent: float
 
     @classmethod
     def init(cls, variance: float) -> Uncertainty:

@@ -212,10 +212,6 @@ class ResidualModel(Protocol):
     def n_rejected(self) -> int:
         """Measurements of this run that were missing or not plausible."""
 
-    @property
-    def is_sound(self) -> bool:
-        """Whether the numbers, which are in range, fit each other."""
-
     def restart(self) -> ResidualModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept."""
 

@@ -116,6 +116,6 @@ def test_what_is_never_excited_stays_regular_however_long_it_is_discounted() -> 
         regression = regression.discount(0.01).update([[1.0, 0.0, 0.0]], [2.0])
     assert np.abs(np.diag(regression.factor)[:3]).min() == 1e-150
     np.testing.assert_allclose(regression.penalised(np.full(3, 1e-9)).weights, [2.0, 0.0, 0.0], atol=1e-8)
-    assert regression.is_sound
+    assert np.isfinite(regression.factor).all()
     regression = regression.discount(0.0)
     np.testing.assert_array_equal(regression.weights, 0.0)

@@ -40,8 +40,6 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
 
     first_mode = next(i for i, name in enumerate(names) if name.startswith(b"mode["))
     numbers = _HEAD + _SETTING * n_settings
-    n_rows = numbers + 8 * n_learned
-    factor = n_rows + 8
     damaged = {
         "nothing": b"",
         "no checksum": content[:-1],
@@ -53,11 +51,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "a name without an end": with_setting(0, b"x" * 24, 1.0),
         "another number of numbers": with_head(2, n_learned + 1),
         "numbers that are cut": sealed(body[: numbers + 8]),
-        "no number": sealed(body[:numbers] + struct.pack("<d", float("nan")) + body[numbers + 8 :]),
-        "fewer rows than none": sealed(body[:n_rows] + struct.pack("<d", -1.0) + body[n_rows + 8 :]),
         "a factor that is cut": sealed(body[:-8]),
-        "a factor with no number": sealed(body[:factor] + struct.pack("<d", float("inf")) + body[factor + 8 :]),
-        "a factor without a diagonal": sealed(body[:factor] + bytes(8) + body[factor + 8 :]),
         "more behind it": sealed(body + bytes(8)),
     }
     other = {f"another {name.decode()}": with_setting(i, name, -7.5) for i, name in enumerate(names)}

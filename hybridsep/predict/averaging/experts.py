@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ...base.signals import Array
-from ...base.state import bounded
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
@@ -72,8 +71,8 @@ class ResidualScale:
         Largest magnitude.
     """
 
-    largest_square: float = field(default=0.0, metadata=bounded())
-    largest: float = field(default=0.0, metadata=bounded())
+    largest_square: float = 0.0
+    largest: float = 0.0
 
     def grown(self, growth: float) -> ResidualScale:
         """Return the scale of residuals that are larger by a factor."""
@@ -120,8 +119,8 @@ class ExpertErrors:
         Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
     """
 
-    noise_variance: float = field(default=0.0, metadata=bounded())
-    correlation: float = field(default=1.0, metadata=bounded(1.0))
+    noise_variance: float = 0.0
+    correlation: float = 1.0
 
     def variance(self, target_square: float, first: float, least: float) -> float:
         """Return the variance of the noise that penalties come from, m².

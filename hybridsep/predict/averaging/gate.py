@@ -9,13 +9,12 @@ reads. After a second the axis has been moved, or its sensor set, and the value 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.signals import PREDICTION_MAX, Array
-from ...base.state import bounded
 from .constants import CONSTANTS
 
 __all__ = ["InnovationGate", "gated"]
@@ -37,7 +36,7 @@ class InnovationGate:
 
     n_missing: int = 0
     n_beyond: int = 0
-    farthest: float = field(default=0.0, metadata=bounded())
+    farthest: float = 0.0
 
 
 def gated(

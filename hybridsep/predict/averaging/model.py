@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...base.settings import PredictorSettings
 from ...base.signals import Array
-from ...base.state import FIXED, bounded
+from ...base.state import FIXED
 from ...model.discrete import DiscreteModel
 from ..regression import RidgeRegression, lags
 from ..window import FeatureScales, Forecast, ResidualWindow
@@ -45,7 +45,7 @@ from .experts import (
 from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
 from .gate import InnovationGate, gated
 from .recall import Memory
-from .stacking import ROUNDING, Stack
+from .stacking import Stack
 from .warm_start import WarmStartRows
 
 __all__ = ["AveragedForecast", "AveragedModel", "Learned", "Parameters", "RunState"]
@@ -127,13 +127,13 @@ class Learned:
         Largest magnitudes of the static features.
     """
 
-    velocity_scale: float = field(metadata=bounded())
-    largest_step: float = field(metadata=bounded())
-    fastest: float = field(metadata=bounded())
-    scales: tuple[ResidualScale, ResidualScale] = field(metadata=bounded())
-    errors: tuple[ExpertErrors, ...] = field(metadata=bounded())
+    velocity_scale: float
+    largest_step: float
+    fastest: float
+    scales: tuple[ResidualScale, ResidualScale]
+    errors: tuple[ExpertErrors, ...]
     stack: Stack
-    largest: Array = field(metadata=bounded())
+    largest: Array
 
     @classmethod
     def init(cls, fixed: Parameters) -> Learned:
@@ -149,12 +149,6 @@ class Learned:
         """Return the same with other errors of some experts."""
         errors = tuple(changed.get(one, known) for one, known in zip(REGRESSIONS, self.errors, strict=True))
         return replace(self, errors=errors)
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether the numbers, which are in range, fit each other."""
-        scale = self.velocity_scale
-        return (scale == 0.0 or scale >= LEAST_VELOCITY) and float(self.stack.weights.sum()) <= 1.0 + ROUNDING
 
 
 @dataclass(frozen=True)
@@ -208,8 +202,8 @@ class AveragedModel:
     fixed: Parameters = field(metadata=FIXED)
     learned: Learned
     evidence: tuple[WarmStartRows, WarmStartRows]
-    noise: tuple[float, ...] = field(metadata=bounded())
-    command_square: float = field(metadata=bounded())
+    noise: tuple[float, ...]
+    command_square: float
     leader: int
     run: RunState
 
@@ -304,12 +298,6 @@ class AveragedModel:
     def n_scaled(self) -> int:
         """Static features, whose scales follow from the commands ahead."""
         return self.fixed.static.n
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether the numbers, which are in range, fit each other."""
-        factors = all(part.is_sound for one in self.evidence for part in (one.this, one.earlier))
-        return factors and self.learned.is_sound and self.leader == self.leading.place
 
     def restart(self) -> AveragedModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from ...base.signals import Array
-from ...base.state import bounded
 from .constants import CONSTANTS
 from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert, Regression
 
@@ -39,10 +38,10 @@ class Stack:
         ``eᵀe`` so far, m², and samples.
     """
 
-    weights: Array = field(metadata=bounded(0.0, 1.0))
+    weights: Array
     gram: Array
     cross: Array
-    evidence: Array = field(metadata=bounded())
+    evidence: Array
 
     @classmethod
     def init(cls) -> Stack:

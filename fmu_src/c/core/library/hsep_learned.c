@@ -68,8 +68,7 @@ HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
 static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
     return hsep_learned_numbers(source, hsep_residual_learned(model), hsep_residual_n_learned(model)) &&
-           hsep_learned_numbers(source, uncertainty->theta, HSEP_N_UNCERTAINTY) &&
-           hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
+           hsep_learned_numbers(source, uncertainty->theta, HSEP_N_UNCERTAINTY);
 }
 
 /* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
@@ -79,8 +78,8 @@ static int learned_take_factor(hsep_learned_source *source, hsep_residual_model 
     hsep_real n_rows = 0.0;
     int taken = hsep_learned_numbers(source, &n_rows, 1);
     for (hsep_int i = 0; taken && i <= n; i++) {
-        taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i) &&
-                hsep_residual_load(model, factor, i, n_rows);
+        taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i);
+        hsep_residual_load(model, factor, i, n_rows);
     }
     return taken;
 }

@@ -88,25 +88,16 @@ HSEP_API void hsep_gram_fold(hsep_gram *self)
     self->waiting++;
 }
 
-HSEP_API int hsep_gram_load(hsep_gram *self, hsep_int i)
+HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i)
 {
     const hsep_int n = self->n;
     hsep_real *row = hsep_gram_row(self);
-    for (hsep_int j = 0; j <= n - i; j++) {
-        if (!isfinite(row[j])) {
-            return 0;
-        }
-    }
-    if (i < n && row[0] == 0.0) {
-        return 0;
-    }
     memmove(row + i, row, (size_t)(n + 1 - i) * sizeof(hsep_real));
     memset(row, 0, (size_t)i * sizeof(hsep_real));
     hsep_gram_fold(self);
     if (i == n) {
         gram_add_waiting(self);
     }
-    return 1;
 }
 
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)

@@ -39,9 +39,8 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
- * rows of a factor stand for the rows that it was made from, whose number the caller sets. Fails, and returns 0, if an
- * entry is not finite or a diagonal entry of R is 0. Cost: as hsep_gram_fold. */
-HSEP_API int hsep_gram_load(hsep_gram *self, hsep_int i);
+ * rows of a factor stand for the rows that it was made from, whose number the caller sets. Cost: as hsep_gram_fold. */
+HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i);
 
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);

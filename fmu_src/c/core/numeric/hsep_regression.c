@@ -185,21 +185,13 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
     }
 }
 
-HSEP_API int hsep_regression_load(hsep_regression *self, hsep_int i)
+HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i)
 {
     const hsep_int n = self->n;
     const hsep_real *row = hsep_regression_row(self);
-    for (hsep_int j = i; j <= n; j++) {
-        if (!isfinite(row[j - i])) {
-            return 0;
-        }
-    }
     if (i == n) {
         self->residual_sum = row[0] * row[0];
-        return 1;
-    }
-    if (row[0] == 0.0) {
-        return 0;
+        return;
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / hsep_fmax(row[0] * row[0], regression_lambda_min);
     for (hsep_int j = i + 1; j <= n; j++) {
@@ -207,5 +199,4 @@ HSEP_API int hsep_regression_load(hsep_regression *self, hsep_int i)
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
         entry[HSEP_TILE_ENTRIES] = 0.0;
     }
-    return 1;
 }

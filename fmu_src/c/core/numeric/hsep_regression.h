@@ -49,9 +49,8 @@ HSEP_API void hsep_regression_fold(hsep_regression *self);
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
- * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
- * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
-HSEP_API int hsep_regression_load(hsep_regression *self, hsep_int i);
+ * hsep_regression_row. All n + 1 rows make a factor. Cost: n divisions. */
+HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i);
 
 /* Entry (i, j), i <= j, of [U z]. */
 static inline const hsep_real *hsep_regression_entry_const(const hsep_regression *self, hsep_int i, hsep_int j)

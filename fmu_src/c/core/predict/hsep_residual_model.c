@@ -67,19 +67,17 @@ HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_int
                           : hsep_regression_row(hsep_paper_regression(hsep_residual_paper(self)));
 }
 
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows)
+HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows)
 {
-    int loaded = n_rows >= 0.0 && n_rows <= HSEP_PREDICTION_MAX;
     if (self->averaged) {
         hsep_gram *gram = residual_gram(self, factor);
-        loaded = loaded && hsep_gram_load(gram, i);
+        hsep_gram_load(gram, i);
         gram->n_rows = n_rows;
     } else {
         hsep_regression *regression = hsep_paper_regression(hsep_residual_paper(self));
-        loaded = loaded && hsep_regression_load(regression, i);
+        hsep_regression_load(regression, i);
         regression->n_rows = n_rows;
     }
-    return loaded;
 }
 
 HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
@@ -90,11 +88,6 @@ HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
 {
     return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
-}
-
-HSEP_API int hsep_residual_sound(hsep_residual_model *self)
-{
-    return !self->averaged || hsep_averaged_sound(hsep_residual_averaged(self));
 }
 
 HSEP_API void hsep_residual_restart(hsep_residual_model *self)

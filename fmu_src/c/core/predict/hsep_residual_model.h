@@ -35,15 +35,14 @@ HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self);
 HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self);
 HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor);
 
-/* Where row i of a factor goes, its entries i ... n, and take it over: 0 if it is damaged. n_rows: rows that the
+/* Where row i of a factor goes, its entries i ... n, and take it over. n_rows: rows that the
  * factor is from, weighted. */
 HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_int factor);
-HSEP_API int hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows);
+HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows);
 
-/* Numbers learned besides them, the first of so many, and whether they are in range; none without averaging. */
+/* Numbers learned besides them, the first of so many; none without averaging. */
 HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self);
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
-HSEP_API int hsep_residual_sound(hsep_residual_model *self);
 
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);

@@ -7,7 +7,6 @@
 #include <string.h>
 
 static const hsep_real uncertainty_shares[] = {HSEP_UNCERTAINTY_SHARES};
-static const hsep_range uncertainty_ranges[] = {HSEP_UNCERTAINTY_RANGES};
 static const hsep_real uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -40,11 +39,6 @@ HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_in
     self->theta[0] = variance;
     memcpy(self->theta + 1, uncertainty_shares, sizeof uncertainty_shares);
     self->factor = self->ratio = 1.0;
-}
-
-HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
-{
-    return hsep_in_ranges(self->theta, HSEP_N_UNCERTAINTY, uncertainty_ranges);
 }
 
 /* Variance of the error with these components. */
@@ -144,13 +138,15 @@ static void uncertainty_step_by(
 {
     for (int i = 0; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) {
         const hsep_real windows = total[i] / (hsep_real)self->Np;
-        const hsep_real least = i > 0 ? uncertainty_ranges[i].least : HSEP_UNCERTAINTY_FLOOR * self->recent;
+        const hsep_real share = i > 0 ? uncertainty_shares[i - 1] : 0.0;
+        const hsep_real least = i > 0 ? HSEP_UNCERTAINTY_LEAST_SHARE * share : HSEP_UNCERTAINTY_FLOOR * self->recent;
+        const hsep_real most = i > 0 ? HSEP_UNCERTAINTY_MOST_SHARE * share : HSEP_PREDICTION_MAX;
         self->evidence[i] = HSEP_UNCERTAINTY_MEMORY * self->evidence[i] + windows;
         const hsep_real change = hsep_fmax(total[i] > 0.0 ? seen[i] / total[i] : 1.0, HSEP_UNCERTAINTY_VANISHING);
         const hsep_real step =
             hsep_fmin(HSEP_UNCERTAINTY_STEP * windows / (self->evidence[i] + HSEP_UNCERTAINTY_FIRST_EVIDENCE), 1.0);
         const hsep_real theta = self->theta[i] * hsep_pow(change, step);
-        self->theta[i] = hsep_fmin(hsep_fmax(theta, least), uncertainty_ranges[i].most);
+        self->theta[i] = hsep_fmin(hsep_fmax(theta, least), most);
     }
 }
 

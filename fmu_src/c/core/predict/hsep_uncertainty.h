@@ -41,9 +41,6 @@ HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real n
 /* Fill the block. variance: that first one. */
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_int n, hsep_real variance);
 
-/* Whether the numbers learned, (HSEP_N_UNCERTAINTY,) from theta on, are in range. */
-HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
-
 /* Signals that tell of a prediction's error. */
 typedef struct {
     const hsep_real *x_pb;     /* (n,) m, physics-based prediction */

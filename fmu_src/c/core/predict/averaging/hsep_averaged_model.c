@@ -2,12 +2,9 @@
 #include "hsep_averaged_model.h"
 
 #include "hsep_math.h"
-#include "hsep_range.h"
 
 #include <stddef.h>
 #include <string.h>
-
-static const hsep_range averaged_ranges[] = {HSEP_LEARNED_RANGES};
 
 /* Features of the rows of some evidence. */
 static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
@@ -146,18 +143,6 @@ HSEP_API void hsep_averaged_prepare_solutions(
 HSEP_API hsep_int hsep_averaged_n_learned(const hsep_averaged *self)
 {
     return sizeof self->learned / sizeof(hsep_real) + self->n_static;
-}
-
-HSEP_API int hsep_averaged_sound(const hsep_averaged *self)
-{
-    const hsep_learned *learned = &self->learned;
-    hsep_real sum = 0.0;
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        sum += learned->stack.weights[i];
-    }
-    return hsep_in_ranges(&learned->velocity_scale, hsep_averaged_n_learned(self), averaged_ranges) &&
-           (learned->velocity_scale == 0.0 || learned->velocity_scale >= HSEP_FEATURES_LEAST_VELOCITY) &&
-           sum <= 1.0 + HSEP_STACKING_ROUNDING;
 }
 
 HSEP_API void hsep_averaged_restart(hsep_averaged *self)

@@ -140,9 +140,8 @@ HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_re
 HSEP_API void hsep_averaged_prepare_solutions(
     hsep_averaged *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
-/* How many numbers are learned besides the factors, from self->learned on, and whether they are in range. */
+/* How many numbers are learned besides the factors, from self->learned on. */
 HSEP_API hsep_int hsep_averaged_n_learned(const hsep_averaged *self);
-HSEP_API int hsep_averaged_sound(const hsep_averaged *self);
 
 /* Begin a run with what an earlier one has learned, loaded into a fresh block: it is discounted and doubted, as a
  * machine may have changed meanwhile. */
