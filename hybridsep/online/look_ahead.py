@@ -403,9 +403,9 @@ class LookAhead:
         meta, arrays, parts = unpack(_KIND, blob)
         look_ahead = cls.__new__(cls)
         with restoring(_KIND):
+            look_ahead.k, look_ahead.start, look_ahead.unit = meta["k"], meta["start"], meta["unit"]
+            look_ahead.diverged = meta["diverged"]
             look_ahead._hold(model_type.from_bytes(parts["model"]))
-            for name in ("unit", "start", "k", "diverged"):
-                setattr(look_ahead, name, meta[name])
             look_ahead._first_scored, look_ahead._n_scored = meta["first_scored"], meta["n_scored"]
             look_ahead._sums, look_ahead._compared = arrays["sums"], arrays["compared"]
             look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
