@@ -10,11 +10,11 @@ static hsep_predictor *predictor;
 /* Room for n numbers, kept; NULL: there is none. */
 double *PAGE(room)(int n) { return malloc((size_t)n * sizeof(double)); }
 
-/* Begin at rest at start, m: one mode with unit gain. Return NULL, or the name of what is refused. */
-const char *PAGE(begin)(int Np, int p, int dead_time, double T_s, double f_n, double zeta, double start)
+/* Begin at rest at start, m: one mode with gain 1. Return NULL, or the name of what is refused. */
+const char *PAGE(begin)(int Np, int p, int dead_time, double T_s, double f_n, double zeta, double beta, double start)
 {
     const double omega = 2.0 * 3.14159265358979323846 * f_n;
-    const hsep_mode mode = {.f_n = f_n, .zeta = zeta, .alpha = omega * omega};
+    const hsep_mode mode = {.f_n = f_n, .zeta = zeta, .alpha = omega * omega, .beta = beta};
     hsep_parameters parameters;
     hsep_defaults(&parameters);
     parameters.predictor.Np = (hsep_int)Np;

@@ -16,6 +16,7 @@ const ARX_LAGS = [20, 40];
 const FAR = 10; // largest distances from the start, beyond which a prediction diverges
 const COLOURS = { "physics model": "#999", hold: "#e69f00", ARX20: "#cc79a7", ARX40: "#d55e00", hybrid: "#0b84d8" };
 const at = (id) => document.getElementById(id);
+const digits = (one) => one.toFixed(Math.min(100, Math.max(0, 2 - Math.floor(Math.log10(one))))); // three, or whole numbers
 const pause = () => new Promise((done) => setTimeout(done));
 
 /** What is wrong with a log, for the user. */
@@ -53,40 +54,42 @@ function interval(t) {
   throw new LogError(`row ${wrong + 2}: the time changes by ${here} s, elsewhere by ${usual} s; cut the log there`);
 }
 
-/** Variance of the first n residuals of ω² / (s² + 2ζωs + ω²), over a zero-order hold, from rest at the first command. */
-function misfit({ f_n, zeta, dead_time }, T_s, x_d, x, n) {
-  if (!(f_n * T_s > 1e-5 && f_n * T_s < 0.45 && zeta > 0.02 && zeta < 20)) return Infinity;
+/** The mode (ω² + βs) / (s² + 2ζωs + ω²) over a zero-order hold, from rest at the first command, with the β of least
+ *  variance of the first n residuals: {f_n, zeta, beta, dead_time, misfit}. */
+function fitted(f_n, zeta, dead_time, T_s, x_d, x, n) {
+  if (!(f_n * T_s > 1e-5 && f_n * T_s < 0.45 && zeta > 0.02 && zeta < 20)) return { misfit: Infinity };
   const omega = 2 * Math.PI * f_n, s = zeta * omega, d = omega * Math.sqrt(Math.abs(zeta * zeta - 1)) || 1e-9;
   const [C, S] = zeta > 1 ? [Math.cosh(d * T_s), Math.sinh(d * T_s) / d] : [Math.cos(d * T_s), Math.sin(d * T_s) / d];
-  const decay = Math.exp(-s * T_s), a = decay * (C + S * s), b = decay * S, c = -b * omega * omega, e = decay * (C - S * s);
-  let sum = 0, squares = 0;
+  const g = Math.exp(-s * T_s), a = g * (C + S * s), b = g * S, c = -b * omega * omega, e = g * (C - S * s); // exp(A T_s)
+  let sum = 0, sum_v = 0, ee = 0, ev = 0, vv = 0;
   for (let k = 0, y = 0, v = 0; k < n; k++) {
-    const error = x[k] - x_d[0] - y, u = x_d[Math.max(k - dead_time, 0)] - x_d[0]; // exp(A T_s) = [a b; c e]
-    [sum, squares, y, v] = [sum + error, squares + error * error, u + a * (y - u) + b * v, c * (y - u) + e * v];
+    const error = x[k] - x_d[0] - y, u = x_d[Math.max(k - dead_time, 0)] - x_d[0];
+    sum += error; sum_v += v; ee += error * error; ev += error * v; vv += v * v;
+    [y, v] = [u + a * (y - u) + b * v, c * (y - u) + e * v];
   }
-  return squares / n - (sum / n) ** 2;
+  const covariance = ev - sum * sum_v / n, variance = vv - sum_v * sum_v / n, zero = covariance / variance || 0; // β / ω²
+  return { f_n, zeta, beta: zero * omega * omega, dead_time, misfit: ee - sum * sum / n - zero * covariance };
 }
 
 /** The mode of least misfit: for each dead time a search over ln f_n and ln ζ from three beginnings. */
 async function identify(T_s, x_d, x, n) {
-  let best = [Infinity];
+  let best = { misfit: Infinity };
   for (let dead_time = 0; dead_time < DEAD_TIMES; dead_time++) {
     for (const f of [0.005, 0.02, 0.08]) {
-      let found = [Infinity, { f_n: f / T_s, zeta: 0.7, dead_time }];
+      let found = fitted(f / T_s, 0.7, dead_time, T_s, x_d, x, n);
       for (let step = 0.5; step > 0.005; ) {
-        const before = found;
+        const { f_n, zeta, misfit } = found;
         for (const [i, j] of [[step, 0], [-step, 0], [0, step], [0, -step]]) {
-          const mode = { f_n: before[1].f_n * Math.exp(i), zeta: before[1].zeta * Math.exp(j), dead_time };
-          const error = misfit(mode, T_s, x_d, x, n);
-          if (error < found[0]) found = [error, mode];
+          const mode = fitted(f_n * Math.exp(i), zeta * Math.exp(j), dead_time, T_s, x_d, x, n);
+          if (mode.misfit < found.misfit) found = mode;
         }
-        if (found === before) step /= 2;
+        if (found.misfit === misfit) step /= 2;
       }
-      if (found[0] < best[0]) best = found;
+      if (found.misfit < best.misfit) best = found;
     }
     await pause();
   }
-  return best[1];
+  return best;
 }
 
 /** Predictions by physics model and hybrid, of the C library, each window before it is learned: two (n,) arrays. */
@@ -95,7 +98,7 @@ async function hybrid(mode, Np, p, T_s, x_d, x, progress) {
   const library = (await WebAssembly.instantiate(module)).instance.exports;
   library._initialize();
   const room = library.room(4 * n), places = [0, 1, 2, 3].map((i) => room + 8 * i * n);
-  const refused = library.begin(Np, p, mode.dead_time, T_s, mode.f_n, mode.zeta, x_d[0]);
+  const refused = library.begin(Np, p, mode.dead_time, T_s, mode.f_n, mode.zeta, mode.beta, x_d[0]);
   if (refused) {
     const text = new Uint8Array(library.memory.buffer, refused), name = text.subarray(0, text.indexOf(0));
     const what = new TextDecoder().decode(name);
@@ -243,12 +246,13 @@ function show(seconds) {
   const { x, first, predictions, unit, mode, Np, T_s } = shown, names = Object.keys(predictions);
   const scores = names.map((name) => score(x, predictions[name], first, x.length));
   const best = scores.reduce((a, b) => (b.rms < a.rms ? b : a));
-  const cell = (e) => `<td>${isNaN(e) ? "diverges" : `${(unit[2] * e).toPrecision(3)} ${unit[1]}`}</td>`;
+  const cell = (e) => `<td>${isNaN(e) ? "diverges" : `${digits(unit[2] * e)} ${unit[1]}`}</td>`;
   at("rows").innerHTML = scores.map((one, i) => `<tr${one === best ? ' class="best"' : ""}><td>` +
     `<i style="background:${COLOURS[names[i]]}"></i>${names[i]}</td>${cell(one.rms)}${cell(one.max)}</tr>`).join("");
-  const [f_n, zeta, span] = [mode.f_n, mode.zeta, 1e3 * Np * T_s].map((one) => one.toPrecision(3));
-  at("model").textContent = `${f_n} Hz, damping ${zeta}, ${mode.dead_time} samples of dead time`;
-  tell("", `${x.length} rows, windows of ${Np} samples, ${span} ms; computed in ${seconds.toFixed(1)} s`);
+  const [f_n, zeta, span] = [mode.f_n, mode.zeta, 1e3 * Np * T_s].map(digits);
+  at("model").textContent = `a mode of ${f_n} Hz, damping ${zeta}, with a zero, ${mode.dead_time} samples of dead time`;
+  const scored = Math.ceil((x.length - first) / Np);
+  tell("", `${x.length} rows; scored by ${scored} windows of ${Np} samples, ${span} ms; computed in ${seconds.toFixed(1)} s`);
   plot(shown, at("what").value);
 }
 

@@ -41,18 +41,17 @@ class Tab:
 
     def call(self, method: str, **params: Any) -> Any:
         self.n += 1
-        message = {"id": self.n, "method": method, "params": params, **self.session}
-        os.write(self.to, json.dumps(message).encode() + b"\0")
+        os.write(
+            self.to, json.dumps({"id": self.n, "method": method, "params": params, **self.session}).encode() + b"\0"
+        )
         while True:
             while b"\0" not in self.rest:
-                said = os.read(self.back, 1 << 16)
-                assert said, "the browser has ended"
-                self.rest += said
+                self.rest += os.read(self.back, 1 << 16) or b'{"method": "the browser has ended"}\0{}\0'
             text, _, self.rest = self.rest.partition(b"\0")
             answer = json.loads(text)
             if answer.get("id") == self.n:
-                assert "error" not in answer, answer
                 return answer["result"]
+            assert "method" in answer, self.events[-1]
             self.events.append(answer)
 
     def value(self, expression: str) -> Any:
@@ -76,23 +75,22 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tab(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+def tab(page: Path) -> Iterator[Tab]:
     name = next(filter(None, map(shutil.which, BROWSERS)), None)
     assert name, f"a browser is needed: one of {', '.join(BROWSERS)}"
     (read, to), (back, write) = os.pipe(), os.pipe()
-    profile = tmp_path_factory.mktemp("profile")
-    options = f"--headless --no-sandbox --disable-gpu --remote-debugging-pipe --user-data-dir={profile}"
+    options = f"--headless --no-sandbox --disable-gpu --remote-debugging-pipe --user-data-dir={page / 'profile'}"
     command = ["bash", "-c", f"exec {name} {options} 3<&{read} 4>&{write}"]
     with subprocess.Popen(command, pass_fds=(read, write), stderr=subprocess.DEVNULL) as process:
-        os.close(read)
-        os.close(write)
+        for end in (read, write):
+            os.close(end)
         tab = Tab(to, back)
         tab.call("Page.navigate", url=(page / "index.html").as_uri())
         tab.wait("document.readyState === 'complete' && at('unit').length > 0")
         yield tab
         process.terminate()
-    os.close(to)
-    os.close(back)
+    for end in (to, back):
+        os.close(end)
 
 
 def test_figures_are_the_librarys_and_nothing_is_asked_for(tab: Tab, page: Path) -> None:
@@ -102,7 +100,9 @@ def test_figures_are_the_librarys_and_nothing_is_asked_for(tab: Tab, page: Path)
     mode = tab.wait("shown && shown.mode")
     rows = tab.value("[...at('rows').rows].map((row) => [...row.cells].map((cell) => cell.textContent))")
     log = read_log(page / "example.csv")
-    model = ModalModel([Mode(mode["f_n"], mode["zeta"], (2 * np.pi * mode["f_n"]) ** 2)], mode["dead_time"])
+    model = ModalModel(
+        [Mode(mode["f_n"], mode["zeta"], (2 * np.pi * mode["f_n"]) ** 2, mode["beta"])], mode["dead_time"]
+    )
     found = backtest(HybridPredictor(model, PredictorSettings(Np=NP, p=50)), log)
     peers = predict_peers([Piece(log.x_d, log.x_meas, 0, FIRST)], NP)
     predictions = {"physics model": found.x_pb, "hold": found.x_hold}
