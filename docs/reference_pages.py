@@ -171,7 +171,8 @@ def fmu_variables() -> str:
         ("Integer", "Int32"),
         ("Boolean", "Boolean"),
         ("Enumeration", "Enumeration, read and written as Int64"),
-        ("`name[i]` of a window", "one array `name`, Float64, of fixed size"),
+        ("`Np` of a HybridPredictor", "UInt64, a structural parameter"),
+        ("`name[i]` of a window, local", "one array `name` of `Np` samples, Float64, an output"),
         ("–", "`time`, Float64, the independent variable"),
     )
     parts += [
@@ -179,8 +180,10 @@ def fmu_variables() -> str:
         "Native FMUs whose names have `Fmi3` (`HybridPredictorFmi3`) are the twins of those above: the same "
         "variables, units, ranges, start values and dependencies, with other types.",
         _table(("FMI 2.0", "FMI 3.0"), types),
-        "`mode[i].*` stay scalars. There is no event mode, no early return, no intermediate update, no clock and no "
-        "structural parameter, and inputs have no derivatives. The state can be saved, restored and serialised. The "
+        "`Np` is set in Configuration Mode, or when the instance is there, and the arrays take its size; a state is "
+        "taken by an instance of the same `Np`. `mode[i].*` stay scalars. There is no event mode, no early return, no "
+        "intermediate update and no clock, and inputs have no derivatives. The state can be saved, restored and "
+        "serialised. The "
         "`instantiationToken` differs from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
         "Terminals, each a plug whose members belong together by name:",
         _table(

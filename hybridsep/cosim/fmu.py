@@ -11,7 +11,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from ctypes import c_bool, c_double, c_int, c_int32, c_int64, c_uint32
+from ctypes import c_bool, c_double, c_int, c_int32, c_int64, c_uint32, c_uint64
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import prod
@@ -88,8 +88,8 @@ _VERSIONS = {
     ),
     "3": _Version(
         *(FMU3Slave, fmpy.platform_tuple, "fmi3", True),
-        access={"Float64": "Float64", "Int32": "Int32", "Enumeration": "Int64", "Boolean": "Boolean"},
-        c_types={"Float64": c_double, "Int32": c_int32, "Int64": c_int64, "Boolean": c_bool},
+        access={name: name for name in ("Float64", "Int32", "UInt64", "Boolean")} | {"Enumeration": "Int64"},
+        c_types={"Float64": c_double, "Int32": c_int32, "UInt64": c_uint64, "Int64": c_int64, "Boolean": c_bool},
         state="FMUState",
         deserialise="deserialize",
     ),
@@ -254,14 +254,24 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def begin(
         self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
     ) -> None:
-        """Enter Initialization Mode and set parameters and start values; for errors see :meth:`initialise`."""
+        """Set structural parameters, enter Initialization Mode, set other parameters and start values.
+
+        For errors see :meth:`initialise`.
+        """
         slave, experiment = self.slave, {"startTime": start_time, "stopTime": stop_time}
+        given = dict(values or {})
+        structural = [name for name in given if self._variable(name).causality == "structuralParameter"]
+        if structural:
+            self._call(slave.enterConfigurationMode)
+            for name in structural:
+                self.set(name, given.pop(name))
+            self._call(slave.exitConfigurationMode)
         if self._version.prefix == "fmi2":
             self._call(slave.setupExperiment, **experiment)
             self._call(slave.enterInitializationMode)
         else:
             self._call(slave.enterInitializationMode, **experiment)
-        for name, value in (values or {}).items():
+        for name, value in given.items():
             self.set(name, value)
 
     def finish(self) -> None:
@@ -271,7 +281,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def set(self, name: str, value: Any) -> None:
         """Set one variable."""
         variable, access = self._variable(name), self._version.access
-        if variable.type in ("Integer", "Int32", "Enumeration") and not (isinstance(value, int) and abs(value) < 2**31):
+        whole = ("Integer", "Int32", "UInt64", "Enumeration")
+        if variable.type in whole and not (isinstance(value, int) and abs(value) < 2**31):
             raise FmuError(f"{self.path.name}: {name} must be a whole number within ±{2**31 - 1}, got {value!r}")
         if variable.type == next(iter(access)) and not isinstance(value, (int, float)):
             raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
@@ -304,7 +315,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         for variable in map(self._variable, names):
             of_type.setdefault(self._version.access[variable.type], []).append(variable)
         prepared = [self._prepared("Get", variables) for variables in of_type.values()]
-        got = [v.name for variables in of_type.values() for v in variables for _ in range(prod(v.shape or ()))]
+        got = [v.name for variables in of_type.values() for v in variables for _ in range(self._size(v))]
         places = [i for name in names for i, one in enumerate(got) if one == name]
 
         def read() -> list[Any]:
@@ -348,11 +359,15 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
         return variable
 
+    def _size(self, variable: Any) -> int:
+        """Return the number of a variable's values, of an array as its structural parameters are now."""
+        return prod(int(one.start) if one.start else self.get(one.variable.name) for one in variable.dimensions)
+
     def _prepared(self, verb: str, variables: Sequence[Any]) -> tuple[Callable[[], object], Any]:
         """Return an FMI call that gets or sets variables of one type, and the array of C that holds their values."""
         version, slave = self._version, self.slave
         kind = version.access[variables[0].type]
-        n = sum(prod(variable.shape or ()) for variable in variables)
+        n = sum(map(self._size, variables))
         references = (c_uint32 * len(variables))(*(variable.valueReference for variable in variables))
         values = (version.c_types[kind] * n)()
         arguments = (slave.component, references, len(variables), values, *((n,) if version.sized else ()))

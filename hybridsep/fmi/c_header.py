@@ -202,6 +202,7 @@ def _interface(kind: str) -> str:
 #define HSEP_N_SCALARS {len(layout.scalars)}
 #define HSEP_HAS_MODES {int(bool(layout.modes))}
 #define HSEP_N_WINDOWS {len(windows)}
+#define HSEP_VR_LENGTH {"HSEP_VR_Np" if windows else 0} /* of the samples in each window, where there are some */
 
 /* Value references; of the modes' numbers the first one. */
 enum {{

@@ -1,9 +1,9 @@
 """Documents of an FMU: ``modelDescription.xml`` of FMI 2.0 and 3.0, ``buildDescription.xml``, and FMI 3.0's terminals.
 
 A template is filled from machine and variable table. An FMI 3.0 FMU has the table of FMI 2.0 with other types, windows
-as arrays, and the time. A terminal is a plug, by which a tool connects whole FMUs: members of the same name of two
-terminals of one kind belong together. ``reference`` carries the commanded position ahead of the drive, ``drive`` the
-command of the drive and its measured position.
+as arrays that are outputs, Np as the structural parameter that sizes them, and the time. A terminal is a plug, by which
+a tool connects whole FMUs: members of the same name of two terminals of one kind belong together. ``reference`` carries
+the commanded position ahead of the drive, ``drive`` the command of the drive and its measured position.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ __all__ = [
 _TEMPLATES = Path(__file__).parent / "templates"
 
 _FMI3_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-_WHOLE = ("Integer", "Int32", "Enumeration")
+_WHOLE = ("Integer", "Int32", "UInt64", "Enumeration")
 """Kinds whose numbers are whole."""
 
 _TIME = Variable("time", "Real", "independent", "continuous", "simulation time", unit="s")
@@ -45,14 +45,20 @@ _OWN_STEPS = ("FeedDrive",)
 def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int | None]]:
     """Return the variables by their value references, each with the length of its array, None if it is scalar.
 
-    Of FMI 2.0 those of the table. Of FMI 3.0, with its types: single ones, then the modes, then windows, then the time.
+    Of FMI 2.0 those of the table. Of FMI 3.0, with its types: single ones, then the modes, then windows, then the time;
+    where there are windows, Np sizes them.
     """
     if fmi == "2":
         return [(variable, None) for variable in table.shown]
     layout = layout_of(table.shown)
     found: list[tuple[Variable, int | None]] = [(variable, None) for variable in (*layout.scalars, *layout.modes)]
-    found += [(replace(one[0], name=one[0].name.partition("[")[0]), len(one)) for one in layout.windows]
-    return [(replace(one, kind=_FMI3_TYPES[one.kind]), size) for one, size in (*found, (_TIME, None))]
+    for one, *more in layout.windows:  # only an output can be connected
+        found.append((replace(one, name=one.name.partition("[")[0], causality="output"), 1 + len(more)))
+    of_type = [(replace(one, kind=_FMI3_TYPES[one.kind]), size) for one, size in (*found, (_TIME, None))]
+    if layout.windows:
+        Np = [variable.name for variable, _ in of_type].index("Np")
+        of_type[Np] = (replace(of_type[Np][0], kind="UInt64", causality="structuralParameter"), None)
+    return of_type
 
 
 def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
@@ -107,6 +113,7 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
             ET.SubElement(parent, "Item", name=item, value=str(value), description=meaning)
     if not len(types):
         root.remove(types)
+    place = {variable.name: str(i if fmi3 else i + 1) for i, variable in enumerate(table)}
     for reference, (variable, size) in enumerate(described):
         own, values = _variable_attributes(variable, reference)
         if not fmi3:
@@ -114,10 +121,9 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
             continue
         element = ET.SubElement(variables, variable.kind, own | values)
         if size is not None:
-            ET.SubElement(element, "Dimension", start=str(size))
+            ET.SubElement(element, "Dimension", valueReference=place["Np"])
     # Outputs have no direct feedthrough; what they depend on at initialization
     key, tags = ("valueReference", ("Output", "InitialUnknown")) if fmi3 else ("index", ("Unknown", "Unknown"))
-    place = {variable.name: str(i if fmi3 else i + 1) for i, variable in enumerate(table)}
     parents = (structure, structure) if fmi3 else structure
     for parent, tag, initially in zip(parents, tags, (False, True), strict=True):
         for variable in (one for one in table if one.causality == "output"):
@@ -174,7 +180,7 @@ def _variable_attributes(variable: Variable, reference: int) -> tuple[dict[str, 
         "causality": variable.causality,
         "variability": variable.variability,
     }
-    if variable.causality == "parameter":
+    if variable.causality in ("parameter", "structuralParameter"):
         own["initial"] = "exact"
     elif variable.causality not in ("input", "independent"):
         own["initial"] = "calculated"

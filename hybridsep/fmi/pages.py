@@ -68,7 +68,7 @@ def documentation(
     """
     model, name = spec.table.model, spec.table.name
     table = [
-        one if size is None else replace(one, kind=f"{one.kind}[{size}]")
+        one if size is None else replace(one, kind=f"{one.kind}[Np]")
         for one, size in described_variables(spec.table, spec.fmi)
     ]
     rows = "\n".join(

@@ -70,7 +70,7 @@ class Variable:
     name, description : str
     kind : {"Real", "Integer", "Boolean", "Enumeration"}
     causality : {"input", "output", "parameter", "local"}
-        FMI 3.0 adds ``independent``, the time.
+        FMI 3.0 adds ``structuralParameter``, the length of its arrays, and ``independent``, the time.
     variability : {"fixed", "tunable", "continuous", "discrete"}
     start : float, int, bool or None
         Start value; None if it is calculated.
@@ -227,7 +227,8 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
         ("x_pb", "physics-based predictions"),
         ("x_h", "hybrid predictions"),
     ):
-        table += [_position(f"{name}_window[{i}]", "local", f"{meaning} of the current window") for i in window]
+        meaning = f"{meaning} of the current window"
+        table += [_position(f"{name}_window[{i}]", "local", meaning, initially_from=ahead) for i in window]
     spread = "standard deviations of x_meas - x_h in the current window"
     table += [_position(f"x_h_std_window[{i}]", "local", spread, display_unit="um") for i in window]
     return table

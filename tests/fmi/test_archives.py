@@ -117,7 +117,7 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     for text in ("Chou, M. Duan, C. E. Okwudire", "<svg", 'href="externalDependencies.txt"', "width=device-width"):
         assert text in page
     for variable in fmpy.read_model_description(str(fmus(name))).modelVariables:
-        size = f"[{variable.shape[0]}]" if variable.shape else ""
+        size = "[Np]" if variable.shape else ""
         shown = re.sub(r"(_window)\[\d+\]", r"\1[i]", variable.name)
         assert f"<td>{shown}</td><td>{variable.type}{size}" in page
     for text in (root.get("description"), page):

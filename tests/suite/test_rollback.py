@@ -16,6 +16,7 @@ from places import SUPPORT
 from stream import (
     CANNOT,
     COMPENSATOR,
+    FMI3,
     LIBRARY,
     LOOK_AHEADS,
     NATIVE,
@@ -106,6 +107,8 @@ def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int)
     initialise(first, **({"p": 5} if new_stream.model in LOOK_AHEADS else {}))
     steps(first, 0, cut)
     blob = first.save()
+    if new_stream.implementation == FMI3 and new_stream.model == PREDICTOR:  # the size of its arrays goes before
+        initialise(second)
     second.restore(blob)  # with parameters of its own, and not even initialised
     assert second.save() == blob
     assert steps(second, cut, cut + 120) == steps(first, cut, cut + 120)
@@ -118,6 +121,8 @@ def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: Str
     initialise(first, averaging=new_stream.model == PREDICTOR)  # which the second one has not, by its machine file
     steps(first, 0, 155)
     blob = first.save()
+    if new_stream.implementation == FMI3:
+        initialise(second)
     second.restore(blob)
     assert second.save() == blob
     assert steps(second, 155, 300) == steps(first, 155, 300)

@@ -16,7 +16,7 @@ from library_stream import start_values
 from numpy.typing import NDArray
 from staircase_data import TS, C, K, M
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Array, Value, machine_of
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters, on_all
 
 from hybridsep import backtest
 from hybridsep.base.metrics import hold
@@ -150,6 +150,21 @@ def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> Non
         expected[:length] = loop.column(PREDICTOR, name)[n : n + length]
         np.testing.assert_allclose(stream.window(f"{name}_window"), expected, rtol=0, atol=tolerance_of(new_stream))
     np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
+
+
+@on_adapters((PREDICTOR,))
+def test_a_window_is_whole_when_it_begins_and_reading_it_changes_nothing(new_stream: StreamMaker) -> None:
+    """With averaging, whose predictions are made in parts."""
+    values: dict[str, Value] = {"Np": 60, "p": 10, "t_init": 0.0, "averaging": True}
+    loop, stream, other = closed_loop(PREDICTOR, 420, values), new_stream(), new_stream()
+    stream.initialise(loop.values)
+    other.initialise(loop.values)
+    expected = replay(other, loop, 0, 420)
+    for first in range(0, 420, 60):
+        for name in ("x_d", "x_pb", "x_h", "x_h_std"):
+            column = expected[first : first + 60, OUTPUTS[PREDICTOR].index(name)]
+            np.testing.assert_array_equal(stream.window(f"{name}_window")[:60], column)
+        np.testing.assert_array_equal(replay(stream, loop, first, first + 60), expected[first : first + 61])
 
 
 @on_all(LOOK_AHEADS)

@@ -231,7 +231,9 @@ class CModel:
         self._call("check_state", ctypes.c_char_p(blob), ctypes.c_size_t(len(blob)), self._values)
 
     def window(self, name: str) -> Array:
-        """Return a window variable's samples."""
+        """Return a window variable's samples, as an adapter shows them."""
+        if len(self.state):
+            self.library.hsep_model_show_windows(ctypes.byref(self.context), self._state, self._values)
         first = self.place[f"{name}[1]"]
         n = sum(key.startswith(f"{name}[") for key in self.place)
         samples: Array = self.values[first : first + n].copy()

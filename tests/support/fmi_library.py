@@ -22,7 +22,7 @@ OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 STATES = ("instantiated", "Initialization Mode", "stepping", "terminated")
 
 ABSENT = (
-    *("EnterEventMode", "EnterStepMode", "EnterConfigurationMode", "ExitConfigurationMode", "EvaluateDiscreteStates"),
+    *("EnterEventMode", "EnterStepMode", "EvaluateDiscreteStates"),
     *("EnterContinuousTimeMode", "GetClock", "SetClock", "GetIntervalDecimal", "GetIntervalFraction"),
     *("GetShiftDecimal", "GetShiftFraction", "SetIntervalDecimal", "SetIntervalFraction", "UpdateDiscreteStates"),
     *("GetNumberOfVariableDependencies", "GetVariableDependencies", "GetDirectionalDerivative"),

@@ -110,9 +110,9 @@ HSEP_API hsep_instance *hsep_call_tune(hsep_instance *instance, const hsep_call 
 {
     const hsep_context *context = &instance->context;
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance->experiment.phase == HSEP_STEPPING &&
-        hsep_table_row(context, reference)->causality == HSEP_PARAMETER &&
-        !hsep_check_parameter(context, reference, value, message)) {
+    const hsep_found found = instance->names->find(context, reference);
+    if ((instance->experiment.phase == HSEP_STEPPING || found.kind == HSEP_COUNT) &&
+        found.row->causality == HSEP_PARAMETER && !hsep_check_parameter(context, reference, value, message)) {
         (void)hsep_refuse(instance, "%s: %s", call->name, message);
         return NULL;
     }

@@ -31,8 +31,8 @@ HSEP_API hsep_instance *hsep_call_access(
     void *component, const hsep_call *call, int sets, const char *type, const unsigned references[], size_t n,
     const void *values, size_t n_values);
 
-/* The instance if a variable may have a value: a parameter is checked when it is set in a run, before with the others
- * when the initialization ends. Otherwise NULL. */
+/* The instance if a variable may have a value: a parameter is checked when it is set in a run, one that sizes arrays
+ * always; before a run the others when the initialization ends. Otherwise NULL. */
 HSEP_API hsep_instance *hsep_call_tune(
     hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
 

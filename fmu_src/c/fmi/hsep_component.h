@@ -44,7 +44,13 @@ typedef struct {
 } hsep_call;
 
 /* The phases, short, for the columns of a table of calls. */
-enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_STEPPING, HSEP_T = HSEP_TERMINATED };
+enum {
+    HSEP_I = HSEP_INSTANTIATED,
+    HSEP_C = HSEP_CONFIGURATION,
+    HSEP_M = HSEP_INITIALIZATION,
+    HSEP_S = HSEP_STEPPING,
+    HSEP_T = HSEP_TERMINATED
+};
 
 /* Make an instance. filled: its words, memory functions, hand, logger and environment; token: must equal the token of
  * modelDescription.xml; resources: as hsep_open takes them. On refusal return NULL and log why. */

@@ -8,11 +8,12 @@
 
 #include <stddef.h>
 
-#define HSEP_N_PHASES 4
+#define HSEP_N_PHASES 5
 
-/* The variable of a value reference: its row, and the place and number of its values. */
+/* The variable of a value reference: its row, its kind in this version, and the place and number of its values. */
 typedef struct {
     const hsep_variable *row;
+    hsep_kind kind;
     size_t place;
     size_t count;
 } hsep_found;

@@ -33,14 +33,40 @@ HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance)
     return instance->context.n_variables + HSEP_N_INTERPOLATED;
 }
 
+HSEP_API hsep_status hsep_instance_resize(hsep_instance *instance, const char *call, size_t window, char message[])
+{
+    hsep_context *context = &instance->context;
+    const size_t before = context->n_variables - HSEP_N_WINDOWS * context->window;
+    const size_t after = HSEP_N_WINDOWS * window + HSEP_N_INTERPOLATED;
+    if (window > instance->room) {
+        double *values = hsep_new(instance, (before + after) * sizeof(double));
+        if (values == NULL) {
+            return hsep_message_add(message, "%s: no memory for %lu values", call, (unsigned long)(before + after));
+        }
+        memcpy(values, instance->values, before * sizeof(double));
+        hsep_delete(instance, instance->values);
+        instance->values = values;
+        instance->room = window;
+    }
+    memset(instance->values + before, 0, after * sizeof(double));
+    instance->values[HSEP_VR_LENGTH] = (double)window;
+    context->n_variables = before + HSEP_N_WINDOWS * window;
+    context->window = window;
+    return HSEP_OK;
+}
+
 HSEP_API void hsep_instance_reset(hsep_instance *instance)
 {
+    hsep_context *context = &instance->context;
     hsep_instance_drop_state(instance);
-    memset(instance->values, 0, hsep_instance_n_values(instance) * sizeof(double));
-    for (size_t i = 0; i < instance->context.n_variables; i++) {
-        instance->values[i] = hsep_table_start(&instance->context, i);
+    if (context->window > 0) { /* never more than there is room for */
+        (void)hsep_instance_resize(instance, "", (size_t)context->starts[HSEP_VR_LENGTH], NULL);
     }
-    hsep_model_start_values(&instance->context, instance->values);
+    memset(instance->values, 0, hsep_instance_n_values(instance) * sizeof(double));
+    for (size_t i = 0; i < context->n_variables; i++) {
+        instance->values[i] = hsep_table_start(context, i);
+    }
+    hsep_model_start_values(context, instance->values);
     instance->experiment = (hsep_experiment){.phase = HSEP_INSTANTIATED};
 }
 

@@ -16,7 +16,13 @@
 #include <stdint.h>
 
 /* The states of a co-simulation whose steps are done when the call returns. */
-typedef enum { HSEP_INSTANTIATED = 1, HSEP_INITIALIZATION = 2, HSEP_STEPPING = 4, HSEP_TERMINATED = 8 } hsep_phase;
+typedef enum {
+    HSEP_INSTANTIATED = 1,
+    HSEP_INITIALIZATION = 2,
+    HSEP_STEPPING = 4,
+    HSEP_TERMINATED = 8,
+    HSEP_CONFIGURATION = 16 /* FMI 3.0's; no state is saved in it */
+} hsep_phase;
 
 /* The importer's memory functions, or the C library's. */
 typedef void *(*hsep_allocate)(size_t count, size_t size);
@@ -56,7 +62,8 @@ typedef struct {
     hsep_experiment experiment;
     void *state; /* the model's, NULL before the initialization has ended */
     size_t state_size;
-    double *values; /* by value reference, then the time derivatives of inputs */
+    double *values; /* by place, then the time derivatives of inputs */
+    size_t room;    /* samples of each window that values has room for, at least as many as the table has */
 } hsep_instance;
 
 /* A zeroed block from the importer's memory; NULL if there is none left. */
@@ -70,6 +77,9 @@ HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
 
 /* Number of values, the time derivatives of inputs included. */
 HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance);
+
+/* Give each window so many samples, which Np becomes; before the initialization. Fails if there is no memory. */
+HSEP_API hsep_status hsep_instance_resize(hsep_instance *instance, const char *call, size_t window, char message[]);
 
 /* As after the instantiation: start values, no experiment, no state. */
 HSEP_API void hsep_instance_reset(hsep_instance *instance);

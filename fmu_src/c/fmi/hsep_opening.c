@@ -69,5 +69,6 @@ HSEP_API hsep_status hsep_open(hsep_instance *instance, const char *name, const 
         return hsep_message_add(
             message, "%s: no memory for %lu values", call, (unsigned long)hsep_instance_n_values(instance));
     }
+    instance->room = instance->context.window;
     return table == HSEP_WARNED ? table : folder;
 }

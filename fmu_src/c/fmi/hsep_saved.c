@@ -85,7 +85,8 @@ HSEP_API hsep_status hsep_restore(hsep_instance *instance, const hsep_saved *sav
             message, "the state belongs to the FMU %s, not to %s", header.guid, instance->context.guid);
     }
     if (header.size != saved_fixed_size(instance) + header.state_size) {
-        return hsep_message_add(message, "the state has another number of variables than this FMU");
+        return hsep_message_add(
+            message, "the state has another number of variables than this instance: its Np is another one");
     }
     if (header.state_size != instance->state_size) {
         void *state = header.state_size > 0 ? hsep_new(instance, (size_t)header.state_size) : NULL;
@@ -145,7 +146,7 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
         return "it belongs to another FMU: the GUID differs";
     }
     if (header.size != size || header.state_size != size - saved_fixed_size(instance)) {
-        return "it is truncated or too long";
+        return "it is truncated or too long, or its Np is another one";
     }
     if (header.checksum != saved_checksum(header, block, size)) {
         return "it is damaged: the checksum differs";

@@ -3,7 +3,8 @@
  * header | values, hsep_instance_n_values doubles | the model's state, of hsep_model_size
  *
  * Numbers are in the machine's own representation; a serialised block of another byte order is refused, as is one of
- * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a). What fails returns
+ * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a), and one of FMI 3.0 whose
+ * windows have another Np. What fails returns
  * HSEP_REFUSED, changes nothing and says why.
  */
 #ifndef HSEP_SAVED_H

@@ -14,13 +14,6 @@
 #define TABLE_FILE "variables.bin"
 #define TABLE_MAGIC "HSEPVAR2"
 
-/* Samples of each window, if the FMU shows them. */
-#if HSEP_N_WINDOWS > 0
-#define TABLE_WINDOW(starts) ((starts)[HSEP_VR_Np])
-#else
-#define TABLE_WINDOW(starts) 0.0
-#endif
-
 typedef struct {
     uint64_t size, kind, n_modes, angular, window;
     char guid[HSEP_GUID_SIZE];
@@ -79,7 +72,8 @@ static hsep_status table_fill(hsep_context *context, const table_content *conten
     if (hsep_check_parameters(context, content->starts, message) > 0) {
         return HSEP_REFUSED;
     }
-    if (content->head.window > 0 && (double)content->head.window != TABLE_WINDOW(content->starts)) {
+    if (content->head.window > 0 &&
+        (HSEP_N_WINDOWS == 0 || (double)content->head.window != content->starts[HSEP_VR_LENGTH])) {
         return hsep_message_add(message, "its windows must be of Np samples, or left out");
     }
     context->window = (size_t)content->head.window;

@@ -5,7 +5,7 @@
 #include <limits.h>
 
 static const char *const values_causalities[] = {
-    "an input", "an output", "a parameter", "a local variable", "the independent variable"};
+    "an input", "an output", "a parameter", "a calculated variable", "the independent variable"};
 
 HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[])
 {
@@ -27,7 +27,7 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
                 reference);
         }
         const hsep_found found = names->find(context, reference);
-        const char *type = names->types[found.row->kind];
+        const char *type = names->types[found.kind];
         if (type != access->type) {
             return hsep_message_add(
                 message, "%s: %s (value reference %u) is of type %s, not %s", access->call,
@@ -66,11 +66,25 @@ HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const 
     return HSEP_OK;
 }
 
+/* Have the windows written if one of the variables is of them: nothing else is local. */
+static void values_show(hsep_instance *instance, const hsep_access *access)
+{
+    size_t i = 0;
+    while (i < access->n_references &&
+           instance->names->find(&instance->context, access->references[i]).row->causality != HSEP_LOCAL) {
+        i++;
+    }
+    if (i < access->n_references) {
+        hsep_model_show_windows(&instance->context, instance->state, instance->values);
+    }
+}
+
 HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_fmi_names *names = instance->names;
     char reason[HSEP_MESSAGE_SIZE] = "", name[HSEP_NAME_SIZE];
     if (instance->state != NULL) {
+        values_show(instance, access);
         return HSEP_OK;
     }
     if (hsep_model_check_start(&instance->context, instance->values, reason) == HSEP_OK) {

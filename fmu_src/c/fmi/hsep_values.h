@@ -25,8 +25,8 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
  * ones later too. */
 HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const hsep_access *access, char message[]);
 
-/* Calculate what is read before the initialization has ended: it follows from the start values. Refused if one of the
- * variables is calculated from a start value that is no position. */
+/* Calculate what is read: windows, and what follows from the start values before the initialization has ended. Refused
+ * if one of the variables is calculated from a start value that is no position. */
 HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[]);
 
 /* A value as a whole number of 32 bits. */

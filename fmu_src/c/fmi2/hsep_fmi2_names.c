@@ -5,7 +5,8 @@ static size_t fmi2_n_variables(const hsep_context *context) { return context->n_
 
 static hsep_found fmi2_find(const hsep_context *context, size_t reference)
 {
-    return (hsep_found){.row = hsep_table_row(context, reference), .place = reference, .count = 1};
+    const hsep_variable *row = hsep_table_row(context, reference);
+    return (hsep_found){.row = row, .kind = row->kind, .place = reference, .count = 1};
 }
 
 /* Enumerations are read and written as integers. */

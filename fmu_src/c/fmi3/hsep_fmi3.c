@@ -43,6 +43,21 @@ fmi3Instance fmi3InstantiateCoSimulation(
 
 HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize, HSEP_FMI3)
 
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
+{
+    hsep_instance *self = hsep_begin(instance, HSEP_FMI3(ENTER_CONFIGURATION_MODE));
+    if (self != NULL && self->context.window == 0) {
+        return hsep_fmi3_status(
+            hsep_refuse(self, "fmi3EnterConfigurationMode: there is no structural parameter in modelDescription.xml"));
+    }
+    return hsep_fmi3_status(hsep_call_phase(instance, HSEP_FMI3(ENTER_CONFIGURATION_MODE), HSEP_CONFIGURATION));
+}
+
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
+{
+    return hsep_fmi3_status(hsep_call_phase(instance, HSEP_FMI3(EXIT_CONFIGURATION_MODE), HSEP_INSTANTIATED));
+}
+
 fmi3Status fmi3EnterInitializationMode(
     fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
     fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)

@@ -1,6 +1,5 @@
-/* What modelDescription.xml says is absent: clocks, events, derivatives, structural parameters, dependencies of single
- * elements, and the other kinds of FMUs. The functions are there, since importers look them all up, and are refused in
- * every state. */
+/* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and the other
+ * kinds of FMUs. The functions are there, since importers look them all up, and are refused in every state. */
 #include "hsep_fmi3_calls.h"
 
 /* Refuse a call; its further arguments are only named, so that no compiler finds them unused. */
@@ -14,7 +13,6 @@ static fmi3Status fmi3_absent(fmi3Instance instance, const char *name, const cha
 
 static const char fmi3_no_clock[] = "there is no clock";
 static const char fmi3_no_event_mode[] = "hasEventMode is false";
-static const char fmi3_no_structure[] = "there is no structural parameter";
 static const char fmi3_no_model_exchange[] = "there is no ModelExchange";
 static const char fmi3_no_execution[] = "there is no ScheduledExecution";
 
@@ -29,8 +27,6 @@ static const char fmi3_no_execution[] = "there is no ScheduledExecution";
 
 FMI3_ABSENT(fmi3EnterEventMode, fmi3_no_event_mode, FMI3_PLAIN, 0)
 FMI3_ABSENT(fmi3EnterStepMode, fmi3_no_event_mode, FMI3_PLAIN, 0)
-FMI3_ABSENT(fmi3EnterConfigurationMode, fmi3_no_structure, FMI3_PLAIN, 0)
-FMI3_ABSENT(fmi3ExitConfigurationMode, fmi3_no_structure, FMI3_PLAIN, 0)
 FMI3_ABSENT(fmi3EvaluateDiscreteStates, "providesEvaluateDiscreteStates is false", FMI3_PLAIN, 0)
 
 FMI3_ABSENT(fmi3GetClock, fmi3_no_clock, FMI3_CLOCKS(fmi3Clock values[]), valueReferences, n, values)

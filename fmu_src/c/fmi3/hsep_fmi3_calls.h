@@ -1,6 +1,6 @@
 /* Legal FMI 3.0 calls in each state of an instance: the standard's table of the co-simulation state machine.
  *
- * There is no Event Mode, no Configuration Mode, no intermediate update and no early return: modelDescription.xml says
+ * There is no Event Mode, no intermediate update and no early return: modelDescription.xml says
  * so, and the functions for them are in hsep_fmi3_absent.c.
  */
 #ifndef HSEP_FMI3_CALLS_H
@@ -12,14 +12,16 @@
 #include "fmi3Functions.h"
 
 /* The calls that belong to an instance: CALL(constant, name, states in which it is legal).
- * I: instantiated, M: Initialization Mode, S: Step Mode, T: terminated */
+ * I: instantiated, C: Configuration Mode, M: Initialization Mode, S: Step Mode, T: terminated */
 /* clang-format off */
 #define HSEP_FMI3_CALLS(CALL) \
-    CALL(SET_DEBUG_LOGGING,         "fmi3SetDebugLogging",         HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(SET_DEBUG_LOGGING,         "fmi3SetDebugLogging",         HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(ENTER_CONFIGURATION_MODE,  "fmi3EnterConfigurationMode",  HSEP_I) \
+    CALL(EXIT_CONFIGURATION_MODE,   "fmi3ExitConfigurationMode",   HSEP_C) \
     CALL(ENTER_INITIALIZATION_MODE, "fmi3EnterInitializationMode", HSEP_I) \
     CALL(EXIT_INITIALIZATION_MODE,  "fmi3ExitInitializationMode",           HSEP_M) \
     CALL(TERMINATE,                 "fmi3Terminate",                                 HSEP_S) \
-    CALL(RESET,                     "fmi3Reset",                   HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(RESET,                     "fmi3Reset",                   HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
     CALL(GET_FLOAT64,               "fmi3GetFloat64",              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(GET_INT32,                 "fmi3GetInt32",                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(GET_INT64,                 "fmi3GetInt64",                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
@@ -43,7 +45,7 @@
     CALL(SET_INT16,                 "fmi3SetInt16",                HSEP_I | HSEP_M | HSEP_S) \
     CALL(SET_UINT16,                "fmi3SetUInt16",               HSEP_I | HSEP_M | HSEP_S) \
     CALL(SET_UINT32,                "fmi3SetUInt32",               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(SET_UINT64,                "fmi3SetUInt64",               HSEP_I | HSEP_M | HSEP_S) \
+    CALL(SET_UINT64,                "fmi3SetUInt64",               HSEP_I | HSEP_C) \
     CALL(SET_STRING,                "fmi3SetString",               HSEP_I | HSEP_M | HSEP_S) \
     CALL(SET_BINARY,                "fmi3SetBinary",               HSEP_I | HSEP_M | HSEP_S) \
     CALL(GET_FMU_STATE,             "fmi3GetFMUState",             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \

@@ -1,5 +1,5 @@
 /* FMI 3.0's words; single variables and modes have a value reference for each value, windows one each, then comes the
- * time. */
+ * time. Where there are windows, Np is the structural parameter that sizes them. */
 #include "hsep_fmi3_calls.h"
 #include "hsep_text.h"
 
@@ -24,13 +24,16 @@ static hsep_found fmi3_find(const hsep_context *context, size_t reference)
 {
     const size_t before = fmi3_before_windows(context);
     if (reference < before) {
-        return (hsep_found){.row = hsep_table_row(context, reference), .place = reference, .count = 1};
+        const hsep_variable *row = hsep_table_row(context, reference);
+        const hsep_kind kind = context->window > 0 && reference == HSEP_VR_LENGTH ? HSEP_COUNT : row->kind;
+        return (hsep_found){.row = row, .kind = kind, .place = reference, .count = 1};
     }
     if (reference == before + fmi3_n_windows(context)) {
-        return (hsep_found){.row = &fmi3_time, .place = context->n_variables, .count = 1};
+        return (hsep_found){.row = &fmi3_time, .kind = HSEP_REAL, .place = context->n_variables, .count = 1};
     }
     const size_t place = before + (reference - before) * context->window;
-    return (hsep_found){.row = hsep_table_row(context, place), .place = place, .count = context->window};
+    return (hsep_found){
+        .row = hsep_table_row(context, place), .kind = HSEP_REAL, .place = place, .count = context->window};
 }
 
 static const char *fmi3_name(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE])
@@ -52,12 +55,13 @@ static const hsep_fmi_names fmi3_names = {
     .n_references = "nValueReferences",
     .values = "values",
     .n_values = "nValues",
-    .phases = {"instantiated", "Initialization Mode", "Step Mode", "terminated"},
+    .phases = {"instantiated", "Initialization Mode", "Step Mode", "terminated", "Configuration Mode"},
     .types =
         {[HSEP_REAL] = "Float64",
          [HSEP_INTEGER] = "Int32",
          [HSEP_ENUMERATION] = "Int64", /* which the standard reads and writes enumerations by */
-         [HSEP_BOOLEAN] = "Boolean"},
+         [HSEP_BOOLEAN] = "Boolean",
+         [HSEP_COUNT] = "UInt64"},
     .n_variables = fmi3_n_variables,
     .find = fmi3_find,
     .name = fmi3_name};

@@ -11,7 +11,7 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
 
 /* The functions that get and set a kind of variables that there are; what is set has one value for each reference, as
  * no array is an input or a parameter. */
-#define FMI3_ACCESS(getter, setter, NAME, c_type, kind, get, set) \
+#define FMI3_GET(getter, NAME, c_type, kind, get) \
     fmi3Status getter( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values) \
     { \
@@ -27,7 +27,9 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
             } \
         } \
         return (self == NULL) ? fmi3Error : fmi3OK; \
-    } \
+    }
+
+#define FMI3_SET(setter, NAME, c_type, kind, set) \
     fmi3Status setter( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, const c_type values[], \
         size_t n_values) \
@@ -46,10 +48,33 @@ static const double *fmi3_source(const hsep_instance *instance, fmi3ValueReferen
         return (self == NULL) ? fmi3Error : fmi3OK; \
     }
 
-FMI3_ACCESS(fmi3GetFloat64, fmi3SetFloat64, FLOAT64, fmi3Float64, HSEP_REAL, number, number)
-FMI3_ACCESS(fmi3GetInt32, fmi3SetInt32, INT32, fmi3Int32, HSEP_INTEGER, hsep_values_integer(number), (double)number)
-FMI3_ACCESS(fmi3GetInt64, fmi3SetInt64, INT64, fmi3Int64, HSEP_ENUMERATION, hsep_values_integer(number), (double)number)
-FMI3_ACCESS(fmi3GetBoolean, fmi3SetBoolean, BOOLEAN, fmi3Boolean, HSEP_BOOLEAN, number != 0.0, number ? 1.0 : 0.0)
+FMI3_GET(fmi3GetFloat64, FLOAT64, fmi3Float64, HSEP_REAL, number)
+FMI3_SET(fmi3SetFloat64, FLOAT64, fmi3Float64, HSEP_REAL, number)
+FMI3_GET(fmi3GetInt32, INT32, fmi3Int32, HSEP_INTEGER, hsep_values_integer(number))
+FMI3_SET(fmi3SetInt32, INT32, fmi3Int32, HSEP_INTEGER, (double)number)
+FMI3_GET(fmi3GetInt64, INT64, fmi3Int64, HSEP_ENUMERATION, hsep_values_integer(number))
+FMI3_SET(fmi3SetInt64, INT64, fmi3Int64, HSEP_ENUMERATION, (double)number)
+FMI3_GET(fmi3GetBoolean, BOOLEAN, fmi3Boolean, HSEP_BOOLEAN, number != 0.0)
+FMI3_SET(fmi3SetBoolean, BOOLEAN, fmi3Boolean, HSEP_BOOLEAN, number ? 1.0 : 0.0)
+FMI3_GET(fmi3GetUInt64, UINT64, fmi3UInt64, HSEP_COUNT, (fmi3UInt64)number)
+
+/* Np alone is of this type: arrays take their new size at once, in Configuration Mode, or as soon as the instance is
+ * there, for importers that know no Configuration Mode. */
+fmi3Status fmi3SetUInt64(
+    fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3UInt64 values[], size_t n_values)
+{
+    const hsep_call *call = HSEP_FMI3(SET_UINT64);
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_instance *self =
+        hsep_call_access(instance, call, 1, hsep_fmi3_names()->types[HSEP_COUNT], references, n, values, n_values);
+    for (size_t i = 0; self != NULL && i < n; i++) {
+        self = hsep_call_tune(self, call, references[i], (double)values[i]);
+    }
+    if (self != NULL && n > 0 && hsep_instance_resize(self, call->name, (size_t)values[n - 1], message) != HSEP_OK) {
+        return hsep_fmi3_status(hsep_refuse(self, "%s", message));
+    }
+    return (self == NULL) ? fmi3Error : fmi3OK;
+}
 
 /* Access to types that no variable has: with references, it is refused by name. */
 static fmi3Status fmi3_none(
@@ -77,7 +102,6 @@ FMI3_NO_VARIABLES(fmi3GetUInt8, fmi3SetUInt8, UINT8, "UInt8", fmi3UInt8)
 FMI3_NO_VARIABLES(fmi3GetInt16, fmi3SetInt16, INT16, "Int16", fmi3Int16)
 FMI3_NO_VARIABLES(fmi3GetUInt16, fmi3SetUInt16, UINT16, "UInt16", fmi3UInt16)
 FMI3_NO_VARIABLES(fmi3GetUInt32, fmi3SetUInt32, UINT32, "UInt32", fmi3UInt32)
-FMI3_NO_VARIABLES(fmi3GetUInt64, fmi3SetUInt64, UINT64, "UInt64", fmi3UInt64)
 FMI3_NO_VARIABLES(fmi3GetString, fmi3SetString, STRING, "String", fmi3String)
 
 fmi3Status fmi3GetBinary(

@@ -32,7 +32,8 @@ typedef enum {
     HSEP_WARNED_BOTH = HSEP_WARNED_LATE | HSEP_WARNED_MOVED
 } hsep_status;
 
-typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_ENUMERATION, HSEP_BOOLEAN, HSEP_N_KINDS } hsep_kind;
+/* HSEP_COUNT: an integer of the table that sizes arrays of FMI 3.0 */
+typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_ENUMERATION, HSEP_BOOLEAN, HSEP_COUNT, HSEP_N_KINDS } hsep_kind;
 typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL, HSEP_INDEPENDENT } hsep_causality;
 
 /* One row of the generated table (hsep_table.h). Numbers of every kind are held as double. */
@@ -73,15 +74,15 @@ typedef struct {
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
 
-/* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs and locals of
- * t_start go to values.
+/* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs of t_start go to
+ * values.
  * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
  * Fails if a start value is not finite, a resource cannot be read or has changed so that size does not fit. */
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[]);
 
-/* Do one communication step from t by h with the inputs, and the tunable parameters, in range, in values; outputs and
- * locals go to values.
+/* Do one communication step from t by h with the inputs, and the tunable parameters, in range, in values; outputs go to
+ * values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
  * unchanged, if an output would not be a finite number, because the learned recursion diverges: every later step fails
  * then, until another state is set or the model is initialised. A drive's step in
@@ -90,6 +91,10 @@ HSEP_API hsep_status hsep_model_initialise(
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[]);
+
+/* Write locals, the samples of HybridPredictor's window, to values. Steps leave part of a prediction to the next ones:
+ * what is left of it is done here. All later outputs are the same. */
+HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[]);
 
 /* Check the start value of the command: a position, from which outputs and locals follow before initialization. */
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[]);

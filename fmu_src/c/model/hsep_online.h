@@ -41,8 +41,11 @@ HSEP_API void hsep_online_begin(hsep_online *self);
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self);
 
-/* Write outputs and locals; window: whether it is a new one. */
-HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[]);
+/* Write the outputs. */
+HSEP_API void hsep_online_write(const hsep_online *self, double values[]);
+
+/* Write locals, as hsep_model_show_windows. */
+HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[]);
 
 #endif
 

@@ -25,7 +25,7 @@ HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return self; }
 
-HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[])
+HSEP_API void hsep_online_write(const hsep_online *self, double values[])
 {
     hsep_predictor_outputs outputs;
     hsep_predictor_read(self, &outputs);
@@ -40,8 +40,13 @@ HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *
     values[HSEP_VR_rms_hold] = outputs.rms_hold;
     values[HSEP_VR_batch] = (double)outputs.batch;
     values[HSEP_VR_n_rejected] = (double)outputs.n_rejected;
+}
+
+HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[])
+{
+    hsep_predictor_complete(self);
     /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
-    for (size_t i = 0; window && i < context->window; i++) {
+    for (size_t i = 0; self->divergence == HSEP_CONVERGES && i < context->window; i++) {
         const int shown = i < self->Np;
         values[HSEP_VR_x_d_window(context) + i] = shown ? hsep_at_const(self, self->x_d)[i] : 0.0;
         values[HSEP_VR_x_pb_window(context) + i] = shown ? hsep_at_const(self, self->x_pb)[i] : 0.0;

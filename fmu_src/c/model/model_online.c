@@ -79,7 +79,7 @@ HSEP_API hsep_status hsep_model_initialise(
     if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_online_write(context, &self->online, 1, values);
+    hsep_online_write(&self->online, values);
     return HSEP_OK;
 }
 
@@ -98,7 +98,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     const hsep_residual_model *model = hsep_predictor_model(predictor);
     const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]};
     const hsep_input x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]};
-    int window = 0;
     hsep_inputs_step step;
     message[0] = '\0';
     if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
@@ -111,13 +110,19 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     }
     hsep_online_tune(&self->online, values);
     while (hsep_inputs_next(&self->inputs, &step)) {
-        window |= HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
+        (void)HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
         if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
             return HSEP_REFUSED;
         }
     }
-    hsep_online_write(context, &self->online, window, values);
+    hsep_online_write(&self->online, values);
     return status;
+}
+
+HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
+{
+    online_state *self = state;
+    hsep_online_show(context, &self->online, values);
 }
 
 #else

@@ -56,9 +56,8 @@ HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return hsep_compensator_predictor(self); }
 
-HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[])
+HSEP_API void hsep_online_write(const hsep_online *self, double values[])
 {
-    (void)context, (void)window;
     hsep_compensator_outputs outputs;
     hsep_compensator_read(self, &outputs);
     const hsep_predictor_outputs *predicted = &outputs.predicted;
@@ -77,6 +76,11 @@ HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *
     values[HSEP_VR_n_rejected] = (double)predicted->n_rejected;
     values[HSEP_VR_no_measurement] = (double)outputs.no_measurement;
     values[HSEP_VR_alarm] = (double)outputs.alarm;
+}
+
+HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[])
+{
+    (void)context, (void)self, (void)values; /* it has no locals */
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])

@@ -246,6 +246,13 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     return 1;
 }
 
+HSEP_API void hsep_predictor_complete(hsep_predictor *self)
+{
+    while (self->n_published < self->Np && self->divergence == HSEP_CONVERGES) {
+        predictor_go_on(self);
+    }
+}
+
 HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i)
 {
     const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);

@@ -95,6 +95,9 @@ HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
 
+/* Predict at once what is left of the window, alone; later samples are the same. */
+HSEP_API void hsep_predictor_complete(hsep_predictor *self);
+
 /* Finish a window: learn it with averaging, and its errors; its residuals become the past of the next one. */
 HSEP_API void hsep_predictor_finish(hsep_predictor *self);
 
