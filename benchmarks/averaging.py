@@ -208,8 +208,8 @@ def replayed(case: Case) -> Row:
     peers = backtest(HybridPredictor(case.model, averages), case.x_d, case.x_meas[0]).overall
     return Row(
         case.name,
-        peers.rms_pb,
-        peers.rms_hold,
+        peers.pb.rms,
+        peers.hold.rms,
         _cold_and_warm(HybridPredictor(case.model, case.settings), case),
         _cold_and_warm(HybridPredictor(case.model, averages), case),
     )

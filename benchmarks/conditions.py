@@ -99,7 +99,7 @@ def starts_in_motion(emps: Path | None, recordings: Path | None, n: int) -> Iter
     for case, cut in motions(emps, recordings, n):
         settings = replace(case.settings, averaging=True, t_init=-1.0)
         found = backtest(HybridPredictor(case.model, settings), case.x_d[cut:], case.x_meas[0][cut:]).overall
-        yield f"{case.name}, from sample {cut} on", found.rms_h, found.rms_pb
+        yield f"{case.name}, from sample {cut} on", found.h.rms, found.pb.rms
 
 
 def motions(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[Case, int]]:

@@ -67,7 +67,7 @@ def errors(amplitude: float, pitch: float, period: float, starts: tuple[float, f
     predictor, found = new_predictor(period), []
     for seed, start in enumerate(starts, start=1):
         predictor.restart(start)
-        found.append(1e6 * backtest(predictor, *moves(amplitude, pitch, start, seed)).overall.rms_h)
+        found.append(1e6 * backtest(predictor, *moves(amplitude, pitch, start, seed)).overall.h.rms)
     return found
 
 
@@ -78,7 +78,7 @@ def main() -> None:
     for amplitude, pitch in CASES:
         peers = backtest(new_predictor(0.0), *moves(amplitude, pitch, STARTS[0], 1)).overall
         shown = [" / ".join(f"{error:.2f}" for error in errors(amplitude, pitch, one)) for one in (0.0, pitch)]
-        sizes = (1e6 * amplitude, 1e3 * pitch, 1e6 * peers.rms_pb, 1e6 * peers.rms_hold)
+        sizes = (1e6 * amplitude, 1e3 * pitch, 1e6 * peers.pb.rms, 1e6 * peers.hold.rms)
         table.add_row(*(f"{size:.4g}" for size in sizes), *shown)
     Console(width=100).print(table)
 

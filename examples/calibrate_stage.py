@@ -65,11 +65,12 @@ def compare_assumptions() -> None:
             predictor = machine.new_predictor(
                 replace(machine.predictor_settings, t_init=0.05 * machine.T_s * len(command))
             )
-            found = backtest(predictor, command, measured(machine, command, f, ratio)).overall
+            found = backtest(predictor, command, measured(machine, command, f, ratio)).summary()
+            printed = PRINTED[f"spiral_{axis}"]["reduction_percent"]
             print(
-                f"{axis.upper()}  {name:<26}f = {f:.4e} m: {1e6 * found.rms_pb:6.1f} → {1e6 * found.rms_h:5.1f} µm, "
-                f"−{found.reduction_percent:.0f} % (printed: −{PRINTED[f'spiral_{axis}']['reduction_percent']:g} %), "
-                f"{found.ratio_to_hold:.2f} × hold",
+                f"{axis.upper()}  {name:<26}f = {f:.4e} m: {found['rms_pb_um']:6.1f} → {found['rms_h_um']:5.1f} µm, "
+                f"−{found['reduction_percent']:.0f} % (printed: −{printed:g} %), "
+                f"{found['ratio_to_hold']:.2f} × hold",
                 flush=True,
             )
 

@@ -67,7 +67,7 @@ def main() -> None:
     print("Hybrid RMS, µm, over λ, m² (printed 14.7)")
     for exponent in range(-16, -5):
         found = backtest(machine.new_predictor(replace(machine.predictor_settings, lam=10.0**exponent)), x_d, x)
-        print(f"  1e{exponent:<5}{1e6 * found.overall.rms_h:9.2f}")
+        print(f"  1e{exponent:<5}{1e6 * found.overall.h.rms:9.2f}")
 
 
 if __name__ == "__main__":

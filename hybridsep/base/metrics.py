@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ErrorSize",
+    "Score",
     "batch_rms",
     "coverage",
     "hold",
@@ -49,6 +50,33 @@ class ErrorSize:
         """Return the size of ``(n,)`` samples, NaN where they are not known."""
         known = error[~np.isnan(error)]
         return cls(rms(known), largest(known)) if known.size else cls(math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of physics model, hold baseline and hybrid against the measured position, over ``n_samples`` samples."""
+
+    n_samples: int
+    pb: ErrorSize
+    hold: ErrorSize
+    h: ErrorSize
+
+    @classmethod
+    def of(cls, errors: Array) -> Score:
+        """Return the score of the errors of the three, ``(3, n)``, m, NaN where missing."""
+        return cls(int((~np.isnan(errors[0])).sum()), *map(ErrorSize.of, errors))
+
+    def figures(self, suffix: str = "") -> dict[str, float | int]:
+        """Return ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ``ratio_to_hold`` and the like, errors in µm."""
+        sizes = {"pb": self.pb, "hold": self.hold, "h": self.h}
+        found = {
+            **{f"rms_{name}_um": 1e6 * one.rms for name, one in sizes.items()},
+            **{f"max_{name}_um": 1e6 * one.largest for name, one in sizes.items()},
+            "reduction_percent": reduction_percent(self.h.rms, self.pb.rms),
+            "ratio_to_hold": rms_ratio(self.h.rms, self.hold.rms),
+            "n_samples": self.n_samples,
+        }
+        return {name + suffix: figure for name, figure in found.items()}
 
 
 def rms(error: ArrayLike) -> float:

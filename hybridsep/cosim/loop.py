@@ -73,17 +73,8 @@ def cosimulate(
         Warm-up of a controller of the library, s; its own if left out, 0 for a warm start.
     start_time : float
         Start of the experiment, s.
-    sensor : callable, optional
-        Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what is measured in its place.
-    disturb : callable, optional
-        Called as ``disturb(k, plant)`` before sample ``k``, counted likewise, with the plant or its ``FmuInstance``,
-        which it may change.
-    progress : callable, optional
-        Called with ``(k, n)`` about a hundred times.
-
-    Returns
-    -------
-    Run
+    sensor, disturb, progress : callable, optional
+        As :data:`Sensor`, :data:`Disturb` (of an FMU with its ``FmuInstance``) and :data:`Progress` say.
 
     Raises
     ------
@@ -153,16 +144,8 @@ def cosimulate(
     found = dict(zip((*kind.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True))
     found.setdefault("x_dm", found["x_d"])
     t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
-    return Run(
-        kind=kind,
-        t=t,
-        **found,
-        state=state[delay:],
-        T_s=T_s,
-        Np=ahead.Np,
-        n_rejected=n_rejected,
-        measurement_delay=ahead.late,
-    )
+    found |= {"t": t, "state": state[delay:]}
+    return Run(kind, **found, T_s=T_s, Np=ahead.Np, n_rejected=n_rejected, measurement_delay=ahead.late)
 
 
 def _refuse(given: object, message: str) -> None:

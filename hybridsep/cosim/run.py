@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.files import written_text, written_whole
 from ..base.metrics import (
-    ErrorSize,
+    Score,
     batch_rms,
     hold,
     html_table,
@@ -21,9 +21,7 @@ from ..base.metrics import (
     line_plot,
     one_line,
     peak_derivatives,
-    reduction_percent,
     rms,
-    rms_ratio,
     shares,
 )
 from ..base.signals import Array
@@ -185,12 +183,8 @@ class Run:
 
     def prediction_figures(self) -> dict[str, float | int]:
         """Return RMS and largest errors, µm, over the whole trajectory, of the measured position unless named true."""
-        pb, hold, h = (ErrorSize.of(self.x_meas - x) for x in (self.x_pb, self.x_hold, self.x_h))
         return {
-            **{f"rms_{name}_um": 1e6 * one.rms for name, one in (("pb", pb), ("hold", hold), ("h", h))},
-            **{f"max_{name}_um": 1e6 * one.largest for name, one in (("pb", pb), ("hold", hold), ("h", h))},
-            "reduction_percent": reduction_percent(h.rms, pb.rms),
-            "ratio_to_hold": rms_ratio(h.rms, hold.rms),
+            **Score.of(self.x_meas - np.stack((self.x_pb, self.x_hold, self.x_h))).figures(),
             "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
             "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
             "servo_error_rms_um": 1e6 * rms(self.error),

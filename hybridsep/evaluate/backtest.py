@@ -7,7 +7,6 @@ this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three pub
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,17 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
-from ..base.metrics import (
-    batch_rms,
-    hold,
-    html_table,
-    known_rms,
-    largest,
-    line_plot,
-    one_line,
-    reduction_percent,
-    rms_ratio,
-)
+from ..base.metrics import Score, batch_rms, hold, html_table, line_plot, one_line
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..cosim.run import PREDICTOR, Run
@@ -38,47 +27,7 @@ from .verdict import Tally, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Backtest", "Score", "backtest", "replayed_run"]
-
-
-@dataclass(frozen=True)
-class Score:
-    """Prediction errors against the measured position; NaN where there are no samples.
-
-    Attributes
-    ----------
-    n_samples : int
-        Samples they were taken over.
-    rms_pb, rms_hold, rms_h : float
-        RMS of physics model, hold baseline and hybrid, m.
-    max_pb, max_hold, max_h : float
-        Largest absolute error of each, m.
-    """
-
-    n_samples: int
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
-    max_pb: float
-    max_hold: float
-    max_h: float
-
-    @property
-    def ratio_to_hold(self) -> float:
-        """RMS of the hybrid relative to the hold baseline's."""
-        return rms_ratio(self.rms_h, self.rms_hold)
-
-    @property
-    def reduction_percent(self) -> float:
-        """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
-        return reduction_percent(self.rms_h, self.rms_pb)
-
-    @classmethod
-    def of(cls, errors: Array) -> Score:
-        """Return the score of the errors of physics model, hold baseline and hybrid, ``(3, n)``, NaN where missing."""
-        known = errors[:, ~np.isnan(errors[0])]
-        peaks = (largest(row) if row.size else math.nan for row in known)
-        return cls(known.shape[1], *map(known_rms, known), *peaks)
+__all__ = ["Backtest", "backtest", "replayed_run"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -122,20 +71,8 @@ class Backtest:
         return len(self.batch_rms_h)
 
     def summary(self) -> dict[str, float | int]:
-        """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ``ratio_to_hold``, ….
-
-        Errors are in micrometres against the measured position; the names with ``_after_warm_up`` leave the warm-up
-        out and are NaN if nothing is left.
-        """
-        result: dict[str, float | int] = {"n_batches": self.n_batches}
-        for score, suffix in ((self.overall, ""), (self.after_warm_up, "_after_warm_up")):
-            for quantity in ("rms", "max"):
-                for name in ("pb", "hold", "h"):
-                    result[f"{quantity}_{name}_um{suffix}"] = 1e6 * float(getattr(score, f"{quantity}_{name}"))
-            result[f"reduction_percent{suffix}"] = score.reduction_percent
-            result[f"ratio_to_hold{suffix}"] = score.ratio_to_hold
-            result[f"n_samples{suffix}"] = score.n_samples
-        return result
+        """Return the figures of both scores; those with ``_after_warm_up`` are NaN if nothing is left."""
+        return {"n_batches": self.n_batches, **self.overall.figures(), **self.after_warm_up.figures("_after_warm_up")}
 
     def __repr__(self) -> str:
         """Return the RMS errors in one line."""
@@ -179,10 +116,6 @@ def backtest(
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     progress : callable, optional
         Called with the fraction done after each window.
-
-    Returns
-    -------
-    Backtest
 
     Raises
     ------
@@ -243,19 +176,9 @@ def backtest(
 
 
 def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int, *, measurement_delay: int = 0) -> Run:
-    """Return the run of a replay, each measurement at the instant that it is of.
+    """Return the run of a replay of ``x_d``, ``x_meas``, ``(n,)``, m; the true position of a recorded axis is NaN.
 
-    Parameters
-    ----------
-    found : Backtest
-    x_d, x_meas : (n,) array, m
-        What was replayed; the true position of a recorded axis is NaN.
-    T_s : float
-        Sampling interval, s.
-    Np : int
-        Samples in a window.
-    measurement_delay : int
-        Samples by which measurements arrived late: measurements from before the log are left out.
+    Each measurement is at the instant that it is of; those from before the log are left out.
     """
     n = max(len(x_meas) - measurement_delay, 0)
     arrived = slice(measurement_delay, None)

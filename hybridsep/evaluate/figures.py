@@ -28,16 +28,7 @@ from ..logs.units import DisplayUnits, shown_in
 from ..online.look_ahead import SepState
 from .report import HOLD, HYBRID, PHYSICS
 
-__all__ = [
-    "CASES",
-    "contour_figure",
-    "prediction_figure",
-    "save_figure",
-    "tracking_figure",
-]
-
-_CREATOR = "hybridsep"
-"""Creator that a PDF or SVG names, by which it is known as ours."""
+__all__ = ["CASES", "contour_figure", "prediction_figure", "save_figure", "tracking_figure"]
 
 CASES = {
     "off": ("no compensation", HOLD),
@@ -89,27 +80,16 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
     if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(w_pad=_PAD, h_pad=_PAD)
     kind = Path(path).suffix.lower().removeprefix(".")
-    metadata = {"pdf": {"Creator": _CREATOR, "CreationDate": None}, "svg": {"Creator": _CREATOR, "Date": None}}.get(
-        kind
-    )
+    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     # pieces of a line, which may be of any length
-    with written_whole(path) as file, rc_context({"svg.hashsalt": _CREATOR, "agg.path.chunksize": 10_000}):
+    with written_whole(path) as file, rc_context({"svg.hashsalt": "hybridsep", "agg.path.chunksize": 10_000}):
         figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
 
 
 def prediction_figure(run: Run, title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:
     """Draw the command, the two models' prediction errors and the RMS of each window to a PNG, PDF or SVG.
 
-    Parameters
-    ----------
-    run : Run
-        Of a predictor, or the replay of a log.
-    title : str
-        Heading.
-    path : str or Path
-        The file.
-    shown : DisplayUnits, optional
-        Units in which positions are shown; mm and µm if left out.
+    Positions are in the units ``shown``, mm and µm if left out.
     """
     shown = shown or shown_in("m")
     (factor, position), (scale, unit) = shown.position, shown.error(rms((run.x_meas - run.x_pb)[~np.isnan(run.x_meas)]))
@@ -143,11 +123,7 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
     """Draw the RMS error of each window and mark the windows where the hybrid is worse than the physics model."""
     errors = {name: scale * values for name, values in run.batch_rms().items()}
     edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
-    for name, color, label in (
-        ("x_pb", PHYSICS, "physics"),
-        ("x_hold", HOLD, "hold"),
-        ("x_h", HYBRID, "hybrid"),
-    ):
+    for name, color, label in (("x_pb", PHYSICS, "physics"), ("x_hold", HOLD, "hold"), ("x_h", HYBRID, "hybrid")):
         axes.stairs(errors[name], edges, baseline=None, color=color, linewidth=1.2, label=label)
     worse = errors["x_h"] > errors["x_pb"]
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
@@ -161,17 +137,9 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
 
 
 def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> None:
-    """Draw command, tracking error and change of the command of one or several runs to a PNG.
+    """Draw command, tracking error and change of the command of runs over the same command to a PNG.
 
-    Parameters
-    ----------
-    runs : mapping
-        Keys of :data:`~hybridsep.evaluate.figures.CASES` → runs over the same command. Of one run alone,
-        the spans are shaded that a lesser model planned.
-    title : str
-        Heading.
-    path : str or Path
-        The PNG.
+    They are by the keys of :data:`CASES`. Of one run alone, the spans are shaded that a lesser model planned.
     """
     compensated = {key: run for key, run in runs.items() if key != "off"}
     enlarged = 0 < len(compensated) < len(runs)
@@ -207,8 +175,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
 def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, Run]) -> None:
     """Draw one signal of each run in µm, labelled with the run's tracking error."""
     for key, signal in signals.items():
-        label, color = CASES[key]
-        run = runs[key]
+        (label, color), run = CASES[key], runs[key]
         label = f"{label}: {1e6 * rms(run.error):.1f} µm"
         axes.plot(run.t - run.t[0], 1e6 * signal, linewidth=0.9, color=color, label=label)
 
@@ -231,16 +198,8 @@ def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
 def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path) -> None:
     """Draw runs along a planar path to a PNG: the path with the error magnified, and the error over time.
 
-    Where the path has full circles it is their radial error over the angle, as a ballbar draws it.
-
-    Parameters
-    ----------
-    contours : mapping
-        Keys of :data:`~hybridsep.evaluate.figures.CASES` → motion along the same path; four at most.
-    title : str
-        Heading.
-    path : str or Path
-        The PNG.
+    Where the path has full circles it is their radial error over the angle, as a ballbar draws it. The motions along
+    one path, four at most, are by the keys of :data:`CASES`.
     """
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     figure.suptitle(title)

@@ -15,17 +15,7 @@ __all__ = ["fit_files", "sha256_of", "write_commands"]
 
 
 def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
-    """Return the files of a fit, by what they are.
-
-    Parameters
-    ----------
-    out : Path
-        Their folder.
-    name : str
-        The machine's.
-    compensator : bool
-        Whether there is a compensator's FMU beside each predictor's.
-    """
+    """Return the files of a fit of a machine, in their folder, by what they are."""
     models = {"": "HybridPredictor", **({"compensator ": "SepCompensator"} if compensator else {})}
     return {
         "machine file": out / "machine.toml",

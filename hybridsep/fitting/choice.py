@@ -91,15 +91,7 @@ def choose_settings(
 ) -> tuple[PredictorSettings, tuple[Tried, ...]]:
     """Return the settings with the least error of causal replays over the training samples, and all that were tried.
 
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    recordings : sequence of Recording
-    settings : PredictorSettings
-        The default, which is tried first, and stays unless others are better by 5 %.
-    progress : callable, optional
-        Called with the fraction done.
+    The given ones, the default, are tried first, and stay unless others are better by 5 %.
     """
     candidates, errors = settings_to_try(settings), []
     for i, candidate in enumerate(candidates):
@@ -133,12 +125,7 @@ def window_scores(
 ) -> tuple[WindowErrors, ...]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
 
-    Parameters
-    ----------
-    model, recordings, settings, progress
-        As for :func:`choose_settings`.
-    offset : float
-        As of :class:`~hybridsep.fitting.replay.Replay`, m.
+    The ``offset``, m, is as of :class:`~hybridsep.fitting.replay.Replay`.
     """
     most = max(min(len(recording.x) for recording in recordings), settings.Np)
     sizes = dict.fromkeys(max(1, round(share * settings.Np)) for share in _WINDOWS)
@@ -156,15 +143,6 @@ def period_finding(
     """Return that the residual repeats with the position, and what the predictor would gain by it, in words.
 
     Empty where a period is given, nothing repeats in the training samples, or the predictor gains little by it.
-
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    recordings : sequence of Recording
-    settings : PredictorSettings
-    shown : DisplayUnits
-        Units of the words.
     """
     late = settings.n_late
     training = [in_time(*one.training, late) for one in recordings if one.n_train > late + 1]

@@ -233,15 +233,8 @@ def expected_tracking(
         )
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
-    return Tracking(
-        none=ErrorSize.of(without),
-        physics=_size(judged["physics"]),
-        hybrid=_size(judged["hybrid"]),
-        limits=bound,
-        costs=costs,
-        change_max=allowed.change_max,
-        following_error_max=allowed.following_error_max,
-    )
+    none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
+    return Tracking(none, physics, hybrid, bound, costs, allowed.change_max, allowed.following_error_max)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

@@ -135,12 +135,9 @@ class Fit:
         return SepCompensator(self.predictor(), replace(self.machine.compensator_settings, compensate=compensate))
 
     def predict(self, x_d: ArrayLike) -> Prediction:
-        """Return what is predicted of a motion from rest at its first command, with what was learned.
+        """Return what is predicted, with what was learned, of a window ``(n,)``, m, from rest at its first command.
 
-        Parameters
-        ----------
-        x_d : (n,) array_like, m
-            Commanded positions of one look-ahead window, ``n`` at most ``Np``.
+        It has at most ``Np`` commanded positions.
         """
         return self.predictor().predict(x_d)
 
@@ -185,14 +182,7 @@ class Fit:
     ) -> dict[str, Path]:
         """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
 
-        Parameters
-        ----------
-        out : str or Path
-            Made if needed.
-        fmus, report : bool
-            Whether FMUs are built; whether a report is written.
-        progress : callable, optional
-            Called with a message and the fraction done.
+        ``fmus`` and ``report`` say whether they are among them; ``progress`` is told a message and the fraction done.
         """
         files = fit_files(Path(out), self.machine.name, compensator=self.tracking is not None)
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}

@@ -143,19 +143,7 @@ class _Piece:
 def identified_plant(
     model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording], fitted: Sequence[Recording]
 ) -> IdentifiedPlant:
-    """Return the plant of a fit.
-
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb`` as identified.
-    settings : PredictorSettings
-        For sampling interval, hold and delay of the measurement.
-    recordings : sequence of Recording
-        Which choose, and judge.
-    fitted : sequence of Recording
-        What it is fitted to: they, or their beginnings.
-    """
+    """Return the plant of a fit of the identified model: recordings choose and judge it, their beginnings fit it."""
     try:
         StageDrive(model, T_s=settings.T_s, input_hold=settings.input_hold)
     except ParameterError as error:
@@ -223,11 +211,10 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
             return np.concatenate([(error - error.mean()) / scale for error in errors])
 
         modes = len(alone.model.modes)
-        start = np.concatenate((np.zeros(n), [0.5, 0.5 * with_stiffness, math.log(0.02)]))
+        start = np.concatenate((np.zeros(n), [0.5, 0.5 if with_stiffness else 1e-9, math.log(0.02)]))
         bound = np.concatenate((np.tile(_MODE_REACH, modes), [1e3, 1e3, 0.0]))
         least = np.concatenate((-np.tile(_MODE_REACH, modes), [0.0, 0.0, math.log(_SMALLEST_SPREAD)]))
         steps = np.concatenate((np.tile(_MODE_STEPS, modes), np.ones(3)))
-        start[n + 1] = max(start[n + 1], 1e-9)
         try:
             done = least_squares(residual, start, bounds=(least, bound), x_scale=steps, max_nfev=_EVALUATIONS)
             one = plant(done.x)

@@ -20,16 +20,7 @@ from ..identify.output_error import delayed
 from ..logs.checks import resolution
 from ..predict.predictor import HybridPredictor
 
-__all__ = [
-    "Judgement",
-    "Recording",
-    "Replay",
-    "Scored",
-    "beginnings",
-    "knew",
-    "replay",
-    "split_log",
-]
+__all__ = ["Judgement", "Recording", "Replay", "Scored", "beginnings", "knew", "replay", "split_log"]
 
 
 @dataclass(frozen=True)
@@ -67,15 +58,9 @@ class Recording:
 
 
 def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int = 0) -> list[Recording]:
-    """Split one log, the pieces ``(x_d, x)`` between its gaps, where a share of its samples is over.
+    """Split one log, the pieces ``(x_d, x)`` between its gaps, where the share of its samples for training is over.
 
-    Parameters
-    ----------
-    pieces : iterable of two (n,) arrays, m
-    share : float
-        Share of the samples that are for training.
-    n_settling : int
-        Samples after each gap that are no test samples, unless fewer than half of the test samples were left.
+    ``n_settling`` samples after each gap are no test samples, unless fewer than half of the test samples were left.
 
     Raises
     ------
@@ -334,15 +319,9 @@ def replay(
     recordings: Sequence[Recording],
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Replay:
-    """Replay recordings with one predictor, which goes on from its state and learns them.
+    """Replay recordings with one predictor, which is at the beginning of a run, and learns them.
 
-    Parameters
-    ----------
-    predictor : HybridPredictor
-        It is at the beginning of a run; another begins with each further recording.
-    recordings : sequence of Recording
-    progress : callable, optional
-        Called with the fraction done.
+    Another run begins with each further recording.
 
     Raises
     ------

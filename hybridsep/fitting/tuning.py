@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from multiprocessing import get_context
@@ -24,16 +25,7 @@ from ..predict.predictor import HybridPredictor
 from .choice import WORTH, settings_to_try
 from .replay import Recording, replay
 
-__all__ = [
-    "TUNED",
-    "Tuning",
-    "candidates",
-    "default_values",
-    "joint_ratio",
-    "losses",
-    "tune",
-    "unsettled",
-]
+__all__ = ["TUNED", "Tuning", "candidates", "default_values", "joint_ratio", "losses", "tune", "unsettled"]
 
 Logs = Mapping[str, Sequence[Recording]]
 """Logs by name, each in pieces without a gap, as of :func:`unsettled`."""
@@ -129,8 +121,7 @@ class Tuning:
             "Np": chosen.Np,
             "averaging": chosen.averaging,
             "logs": {
-                name: {"rms_pb": pb, "rms_hold": hold}
-                for name, pb, hold in zip(self.logs, self.rms_pb.tolist(), self.rms_hold.tolist(), strict=True)
+                name: {"rms_pb": self.rms_pb[i], "rms_hold": self.rms_hold[i]} for i, name in enumerate(self.logs)
             },
             "chosen": self.entries(self.chosen),
             "ratio_to_hold": float(self.ratio[self.chosen]),
@@ -164,20 +155,9 @@ def tune(
     jobs: int = 1,
     progress: Progress = lambda _done: None,
 ) -> Tuning:
-    """Return the losses of candidates, which have one look-ahead, on each of the logs.
+    """Return the losses of candidates, which have one look-ahead, the machine's own first, on each of the logs.
 
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    logs : mapping
-        On each log every candidate begins untrained.
-    candidates : sequence of PredictorSettings
-        The machine's own first; each takes a replay a log.
-    jobs : int
-        Processes; the result is the same for any number.
-    progress : callable, optional
-        Called with the fraction done.
+    On each log every candidate begins untrained; the result is the same for any number of processes, ``jobs``.
     """
     tasks = [(recordings, one) for recordings in logs.values() for one in candidates]
     by_log = np.reshape(_losses(model, tasks, jobs, progress), (len(logs), -1, 3))
@@ -189,21 +169,17 @@ def tune(
 
 def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Array]:
     """Return the losses of each task, in their order."""
-    n, n_jobs = len(tasks), min(jobs, len(tasks))
-    if n_jobs == 1:
-        return [
-            losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
-            for i, task in enumerate(tasks)
-        ]
-    ignore = (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is this process's
-    pool = ProcessPoolExecutor(n_jobs, get_context("spawn"), initializer=signal.signal, initargs=ignore)
-    found = []
-    try:
-        for one in pool.map(partial(losses, model), tasks):
+    n_jobs, found = min(jobs, len(tasks)), []
+    with ExitStack() as stack:
+        each: Iterable[Array] = map(partial(losses, model), tasks)
+        if n_jobs > 1:
+            ignore = (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is this process's
+            pool = ProcessPoolExecutor(n_jobs, get_context("spawn"), initializer=signal.signal, initargs=ignore)
+            stack.callback(pool.shutdown, cancel_futures=True)
+            each = pool.map(partial(losses, model), tasks)
+        for one in each:
             found.append(one)
-            progress(len(found) / n)
-    finally:
-        pool.shutdown(cancel_futures=True)
+            progress(len(found) / len(tasks))
     return found
 
 
@@ -215,14 +191,14 @@ def unsettled(x_d: Array, x: Array, Np: int) -> Recording:
     return Recording(x_d, x, 0, Np if len(x_d) > Np and starts_in_motion(x_d) else 0)
 
 
-def losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Array:
+def losses(model: ModalModel, task: _Task) -> Array:
     """Return the losses of a candidate by a replay of its own: RMS of physics model, hold and hybrid, ``(3,)``, m.
 
     Where it diverges the last is infinite, and the others are NaN.
     """
     recordings, candidate = task
     try:
-        return np.array(replay(HybridPredictor(model, candidate), recordings, progress=progress).rms())
+        return np.array(replay(HybridPredictor(model, candidate), recordings).rms())
     except SignalError:  # samples that were read are sound: it diverges
         return np.array([math.nan, math.nan, math.inf])
 

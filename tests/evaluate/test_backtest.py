@@ -61,13 +61,13 @@ def test_scores_are_those_of_the_predictions() -> None:
         error = x - getattr(result, f"x_{name}")
         windows = [rms(error[i : i + 20]) for i in range(0, 1010, 20)]
         for score, part in ((result.overall, error), (result.after_warm_up, error[50:])):
-            assert getattr(score, f"rms_{name}") == pytest.approx(rms(part), rel=1e-12)
-            assert getattr(score, f"max_{name}") == np.abs(part).max()
+            assert getattr(score, name).rms == pytest.approx(rms(part), rel=1e-12)
+            assert getattr(score, name).largest == np.abs(part).max()
         np.testing.assert_allclose(getattr(result, f"batch_rms_{name}"), windows, rtol=1e-12)
         assert result.summary()[f"rms_{name}_um"] == pytest.approx(1e6 * rms(error), rel=1e-12)
         assert result.summary()[f"max_{name}_um_after_warm_up"] == 1e6 * np.abs(error[50:]).max()
-    expected = 100 * (1 - result.overall.rms_h / result.overall.rms_pb)
-    assert result.overall.reduction_percent == pytest.approx(expected)
+    expected = 100 * (1 - result.overall.h.rms / result.overall.pb.rms)
+    assert result.summary()["reduction_percent"] == pytest.approx(expected)
 
 
 def test_predictions_are_the_predictor_s_own_and_hold_the_last_residual_measured() -> None:
@@ -100,28 +100,28 @@ def test_hold_is_the_last_sample_measured_whatever_is_believed(delay: int) -> No
     expected = held(result.x_pb[delay:], x[delay:], 20, delay=delay)
     np.testing.assert_allclose(result.x_hold[delay:], expected, rtol=0, atol=1e-15)
     error = (x - result.x_hold)[delay:]
-    assert result.overall.rms_hold == pytest.approx(rms(error[~np.isnan(error)]), abs=1e-15)
+    assert result.overall.hold.rms == pytest.approx(rms(error[~np.isnan(error)]), abs=1e-15)
     run = replayed_run(result, x_d, x, 1e-3, 20, measurement_delay=delay)
     np.testing.assert_allclose(run.x_hold, expected, rtol=0, atol=1e-15)
-    assert run.prediction_figures()["rms_hold_um"] == pytest.approx(1e6 * result.overall.rms_hold, rel=1e-12)
+    assert run.prediction_figures()["rms_hold_um"] == pytest.approx(1e6 * result.overall.hold.rms, rel=1e-12)
 
 
 def test_log_shorter_than_the_warm_up() -> None:
     result = backtest(predictor(), *log(30))
     assert result.after_warm_up.n_samples == 0
-    assert math.isnan(result.after_warm_up.rms_pb)
+    assert math.isnan(result.after_warm_up.pb.rms)
     assert math.isnan(result.summary()["reduction_percent_after_warm_up"])
-    assert result.overall.reduction_percent == 0.0
+    assert result.summary()["reduction_percent"] == 0.0
 
 
 def test_perfect_physics_leaves_nothing_to_reduce() -> None:
     x_d = np.zeros(100)
-    assert backtest(predictor(), x_d, x_d).overall.reduction_percent == 0.0
+    assert backtest(predictor(), x_d, x_d).summary()["reduction_percent"] == 0.0
     warm = predictor()
     backtest(warm, *log())
     warm.restart()
-    score = backtest(warm, x_d, x_d).overall
-    assert (score.rms_pb, score.reduction_percent) == (0.0, -math.inf)
+    figures = backtest(warm, x_d, x_d).summary()
+    assert (figures["rms_pb_um"], figures["reduction_percent"]) == (0.0, -math.inf)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_missing_measurements_are_bridged_with_averaging_and_refused_without() -
     settings = PredictorSettings(Np=20, p=5, q=2, t_init=-1.0)
     result = backtest(HybridPredictor(predictor().model, settings), x_d, holes)
     assert result.overall.n_samples == 1010 - 30
-    assert result.overall.rms_h == pytest.approx(rms((holes - result.x_h)[~np.isnan(holes)]), rel=1e-12)
+    assert result.overall.h.rms == pytest.approx(rms((holes - result.x_h)[~np.isnan(holes)]), rel=1e-12)
     assert np.isfinite(result.x_h).all()
     assert np.isfinite(result.x_h_std).all()
     assert math.isnan(result.batch_rms_h[25])

@@ -87,8 +87,8 @@ def test_a_replay_compares_with_what_was_measured(settings: dict[str, Any]) -> N
     np.testing.assert_array_equal(found.active[DELAY:], sound.active[:-DELAY])
     assert found.overall.n_samples == N - DELAY  # the first ones were measured before the run
     error = (x_meas - found.x_h)[DELAY:]
-    assert found.overall.rms_h == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
-    assert found.overall.rms_h < 1.5 * sound.overall.rms_h
+    assert found.overall.h.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
+    assert found.overall.h.rms < 1.5 * sound.overall.h.rms
 
 
 def test_a_delay_of_chunks_is_that_of_the_whole() -> None:
