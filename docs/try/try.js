@@ -16,7 +16,8 @@ const ARX_LAGS = [20, 40];
 const FAR = 10; // largest distances from the start, beyond which a prediction diverges
 const COLOURS = { "physics model": "#999", hold: "#e69f00", ARX20: "#cc79a7", ARX40: "#d55e00", hybrid: "#0b84d8" };
 const at = (id) => document.getElementById(id);
-const digits = (one) => one.toFixed(Math.min(100, Math.max(0, 2 - Math.floor(Math.log10(one))))); // three, or whole numbers
+/** Three digits, or a whole number. */
+const digits = (one) => one.toFixed(Math.min(100, Math.max(0, 2 - Math.floor(Math.log10(one)))));
 const pause = () => new Promise((done) => setTimeout(done));
 
 /** What is wrong with a log, for the user. */
@@ -60,14 +61,14 @@ function fitted(f_n, zeta, dead_time, T_s, x_d, x, n) {
   if (!(f_n * T_s > 1e-5 && f_n * T_s < 0.45 && zeta > 0.02 && zeta < 20)) return { misfit: Infinity };
   const omega = 2 * Math.PI * f_n, s = zeta * omega, d = omega * Math.sqrt(Math.abs(zeta * zeta - 1)) || 1e-9;
   const [C, S] = zeta > 1 ? [Math.cosh(d * T_s), Math.sinh(d * T_s) / d] : [Math.cos(d * T_s), Math.sin(d * T_s) / d];
-  const g = Math.exp(-s * T_s), a = g * (C + S * s), b = g * S, c = -b * omega * omega, e = g * (C - S * s); // exp(A T_s)
+  const g = Math.exp(-s * T_s), a = g * (C + S * s), b = g * S, c = -b * omega * omega, e = g * (C - S * s);
   let sum = 0, sum_v = 0, ee = 0, ev = 0, vv = 0;
   for (let k = 0, y = 0, v = 0; k < n; k++) {
     const error = x[k] - x_d[0] - y, u = x_d[Math.max(k - dead_time, 0)] - x_d[0];
     sum += error; sum_v += v; ee += error * error; ev += error * v; vv += v * v;
-    [y, v] = [u + a * (y - u) + b * v, c * (y - u) + e * v];
+    [y, v] = [u + a * (y - u) + b * v, c * (y - u) + e * v]; // exp(A T_s) = [a b; c e]
   }
-  const covariance = ev - sum * sum_v / n, variance = vv - sum_v * sum_v / n, zero = covariance / variance || 0; // β / ω²
+  const covariance = ev - sum * sum_v / n, zero = covariance / (vv - sum_v * sum_v / n) || 0; // β / ω²
   return { f_n, zeta, beta: zero * omega * omega, dead_time, misfit: ee - sum * sum / n - zero * covariance };
 }
 
@@ -140,8 +141,8 @@ function solution(R, n) {
 
 /** y(k) = Σ a_i y(k−i) + Σ b_j [x_d(k−j) − x_d(k−j−1)] + c, y = x − x_d: predictions from row first on, NaN before. */
 async function arx(lags, Np, first, x_d, x, progress) {
-  const n = x.length, m = 2 * lags + 2, y = x.map((one, k) => one - x_d[k]), predicted = new Float64Array(n).fill(NaN);
-  const R = Array.from({ length: m + 1 }, () => new Float64Array(m + 1));
+  const n = x.length, m = 2 * lags + 2, y = x.map((one, k) => one - x_d[k]), run = y.slice();
+  const predicted = new Float64Array(n).fill(NaN), R = Array.from({ length: m + 1 }, () => new Float64Array(m + 1));
   const far = FAR * x.reduce((most, one, k) => Math.max(most, Math.abs(one - x_d[0]), Math.abs(x_d[k] - x_d[0])), 0);
   const row = (past, k) => {
     const found = new Float64Array(m + 1);
@@ -153,13 +154,14 @@ async function arx(lags, Np, first, x_d, x, progress) {
   for (let begin = 0; begin < n; begin += Np) {
     const end = Math.min(begin + Np, n);
     if (begin >= first) { // a free run over the window
-      const w = solution(R, begin), run = y.slice(0, end);
+      const w = solution(R, begin);
       for (let k = begin; k < end; k++) {
         const known = row(run, k);
         run[k] = w.reduce((sum, one, i) => sum + one * known[i], 0);
         if (!(Math.abs(run[k]) <= far)) return predicted.fill(NaN);
         predicted[k] = x_d[k] + run[k];
       }
+      run.set(y.subarray(begin, end), begin);
     }
     for (let k = Math.max(begin, lags + 1); k < end; k++) {
       const known = row(y, k);
@@ -251,8 +253,8 @@ function show(seconds) {
     `<i style="background:${COLOURS[names[i]]}"></i>${names[i]}</td>${cell(one.rms)}${cell(one.max)}</tr>`).join("");
   const [f_n, zeta, span] = [mode.f_n, mode.zeta, 1e3 * Np * T_s].map(digits);
   at("model").textContent = `a mode of ${f_n} Hz, damping ${zeta}, with a zero, ${mode.dead_time} samples of dead time`;
-  const scored = Math.ceil((x.length - first) / Np);
-  tell("", `${x.length} rows; scored by ${scored} windows of ${Np} samples, ${span} ms; computed in ${seconds.toFixed(1)} s`);
+  const scored = Math.ceil((x.length - first) / Np), windows = `${scored} windows of ${Np} samples, ${span} ms`;
+  tell("", `${x.length} rows, scored by ${windows}; computed in ${seconds.toFixed(1)} s`);
   plot(shown, at("what").value);
 }
 

@@ -1,7 +1,6 @@
 /* Memory of a compensator: its layout and beginning. */
 #include "hsep_compensator.h"
 
-
 #include <stddef.h>
 #include <string.h>
 

@@ -1,7 +1,6 @@
 /* Memory of a predictor: its layout and beginning. */
 #include "hsep_predictor.h"
 
-
 #include <stddef.h>
 #include <string.h>
 
