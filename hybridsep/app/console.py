@@ -252,15 +252,7 @@ def check_outputs(
 ) -> None:
     """Check that files can be written where they will be.
 
-    Parameters
-    ----------
-    outputs : iterable of Output
-    inputs : mapping
-        Role of a file that is read → its path; None if it is not given.
-    force : bool
-        Whether existing files may be overwritten; an input never is.
-    ours : collection of Path
-        Existing files that may be overwritten without ``force``.
+    Existing files are overwritten with ``force``, and ``ours`` without it; ``inputs``, role → path, never.
 
     Raises
     ------

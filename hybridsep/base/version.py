@@ -24,13 +24,7 @@ def version_text() -> str:
 
 
 def commit(root: Path = _ROOT) -> str:
-    """Return the commit of a wheel, an sdist or a checkout, with ``-dirty`` where files differ from it; "" without one.
-
-    Parameters
-    ----------
-    root : Path
-        Folder that the package lies in.
-    """
+    """Return the commit of a wheel, an sdist or a checkout, with ``-dirty`` where files differ; "" without one."""
     file = root / COMMIT_FILE
     if file.is_file():
         return file.read_text(encoding="utf-8").strip()

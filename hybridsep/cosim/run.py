@@ -231,13 +231,7 @@ class Run:
 
 
 def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
-    """Write arrays of one length to ``path``: ``.csv`` with one row a sample, or ``.npz``.
-
-    Parameters
-    ----------
-    columns : mapping
-        Name → ``(n,)`` array; truth values become 0 and 1 in a CSV.
-    path : str or Path
+    """Write arrays ``(n,)`` by name: ``.csv`` with one row a sample, truth values as 0 and 1, or ``.npz``.
 
     Raises
     ------

@@ -62,13 +62,7 @@ class FirstOrderLag:
 
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
-    """Return the lag that fits recordings best.
-
-    Parameters
-    ----------
-    recordings : sequence of two (n,) arrays, m
-        Commanded and measured positions, sampled alike; measured ones are NaN where missing.
-    """
+    """Return the lag that fits commanded and measured positions ``(n,)``, m, NaN where missing, best."""
     known = [~np.isnan(x) for _, x in recordings]
 
     def misfit(log_tau: float, late: int) -> float:
@@ -258,21 +252,11 @@ def predict_peers(
     delay: int = 0,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> tuple[Peer, ...]:
-    """Return the peers' predictions of all windows from each piece's ``first`` on.
+    """Return the peers' predictions of all windows from each piece's ``first`` on; the pieces are in the order of time.
 
     The lag and a frozen ARX are fitted to the leading training samples; without any there are none of them, and no lag
-    without motion there. A refitted ARX is fitted before each window to all samples so far.
-
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        In the order of time.
-    Np : int
-        Samples in a window.
-    delay : int
-        Samples by which the measurements are late; a prediction stands where its measurement does.
-    progress : callable, optional
-        Called with the fraction done.
+    without motion there. A refitted ARX is fitted before each window to all samples so far. Measurements are late by
+    ``delay`` samples; a prediction stands where its measurement does.
     """
     training = [(one.x_d[: one.n_train], one.x[: one.n_train]) for one in pieces if one.n_train > delay]
     trains = any((~np.isnan(x[delay:])).any() for _, x in training)

@@ -166,14 +166,9 @@ class Tally:
         self._n_whole += int(len(x) == self.Np and known.any())
 
     def verdict(self, *, n_rejected: int = 0, n_missing: int | None = None) -> Verdict:
-        """Return the verdict on the windows so far.
+        """Return the verdict on the windows so far, with the numbers of measurements not learned, and of missing ones.
 
-        Parameters
-        ----------
-        n_rejected : int
-            Measurements that were not learned, missing ones included.
-        n_missing : int, optional
-            Those that were missing; as many as the windows lack, if left out.
+        The latter are among the former; as many as the windows lack, if left out.
         """
         *peers, h = self._squares
         least = self._least**2 * self._counts.sum()

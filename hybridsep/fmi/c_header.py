@@ -99,30 +99,13 @@ def layout_of(table: Sequence[Variable]) -> _Layout:
 
 
 def kind_header(kind: str) -> str:
-    """Return the header with which a library serves all FMUs of a kind.
-
-    Parameters
-    ----------
-    kind : str
-        Of :data:`KINDS`.
-    """
+    """Return the header with which a library serves all FMUs of a kind, of :data:`KINDS`."""
     table = "/* The table of each FMU, its GUID and start values, is in its resources (hsep_table_file.h). */\n"
     return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
 
 
 def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: bytes | None = None) -> str:
-    """Return the header of one FMU, with its table.
-
-    Parameters
-    ----------
-    table : FmuTable
-    guid : str
-        The modelDescription's.
-    fmi : {"2", "3"}
-        Version of FMI.
-    weights : bytes, optional
-        Content of the weights file, with which the FMU starts instead of with the resources' file.
-    """
+    """Return the header of one FMU, with its table and, instead of the resources' file, the content of its weights."""
     layout = layout_of(table.variables)
     starts = ",\n".join(
         f"    {start!r} /* {variable.name} */"
@@ -259,10 +242,7 @@ FMI_HEADERS = {
 def c_sources(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
     """Return our C files by name, with ``all.c`` first; ``hsep_fmu.h`` and the FMI headers are not among them.
 
-    Parameters
-    ----------
-    versions : collection of str
-        Versions of FMI whose functions they have: a library has both, a source FMU its own.
+    They have the functions of these versions of FMI: a library has both, a source FMU its own.
     """
     root = data_folder("fmu_src") / "c"
     others = [f"fmi{version}" for version in FMI_VERSIONS if version not in versions]
@@ -297,14 +277,7 @@ _MAGIC = b"HSEPVAR2"
 
 
 def table_file(table: FmuTable, guid: str) -> bytes:
-    """Return the content of the file.
-
-    Parameters
-    ----------
-    table : FmuTable
-    guid : str
-        The modelDescription's.
-    """
+    """Return the content of :data:`TABLE_FILE`."""
     layout = layout_of(table.variables)
     starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
     size = _HEAD.size + len(starts) + _CHECKSUM.size

@@ -158,16 +158,9 @@ def expanded(targets: Sequence[str]) -> tuple[str, ...]:
 
 
 def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
-    """Return where libraries lie in an archive: path below ``binaries/`` → library.
+    """Return where libraries, by the keys of :data:`TARGETS`, lie in an archive: path below ``binaries/`` → library.
 
-    Parameters
-    ----------
-    libraries : mapping
-        Key of :data:`TARGETS` → library.
-    name : str
-        Model identifier: the libraries' stem.
-    fmi : {"2", "3"}
-        Version of FMI; 3.0 has one folder for each platform, which is called as the platform is.
+    The model identifier is their stem; FMI 3.0 has one folder for each platform, which is called as the platform is.
     """
     if fmi == "3":
         return {f"{key}/{name}{TARGETS[key].suffix}": library for key, library in libraries.items()}
@@ -247,14 +240,7 @@ _KEPT_VERSIONS = 4
 
 
 def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
-    """Return the libraries of a kind: platform → library.
-
-    Parameters
-    ----------
-    kind : str
-        Of :data:`hybridsep.fmi.c_header.KINDS`.
-    targets : sequence of str
-        Of :data:`hybridsep.fmi.compile.TARGET_NAMES`.
+    """Return the libraries of a kind for targets of :data:`TARGET_NAMES`: platform → library.
 
     Raises
     ------
@@ -270,11 +256,7 @@ def library_paths(
 ) -> dict[Library, Path]:
     """Return the files of libraries; missing ones are compiled, as many at a time as there are processors.
 
-    Parameters
-    ----------
-    wanted : iterable of pairs
-    on_library : callable, optional
-        Called with each library that had to be compiled, when it is there and kept, and with the fraction done.
+    ``on_library`` is told each that had to be compiled, when it is there and kept, and the fraction done.
 
     Raises
     ------

@@ -63,12 +63,7 @@ def check_names(model: str, names: Sequence[str]) -> None:
 
 
 def component_files(model: str) -> dict[str, bytes]:
-    """Return the sources of the component: name → content, ``<component>.c`` to be given to ``halcompile``.
-
-    Parameters
-    ----------
-    model : {"SepCompensator", "HybridPredictor"}
-    """
+    """Return the sources of a model's component: name → content, ``<component>.c`` to be given to ``halcompile``."""
     name = COMPONENTS[model]
     text = (data_folder("integrations") / "linuxcnc" / "hsep.c").read_text(encoding="utf-8")
     sources = {**c_sources(versions=()), "hsep_fmu.h": kind_header(model).encode()}
@@ -79,14 +74,7 @@ def component_files(model: str) -> dict[str, bytes]:
 
 
 def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = None) -> dict[str, bytes]:
-    """Return the files of an axis' folder: name → content.
-
-    Parameters
-    ----------
-    machine : Machine
-    model : {"SepCompensator", "HybridPredictor"}
-    trained : HybridPredictor, optional
-        What an earlier run has learned.
+    """Return the files of an axis' folder, with what an earlier run has learned: name → content.
 
     Raises
     ------
@@ -108,14 +96,7 @@ _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "com
 
 
 def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = None) -> str:
-    """Return the header's text.
-
-    Parameters
-    ----------
-    machine : Machine
-    model : {"SepCompensator", "HybridPredictor"}
-    trained : HybridPredictor, optional
-        What an earlier run has learned.
+    """Return the header's text, with what an earlier run has learned.
 
     Raises
     ------

@@ -64,13 +64,8 @@ def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int |
 def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
     """Return the XML document, the same bytes for the same arguments.
 
-    Parameters
-    ----------
-    spec : FmuSpec
-        The machine's sampling interval and trajectory make the default experiment.
-    guid : str
-        Follows from the content; see :mod:`hybridsep.fmi.spec`. FMI 3.0 has it as the instantiation token.
-    generation_tool : str
+    The machine's sampling interval and trajectory make the default experiment. The GUID follows from the content, see
+    :mod:`hybridsep.fmi.spec`; FMI 3.0 has it as the instantiation token.
     """
     fmi3, model, name = spec.fmi == "3", spec.table.model, spec.table.name
     described = described_variables(spec.table, spec.fmi)
@@ -135,12 +130,7 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
 def build_description(name: str, fmi: str) -> bytes:
     """Return ``buildDescription.xml`` (FMI 3.0's, which FMI 2.0 tools read too): how the sources are compiled.
 
-    Parameters
-    ----------
-    name : str
-        Model identifier.
-    fmi : {"2", "3"}
-        Version of FMI, whose headers put the identifier before the functions' names unless a definition says not to.
+    FMI's headers put the model identifier before the functions' names unless a definition says not to.
     """
     root = _template("buildDescription.xml")
     root[0].set("modelIdentifier", name)

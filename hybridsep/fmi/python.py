@@ -126,11 +126,6 @@ def _imported_modules(script: Path) -> dict[str, bytes]:
 
     Followed are the imports at the top level of a module; one inside a function is not needed to load it. The
     ``__init__.py`` of the folders are among them, empty: the top level's public names would import the whole library.
-
-    Parameters
-    ----------
-    script : Path
-        It names this package ``hybridsep``.
     """
     found: dict[str, bytes] = {}
     waiting = list(_imports(script.read_bytes(), ()))

@@ -120,16 +120,10 @@ class _HostFmu:
 
 
 def reference_run(spec: FmuSpec, content: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return inputs, result and times as the native FMU runs them here: archive name → content.
+    """Return inputs, result and times as the native FMU of that content runs them here: archive name → content.
 
     Empty where the look-ahead is too long, or this machine cannot load its library. A Python FMU's is its native
     twin's, which agrees with it. Platforms differ in the last digits, so it stays out of the GUID, as the binaries do.
-
-    Parameters
-    ----------
-    spec : FmuSpec
-    content : mapping
-        Archive name → content; the FMU reads ``resources/*.bin``.
     """
     machine, table, folder = spec.machine, spec.table, "resources/"
     if int(table.parameters.get("preview", table.parameters.get("Np", 0))) > _WINDOW_MAX:

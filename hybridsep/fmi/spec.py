@@ -135,23 +135,10 @@ def table_of(
     windows: bool = True,
     rest: float = 0.0,
 ) -> FmuTable:
-    """Return the table of a machine's FMU.
+    """Return the table of a machine's FMU, at rest at the position ``rest``, m.
 
-    Parameters
-    ----------
-    machine : Machine
-    model : str
-        ``HybridPredictor``, ``FeedDrive``, …
-    name : str
-        Model identifier.
-    samples : bool
-        Whether a ReferenceTrajectory plays samples of its own.
-    warm : bool
-        Whether a look-ahead starts with trained weights, and so without a warm-up.
-    windows : bool
-        Whether a HybridPredictor shows the samples of its window.
-    rest : float, m
-        Position where the axis is at rest.
+    A ReferenceTrajectory may play ``samples`` of its own, a look-ahead start ``warm``, with trained weights and so
+    without a warm-up, and a HybridPredictor show the samples of its window.
     """
     parameters, modes = _starts(machine, model)
     if samples:
@@ -232,13 +219,9 @@ def generation_time() -> str:
 
 
 def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
-    """Return a GUID that follows from files and table, and from nothing else.
+    """Return a GUID that follows from table and files (archive name → content), and from nothing else.
 
-    Parameters
-    ----------
-    files : mapping
-        Archive name → content, without the binaries and reference results made from it.
-    table : FmuTable
+    Binaries and reference results, which are made from them, are not among them.
     """
     digest = hashlib.sha256(json.dumps(table.as_json(), sort_keys=True).encode())
     for arcname in sorted(files):

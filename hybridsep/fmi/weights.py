@@ -146,14 +146,8 @@ def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredic
 def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredictor:
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
-    Parameters
-    ----------
-    path : str or Path
-    machine : Machine
-        Machine that it must have been trained for: with its ``Np``, ``input_hold``, modes, and all settings on which
-        weights depend (:func:`learned_settings`).
-    kind : {"HybridPredictor", "SepCompensator"}
-        Which of the machine's two sets of settings is meant.
+    It must have been trained for the machine: with its ``Np``, ``input_hold``, modes, and all settings on which weights
+    depend (:func:`learned_settings`), those of its predictor or compensator as ``kind`` says.
 
     Raises
     ------

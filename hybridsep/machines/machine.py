@@ -187,15 +187,7 @@ class Machine(Section):
     def new_compensator(
         self, settings: CompensatorSettings | None = None, *, predictor: PredictorSettings | None = None
     ) -> SepCompensator:
-        """Return a compensator for this machine.
-
-        Parameters
-        ----------
-        settings : CompensatorSettings, optional
-            :attr:`compensator_settings` if left out.
-        predictor : PredictorSettings, optional
-            :attr:`compensator_predictor` if left out.
-        """
+        """Return a compensator, by :attr:`compensator_settings` and :attr:`compensator_predictor` if left out."""
         from ..compensate.compensator import SepCompensator
 
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
