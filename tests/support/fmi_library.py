@@ -25,7 +25,7 @@ ABSENT = (
     *("EnterEventMode", "EnterStepMode", "EvaluateDiscreteStates"),
     *("EnterContinuousTimeMode", "GetClock", "SetClock", "GetIntervalDecimal", "GetIntervalFraction"),
     *("GetShiftDecimal", "GetShiftFraction", "SetIntervalDecimal", "SetIntervalFraction", "UpdateDiscreteStates"),
-    *("GetNumberOfVariableDependencies", "GetVariableDependencies", "GetDirectionalDerivative"),
+    *("GetNumberOfVariableDependencies", "GetVariableDependencies"),
     *("GetAdjointDerivative", "GetOutputDerivatives", "CompletedIntegratorStep", "SetTime", "SetContinuousStates"),
     *("GetContinuousStateDerivatives", "GetEventIndicators", "GetContinuousStates", "GetNominalsOfContinuousStates"),
     *("GetNumberOfEventIndicators", "GetNumberOfContinuousStates", "ActivateModelPartition"),

@@ -1,6 +1,7 @@
 #include "hsep_values.h"
 
 #include "hsep_check.h"
+#include "hsep_windows.h"
 
 #include <limits.h>
 
@@ -69,6 +70,7 @@ HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const 
 /* Have the windows written if one of the variables is of them: nothing else is local. */
 static void values_show(hsep_instance *instance, const hsep_access *access)
 {
+#if HSEP_N_WINDOWS > 0
     size_t i = 0;
     while (i < access->n_references &&
            instance->names->find(&instance->context, access->references[i]).row->causality != HSEP_LOCAL) {
@@ -77,6 +79,9 @@ static void values_show(hsep_instance *instance, const hsep_access *access)
     if (i < access->n_references) {
         hsep_model_show_windows(&instance->context, instance->state, instance->values);
     }
+#else
+    (void)instance, (void)access;
+#endif
 }
 
 HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[])

@@ -1,5 +1,5 @@
-/* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and the other
- * kinds of FMUs. The functions are there, since importers look them all up, and are refused in every state. */
+/* What modelDescription.xml says is absent: clocks, events, adjoint derivatives, dependencies of single elements, and
+ * the other kinds of FMUs. The functions are there, since importers look them all up, and are refused in every state. */
 #include "hsep_fmi3_calls.h"
 
 /* Refuse a call; its further arguments are only named, so that no compiler finds them unused. */
@@ -59,13 +59,9 @@ FMI3_ABSENT(fmi3GetVariableDependencies, "providesPerElementDependencies is fals
      size_t others[], fmi3DependencyKind kinds[], size_t n),
     dependent, elements, independents, others, kinds, n)
 
-#define FMI3_DERIVATIVE \
-    (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], \
-     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
-
-FMI3_ABSENT(fmi3GetDirectionalDerivative, "providesDirectionalDerivatives is false", FMI3_DERIVATIVE,
-    unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity)
-FMI3_ABSENT(fmi3GetAdjointDerivative, "providesAdjointDerivatives is false", FMI3_DERIVATIVE,
+FMI3_ABSENT(fmi3GetAdjointDerivative, "providesAdjointDerivatives is false",
+    (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
+     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity),
     unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity)
 FMI3_ABSENT(fmi3GetOutputDerivatives, "maxOutputDerivativeOrder is 0",
     (fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t n, const fmi3Int32 orders[],

@@ -48,6 +48,7 @@
     CALL(SET_UINT64,                "fmi3SetUInt64",               HSEP_I | HSEP_C) \
     CALL(SET_STRING,                "fmi3SetString",               HSEP_I | HSEP_M | HSEP_S) \
     CALL(SET_BINARY,                "fmi3SetBinary",               HSEP_I | HSEP_M | HSEP_S) \
+    CALL(GET_DIRECTIONAL_DERIVATIVE, "fmi3GetDirectionalDerivative",        HSEP_M | HSEP_S) \
     CALL(GET_FMU_STATE,             "fmi3GetFMUState",             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(SET_FMU_STATE,             "fmi3SetFMUState",             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(FREE_FMU_STATE,            "fmi3FreeFMUState",            HSEP_I | HSEP_M | HSEP_S | HSEP_T) \

@@ -92,10 +92,6 @@ HSEP_API hsep_status hsep_model_initialise(
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 
-/* Write locals, the samples of HybridPredictor's window, to values. Steps leave part of a prediction to the next ones:
- * what is left of it is done here. All later outputs are the same. */
-HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[]);
-
 /* Check the start value of the command: a position, from which outputs and locals follow before initialization. */
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[]);
 

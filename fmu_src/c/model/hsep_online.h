@@ -44,9 +44,6 @@ HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self);
 /* Write the outputs. */
 HSEP_API void hsep_online_write(const hsep_online *self, double values[]);
 
-/* Write locals, as hsep_model_show_windows. */
-HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[]);
-
 #endif
 
 #endif

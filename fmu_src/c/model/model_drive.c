@@ -124,11 +124,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     values[HSEP_VR_x_meas] = drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
 }
 
-HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
-{
-    (void)context, (void)state, (void)values; /* it has none */
-}
-
 #else
 typedef int hsep_no_drive; /* a translation unit must not be empty */
 #endif

@@ -6,6 +6,7 @@
 #include "hsep_check.h"
 #include "hsep_model.h"
 #include "hsep_parameters.h"
+#include "hsep_windows.h"
 
 HSEP_API int hsep_online_check(const double values[], char message[])
 {
@@ -42,8 +43,9 @@ HSEP_API void hsep_online_write(const hsep_online *self, double values[])
     values[HSEP_VR_n_rejected] = (double)outputs.n_rejected;
 }
 
-HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[])
+HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
 {
+    hsep_predictor *self = hsep_model_predictor(state);
     hsep_predictor_complete(self);
     /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
     for (size_t i = 0; self->divergence == HSEP_CONVERGES && i < context->window; i++) {
@@ -53,6 +55,19 @@ HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, d
         values[HSEP_VR_x_h_window(context) + i] = shown ? hsep_at_const(self, self->x_h)[i] : 0.0;
         values[HSEP_VR_x_h_std_window(context) + i] = shown ? hsep_predictor_std(self, i) : 0.0;
     }
+}
+
+HSEP_API hsep_status
+hsep_model_derivative(void *state, const double direction[], double x_h[], double *now, double work[], char message[])
+{
+    hsep_predictor *self = hsep_model_predictor(state);
+    if (hsep_residual_paper(hsep_predictor_model(self)) == NULL) {
+        return hsep_message_add(
+            message, "x_h is linear in x_d_window with averaging = false alone, got averaging = true");
+    }
+    hsep_predictor_respond(self, direction, work, x_h);
+    *now = x_h[self->k % self->Np];
+    return HSEP_OK;
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])

@@ -13,6 +13,7 @@
 #include "hsep_state.h"
 #include "hsep_table.h"
 #include "hsep_weights.h"
+#include "hsep_windows.h"
 
 typedef struct {
     hsep_state_header header;
@@ -119,11 +120,9 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     return status;
 }
 
-HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
-{
-    online_state *self = state;
-    hsep_online_show(context, &self->online, values);
-}
+#if HSEP_N_WINDOWS > 0
+HSEP_API hsep_predictor *hsep_model_predictor(void *state) { return &((online_state *)state)->online; }
+#endif
 
 #else
 typedef int hsep_no_online; /* a translation unit must not be empty */

@@ -162,11 +162,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     fclose(file);
 }
 
-HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
-{
-    (void)context, (void)state, (void)values; /* it has none */
-}
-
 #else
 typedef int hsep_no_reference_trajectory; /* a translation unit must not be empty */
 #endif

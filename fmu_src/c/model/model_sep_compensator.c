@@ -78,11 +78,6 @@ HSEP_API void hsep_online_write(const hsep_online *self, double values[])
     values[HSEP_VR_alarm] = (double)outputs.alarm;
 }
 
-HSEP_API void hsep_online_show(const hsep_context *context, hsep_online *self, double values[])
-{
-    (void)context, (void)self, (void)values; /* it has no locals */
-}
-
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     (void)context;
