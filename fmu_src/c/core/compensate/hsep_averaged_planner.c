@@ -15,18 +15,6 @@ HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * si
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 HSEP_ASSERT(solved, sizeof averaged_planner_solved == (1 + HSEP_AVERAGED_STEPS) * sizeof(hsep_int));
 
-/* Where the solver of a programme ends: of the physics model's plan, 0, or of a Newton step. In single precision
- * rounding leaves up to 2e-4 of a bound of third differences, so that the margin is wider. */
-static hsep_tolerance averaged_planner_tolerance(hsep_int programme)
-{
-    hsep_tolerance tolerance = {HSEP_NEWTON_TOLERANCE};
-#ifdef HSEP_FLOAT32
-    tolerance.margin = 1e-4F;
-#endif
-    tolerance.steps = averaged_planner_solved[programme];
-    return tolerance;
-}
-
 /* Whether a plan costs less than another; not if it is NaN. */
 static int averaged_planner_better(hsep_real cost, hsep_real other)
 {
@@ -53,21 +41,20 @@ static void averaged_planner_command(
     }
 }
 
-/* Predict the commands of a plan in two calls, with the variances under the remainder of the last plan; return
- * whether all are predicted. */
-static int averaged_planner_predicts(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+/* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
+ * hsep_averaged_go_on has it. */
+static void averaged_planner_predict(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[], hsep_int count, hsep_int apart)
 {
-    const hsep_int all = self->preview + self->late;
+    const hsep_int first = self->samples;
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (self->predicted == 0) {
-        self->predicted = all / HSEP_AVERAGED_AT_FIRST;
+    self->samples += count;
+    if (first == 0) {
         averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, self->predicted, 0);
-        return 0;
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
+    } else {
+        hsep_averaged_go_on(task->model, x_pb, e_h, first, self->samples, apart);
     }
-    hsep_averaged_go_on(task->model, x_pb, e_h, self->predicted, all, 0);
-    self->predicted = 0;
-    return 1;
 }
 
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
@@ -91,167 +78,39 @@ static hsep_real averaged_planner_cost(
     return error + task->planner->jerk_weight * jerk;
 }
 
-/* The plan is made: its window is to be predicted. */
-static void averaged_planner_end(hsep_averaged_planner *self)
-{
-    self->predicted = 0;
-    self->stage = HSEP_AVERAGED_PREDICT;
-}
-
-/* Some of the window's samples under the plan, and their variances. */
-static void averaged_planner_window(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_int first = self->predicted, all = self->late + self->Np, left = all - first;
-    const hsep_int last = first + (left < HSEP_AVERAGED_VARIED ? left : HSEP_AVERAGED_VARIED);
-    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (first == 0) {
-        averaged_planner_command(self, task, hsep_planner_coefficients(task->planner), HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, 1);
-    } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, last, 1);
-    }
-    self->predicted = last;
-    self->stage = last < all ? HSEP_AVERAGED_PREDICT : HSEP_AVERAGED_DONE;
-}
-
-/* The physics model's plan is made: try a better one, if there may be one. */
-static void averaged_planner_continue(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    hsep_real *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
-    self->planned = 1;
-    if (!self->judges) {
-        averaged_planner_end(self);
-        return;
-    }
-    self->stage = HSEP_AVERAGED_COMPARE;
-    averaged_planner_copy(self, hsep_at(self, self->of_physics), c);
-    if (self->follows) {
-        self->stage = HSEP_AVERAGED_STEP;
-        averaged_planner_copy(self, hsep_at(self, self->best), rest);
-        averaged_planner_copy(self, c, rest);
-        hsep_planner_let_turn(task->planner);
-        hsep_planner_decide_pinned(task->planner);
-    }
-}
-
-/* Begin the physics model's plan. */
-static void averaged_planner_physics(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Begin the linearisations of a window and the physics model's plan. */
+static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb);
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const hsep_linearised_change change = {
+        .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
     hsep_real *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
+    if (self->follows) {
+        hsep_linearised_begin((hsep_linearised *)hsep_at(self, self->linearised), task->model, &change);
+    }
     averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
     }
     hsep_planner_open(task->planner, task->x_d);
-    self->stage = HSEP_AVERAGED_AIM;
 }
 
-/* Make its programme. */
-static void averaged_planner_aim(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    hsep_planner_aim(task->planner, task->spline, hsep_at(self, self->target));
-    hsep_planner_pin(task->planner);
-    self->stage = HSEP_AVERAGED_AIMED;
-}
-
-/* Solve it; without one the remainder of the last plan goes on. */
-static void averaged_planner_solve_physics(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_tolerance tolerance = averaged_planner_tolerance(0);
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
-    if (status == HSEP_PLAN_DONE) {
-        averaged_planner_continue(self, task);
-    } else if (status == HSEP_PLAN_BOUNDED) {
-        self->stage = HSEP_AVERAGED_PHYSICS;
-    } else {
-        averaged_planner_end(self);
-    }
-}
-
-HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
-    int warm)
-{
-    const size_t late = (size_t)self->late * sizeof(hsep_real);
-    hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->steps = self->tries = self->planned = self->predicted = self->bounded = 0;
-    averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
-    memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
-    memcpy(
-        hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(hsep_real));
-    for (hsep_int k = 0; k < self->preview; k++) {
-        path[self->preview - 1 - k] = task->x_d[k] - self->start;
-    }
-    averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
-    const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
-    self->varied = self->late + (pinned > 0 ? pinned : 1);
-    hsep_averaged_forecast(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
-        hsep_at(self, self->e_h), self->varied);
-    self->judges = warm && task->model->predicted[HSEP_STATIC];
-    self->follows = self->judges && best > 1 && self->paused == 0;
-    self->paused -= self->paused > 0;
-    if (best == 0) {
-        averaged_planner_end(self);
-    } else {
-        self->stage = self->judges ? HSEP_AVERAGED_VARY : HSEP_AVERAGED_BEGIN;
-    }
-}
-
-/* Some of the samples under the remainder of the last plan, and their variances. */
-static void averaged_planner_vary(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_int all = self->late + self->preview, window = self->late + self->Np;
-    const int is_within = self->varied < window;
-    const hsep_int apart = is_within ? 1 : HSEP_NEWTON_APART, left = (is_within ? window : all) - self->varied;
-    const hsep_int most = apart * HSEP_AVERAGED_VARIED, last = self->varied + (left < most ? left : most);
-    hsep_averaged_go_on(task->model, hsep_at(self, self->x_pb), hsep_at(self, self->e_h), self->varied, last, apart);
-    self->varied = last;
-    if (last == all) {
-        self->cost = self->unchanged = averaged_planner_cost(self, task, hsep_at(self, self->rest));
-        self->stage = self->follows ? HSEP_AVERAGED_CHANGE : HSEP_AVERAGED_BEGIN;
-    }
-}
-
-/* What linearisations of this window have in common. */
-static void averaged_planner_change(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_linearised_change change = {
-        .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
-    hsep_linearised_begin((hsep_linearised *)hsep_at(self, self->linearised), task->model, &change);
-    self->stage = HSEP_AVERAGED_BEGIN;
-}
-
-/* Begin a Newton step: slopes at the best plan, which was predicted last. */
-static void averaged_planner_step(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    if (self->steps == 0) { /* the rest of the last plan was predicted before the physics model's plan */
-        averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n);
-    }
-    hsep_linearised_slopes(
-        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command),
-        hsep_at(self, self->x_pb), averaged_planner_reaches[self->steps]);
-    self->steps++;
-    self->stage = HSEP_AVERAGED_AT;
-}
-
-/* Linearise with these slopes. */
+/* Linearise at the best plan, which was predicted last, the remainder of the last plan before the physics model's. */
 static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    const hsep_real *e_h = hsep_at(self, self->e_h);
     hsep_real *target = hsep_at(self, self->target);
-    hsep_linearised_at((hsep_linearised *)hsep_at(self, self->linearised), task->model);
+    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    if (self->steps == 0) {
+        averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n);
+    }
+    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
     for (hsep_int k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
         const hsep_int j = self->preview - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
     }
-    self->columns = self->rows = self->n_pinned;
-    self->part = self->tries = 0;
-    self->stage = HSEP_AVERAGED_COLUMN;
 }
 
 /* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
@@ -261,28 +120,22 @@ static hsep_real *averaged_planner_column_of(hsep_averaged_planner *self, hsep_i
     return hsep_at(self, self->W) + (i * (self->preview - spacing * first) - spacing * (i * (i - 1) / 2));
 }
 
-/* A part of the changes of x_h by the next splines, as many as are computed side by side. */
+/* Changes of x_h by the next splines, as many as are computed side by side. */
 static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, first = self->columns;
+    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, first = self->spline;
     const hsep_int left = self->n - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
     const hsep_real *at = hsep_at(self, self->best) + HSEP_N_DECIDED;
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
     for (hsep_int c = 0; c < count; c++) {
         columns[c] = averaged_planner_column_of(self, first + c, spacing);
     }
-    if (hsep_linearised_columns(
-            (hsep_linearised *)hsep_at(self, self->linearised), task->model, self->part, first * spacing, spacing,
-            count, columns)) {
-        self->part++;
-        return;
-    }
-    self->part = 0;
+    hsep_linearised_columns(
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, first * spacing, spacing, count, columns);
     for (hsep_int j = first; j < first + count; j++) {
         hsep_axpy(target + j * spacing, at[j], columns[j - first], self->preview - j * spacing);
     }
-    self->columns += count;
-    self->stage = self->columns < self->n ? HSEP_AVERAGED_COLUMN : HSEP_AVERAGED_PRODUCT;
+    self->spline += count;
 }
 
 /* Some rows of the programme of a Newton step, P = W' W + jerk_weight D' D, and of its linear term, for the splines
@@ -291,7 +144,7 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_int n = self->n, preview = self->preview, spacing = splines->spacing, first = self->n_pinned;
-    const hsep_int begin = self->rows, end = begin + HSEP_AVERAGED_PRODUCTS < n ? begin + HSEP_AVERAGED_PRODUCTS : n;
+    const hsep_int begin = self->spline, end = begin + HSEP_AVERAGED_PRODUCTS < n ? begin + HSEP_AVERAGED_PRODUCTS : n;
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
     hsep_real *P = hsep_planner_quadratic(task->planner, begin);
     for (hsep_int i = begin; i < end; i++) {
@@ -314,14 +167,12 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
         }
         v[i - first] = hsep_dot(left, target + i * spacing, preview - i * spacing);
     }
-    self->rows = end;
-    if (end == n) {
-        self->stage = HSEP_AVERAGED_FACTOR;
-    }
+    self->spline = end;
 }
 
-/* Complete the programme of a Newton step, and factor it if it does not follow a bounded one. */
-static void averaged_planner_factor(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Complete the programme of a Newton step, and factor it if it does not follow a bounded one; return whether it has a
+ * minimum. */
+static int averaged_planner_factor(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_int first = self->n_pinned;
@@ -331,25 +182,27 @@ static void averaged_planner_factor(hsep_averaged_planner *self, const hsep_aver
     hsep_splines_project_jerk(
         splines, jerk_weight, hsep_planner_third(task->planner), first, hsep_planner_linear(task->planner));
     hsep_planner_regularise(task->planner, first);
-    const int begins = self->bounded || hsep_planner_factor(task->planner, 1);
-    self->stage = begins ? HSEP_AVERAGED_SOLVE : HSEP_AVERAGED_COMPARE;
+    return self->bounded || hsep_planner_factor(task->planner, 1);
 }
 
-/* Solve it. */
-static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Begin to solve a programme, of the physics model's plan, 0, or of a Newton step, again where the last one's was
+ * bounded; return whether it has a plan. */
+static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int programme)
 {
-    const hsep_tolerance tolerance = averaged_planner_tolerance(self->steps);
+    hsep_tolerance tolerance = {HSEP_NEWTON_TOLERANCE};
+    hsep_plan_status status = HSEP_PLAN_BOUNDED;
+#ifdef HSEP_FLOAT32
+    tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
+#endif
+    tolerance.steps = averaged_planner_solved[programme];
     if (self->bounded) { /* so it is again */
         hsep_planner_solve_again(task->planner, hsep_at(self, self->best), &tolerance);
-        self->stage = HSEP_AVERAGED_BOUNDED;
-        return;
+    } else {
+        status = hsep_planner_solve(task->planner, 1, &tolerance);
     }
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
-    self->bounded = status == HSEP_PLAN_BOUNDED;
-    self->stage = HSEP_AVERAGED_COMPARE;
-    if (status != HSEP_PLAN_FAILED) {
-        self->stage = status == HSEP_PLAN_DONE ? HSEP_AVERAGED_JUDGE : HSEP_AVERAGED_BOUNDED;
-    }
+    self->solving = status == HSEP_PLAN_BOUNDED;
+    self->bounded = self->solving && programme > 0;
+    return status != HSEP_PLAN_FAILED;
 }
 
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
@@ -359,19 +212,17 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real cost = averaged_planner_cost(self, task, c), gain = self->cost - cost;
     self->tries++;
-    self->stage = HSEP_AVERAGED_COMPARE;
     if (averaged_planner_better(cost, self->cost)) {
-        const int is_last = gain < HSEP_NEWTON_GAIN * (gain + cost) || self->steps == HSEP_AVERAGED_STEPS;
-        averaged_planner_copy(self, best, c);
+        self->gains = !(gain < HSEP_NEWTON_GAIN * (gain + cost));
+        self->tries = HSEP_AVERAGED_TRIES;
         self->cost = cost;
-        self->stage = is_last ? HSEP_AVERAGED_COMPARE : HSEP_AVERAGED_STEP;
+        averaged_planner_copy(self, best, c);
         averaged_planner_copy(self, c, hsep_at(self, self->rest));
     } else if (self->tries < HSEP_AVERAGED_TRIES) {
         const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
         }
-        self->stage = HSEP_AVERAGED_JUDGE;
     }
 }
 
@@ -415,76 +266,270 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
         }
     }
     averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
-    averaged_planner_end(self);
 }
 
-HSEP_API void hsep_averaged_planner_advance(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Multiply-adds of the parts of a plan, counted from the sizes. */
+typedef struct {
+    hsep_real number;    /* one of every sample of the preview */
+    hsep_real commands;  /* commands of a plan, and their disturbances */
+    hsep_real sample;    /* a sample of its prediction, with its variance, */
+    hsep_real row;       /* and a row of features for variances */
+    hsep_real predict;   /* half of a prediction without variances, and of its cost */
+    hsep_real linearise; /* slopes of the disturbances, and gains with them */
+    hsep_real pairs;     /* one of every pair of splines that are not pinned, */
+    hsep_real factor;    /* the factor of a programme, */
+    hsep_real solve;     /* its bounds, and whether they allow its minimum, */
+    hsep_real step;      /* and a part of a solver's step */
+} averaged_planner_work;
+
+static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    switch ((hsep_averaged_stage)self->stage) {
-    case HSEP_AVERAGED_DONE:
-        break;
-    case HSEP_AVERAGED_VARY:
-        averaged_planner_vary(self, task);
-        break;
-    case HSEP_AVERAGED_CHANGE:
-        averaged_planner_change(self, task);
-        break;
-    case HSEP_AVERAGED_BEGIN:
-        averaged_planner_physics(self, task);
-        break;
-    case HSEP_AVERAGED_AIM:
-        averaged_planner_aim(self, task);
-        break;
-    case HSEP_AVERAGED_AIMED:
-        if (hsep_planner_factor(task->planner, 1)) {
-            self->stage = HSEP_AVERAGED_FACTORED;
-        } else {
-            averaged_planner_end(self);
+    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    const hsep_real all = (hsep_real)(self->preview + self->late), n = (hsep_real)(self->n - self->n_pinned);
+    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview, .pairs = n * n};
+    hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
+    work.sample = run;
+    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
+        if (task->model->predicted[i]) {
+            const hsep_expert *expert = hsep_averaged_expert(task->model, i);
+            const hsep_real m = (hsep_real)(expert->p + expert->n_static);
+            run += m + 3.0 * HSEP_WORK_NUMBER;                     /* in free run, within bounds, shrunk */
+            work.sample += 2.0 * m + all + 3.0 * HSEP_WORK_NUMBER; /* with the variances before it */
+            work.row += 0.5 * m * (m + HSEP_WORK_NUMBER);
         }
-        break;
-    case HSEP_AVERAGED_FACTORED:
-        averaged_planner_solve_physics(self, task);
-        break;
-    case HSEP_AVERAGED_PHYSICS:
-        if (hsep_planner_advance(task->planner)) {
-            averaged_planner_continue(self, task);
+    }
+    /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
+    work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
+                    all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
+    work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
+    work.linearise = all * HSEP_WORK_NUMBER * (4.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 8.0);
+    work.factor = work.pairs * (n / 6.0 + 1.5);
+    work.solve = 4.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
+    work.step = (9.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
+    return work;
+}
+
+/* Products of the columns of some splines with all behind them. */
+static hsep_real averaged_planner_of_products(
+    const hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int begin, hsep_int end)
+{
+    const hsep_real spacing = (hsep_real)hsep_planner_splines(task->planner)->spacing;
+    hsep_real sum = 0.0;
+    for (hsep_int i = begin; i < end && i < self->n; i++) {
+        const hsep_real middle = 0.5 * (hsep_real)(i + self->n - 1);
+        sum += (hsep_real)(self->n - i) * ((hsep_real)self->preview - spacing * middle + 0.5 * HSEP_WORK_NUMBER);
+    }
+    return sum;
+}
+
+/* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */
+static hsep_real averaged_planner_vary(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[])
+{
+    const hsep_int window = self->late + self->Np, is_within = self->samples < window;
+    const hsep_int left = (is_within ? window : self->late + self->preview) - self->samples;
+    const hsep_int apart = is_within ? 1 : HSEP_NEWTON_APART, most = apart * HSEP_AVERAGED_VARIED;
+    const hsep_int count = left < most ? left : most;
+    if (c != NULL) {
+        averaged_planner_predict(self, task, c, count, apart);
+    }
+    return (hsep_real)count * work->sample + (hsep_real)((count + apart - 1) / apart) * work->row;
+}
+
+/* Bound on the work that is left of a plan where it begins, or behind so many Newton steps. */
+static hsep_real averaged_planner_left(
+    const hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work,
+    hsep_int steps)
+{
+    const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
+    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, n = self->n, pinned = self->n_pinned;
+    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
+    const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
+    hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
+    if (self->place == 0 && self->judges) {
+        left += (hsep_real)(window - first + behind) * work->sample +
+                (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
+    }
+    if (self->place == 0 && self->planned) {
+        left += 9.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
+                (hsep_real)averaged_planner_solved[0] * parts;
+    }
+    if (self->follows && steps < HSEP_AVERAGED_STEPS) {
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->solve +
+                           2.0 * HSEP_AVERAGED_TRIES * work->predict;
+        for (hsep_int j = pinned; j < n; j += HSEP_PHYSICS_ABREAST) {
+            newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
-        break;
-    case HSEP_AVERAGED_STEP:
-        averaged_planner_step(self, task);
-        break;
-    case HSEP_AVERAGED_AT:
-        averaged_planner_linearise(self, task);
-        break;
-    case HSEP_AVERAGED_COLUMN:
-        averaged_planner_columns(self, task);
-        break;
-    case HSEP_AVERAGED_PRODUCT:
-        averaged_planner_products(self, task);
-        break;
-    case HSEP_AVERAGED_FACTOR:
-        averaged_planner_factor(self, task);
-        break;
-    case HSEP_AVERAGED_SOLVE:
-        averaged_planner_solve(self, task);
-        break;
-    case HSEP_AVERAGED_BOUNDED:
-        if (hsep_planner_advance(task->planner)) {
-            self->stage = HSEP_AVERAGED_JUDGE;
+        left += work->factor; /* of the first programme that is bounded: those behind it need none */
+        for (; steps < HSEP_AVERAGED_STEPS; steps++) {
+            left += newton + (hsep_real)averaged_planner_solved[1 + steps] * parts;
         }
-        break;
-    case HSEP_AVERAGED_JUDGE:
-        if (averaged_planner_predicts(self, task, hsep_planner_coefficients(task->planner))) {
-            averaged_planner_judge(self, task);
+    }
+    return left + (self->judges ? 2.0 * work->predict : 0.0);
+}
+
+/* Cut a plan: what follows costs so much, and is done when averaged_planner_go_on is called again; place: another one
+ * for each. A switch into the midst of a function goes on there, as in protothreads (Dunkels et al. 2006): what is
+ * needed behind a yield is in the block. */
+#define AVERAGED_PLANNER_YIELD(where, cost) \
+    do { \
+        self->place = (where); \
+        self->next = (cost); \
+        return; \
+    case (where):; \
+    } while (0)
+
+/* Make a plan, from one yield to the next. */
+static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
+{
+    const averaged_planner_work work = averaged_planner_work_of(self, task);
+    const hsep_int all = self->late + self->preview, spacing = hsep_planner_splines(task->planner)->spacing;
+    hsep_planner *planner = task->planner;
+    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
+    hsep_real *of_physics = hsep_at(self, self->of_physics);
+
+    switch (self->place) {
+    case 0:
+        self->left = averaged_planner_left(self, task, &work, 0);
+
+        /* The remainder of the last plan, with the variances of all plans */
+        while (self->judges && self->samples < all) {
+            AVERAGED_PLANNER_YIELD(1, averaged_planner_vary(self, task, &work, NULL));
+            (void)averaged_planner_vary(self, task, &work, rest);
         }
-        break;
-    case HSEP_AVERAGED_COMPARE:
-        if (averaged_planner_predicts(self, task, hsep_at(self, self->of_physics))) {
+        if (self->judges) {
+            self->cost = self->unchanged = averaged_planner_cost(self, task, rest);
+        }
+
+        /* The physics model's plan; without one the remainder of the last plan goes on */
+        if (self->planned) {
+            AVERAGED_PLANNER_YIELD(2, (self->follows ? 9.0 : 6.0) * work.number);
+            averaged_planner_open(self, task);
+            AVERAGED_PLANNER_YIELD(3, HSEP_WORK_NUMBER * work.pairs);
+            hsep_planner_aim(planner, task->spline, hsep_at(self, self->target));
+            hsep_planner_pin(planner);
+            AVERAGED_PLANNER_YIELD(4, work.factor);
+            self->planned = (hsep_int)hsep_planner_factor(planner, 1);
+        }
+        if (self->planned) {
+            AVERAGED_PLANNER_YIELD(5, work.solve);
+            self->planned = (hsep_int)averaged_planner_solve(self, task, 0);
+            while (self->solving) {
+                AVERAGED_PLANNER_YIELD(6, work.step);
+                self->solving = !hsep_planner_advance(planner);
+            }
+        }
+        averaged_planner_copy(self, of_physics, c);
+        self->judges = self->judges && self->planned;
+        self->follows = self->follows && self->planned;
+
+        /* Newton steps from the remainder of the last plan, as long as they gain */
+        if (self->follows) {
+            averaged_planner_copy(self, hsep_at(self, self->best), rest);
+            averaged_planner_copy(self, c, rest);
+            hsep_planner_let_turn(planner);
+            hsep_planner_decide_pinned(planner);
+        }
+        self->gains = self->follows;
+        for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
+            self->left = averaged_planner_left(self, task, &work, self->steps);
+            self->gains = 0;
+            AVERAGED_PLANNER_YIELD(7, work.linearise);
+            averaged_planner_linearise(self, task);
+            for (self->spline = self->n_pinned; self->spline < self->n;) {
+                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
+                averaged_planner_columns(self, task);
+            }
+            for (self->spline = self->n_pinned; self->spline < self->n;) {
+                AVERAGED_PLANNER_YIELD(
+                    9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
+                averaged_planner_products(self, task);
+            }
+            AVERAGED_PLANNER_YIELD(10, self->bounded ? 3.0 * work.number : work.factor);
+            if (!averaged_planner_factor(self, task)) {
+                break;
+            }
+            AVERAGED_PLANNER_YIELD(11, work.solve);
+            if (!averaged_planner_solve(self, task, 1 + self->steps)) {
+                break;
+            }
+            while (self->solving) {
+                AVERAGED_PLANNER_YIELD(12, work.step);
+                self->solving = !hsep_planner_advance(planner);
+            }
+            for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
+                self->samples = 0;
+                AVERAGED_PLANNER_YIELD(13, work.predict);
+                averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
+                AVERAGED_PLANNER_YIELD(14, work.predict);
+                averaged_planner_predict(self, task, c, all - self->samples, 0);
+                averaged_planner_judge(self, task);
+            }
+        }
+
+        /* The best of them */
+        self->left = averaged_planner_left(self, task, &work, HSEP_AVERAGED_STEPS);
+        self->samples = 0;
+        if (self->judges) {
+            AVERAGED_PLANNER_YIELD(15, work.predict);
+            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(16, work.predict);
+            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
             averaged_planner_compare(self, task);
         }
+
+        /* The window under the plan, and its variances */
+        for (self->samples = 0; self->samples < self->late + self->Np;) {
+            AVERAGED_PLANNER_YIELD(
+                17, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
+            (void)averaged_planner_vary(self, task, &work, c);
+        }
         break;
-    case HSEP_AVERAGED_PREDICT:
-        averaged_planner_window(self, task);
+    default:
         break;
     }
+    self->place = 0;
+    self->next = 0.0;
+}
+
+HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples)
+{
+    hsep_real done = 0.0, due;
+    do {
+        done += self->next;
+        self->left -= self->next;
+        averaged_planner_go_on(self, task);
+        due = samples > 1 ? (done + self->left) / (hsep_real)samples : INFINITY;
+    } while (self->place > 0 && done + 0.5 * self->next <= due);
+    return self->place == 0;
+}
+
+HSEP_API void hsep_averaged_planner_begin(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
+    int warm)
+{
+    const size_t late = (size_t)self->late * sizeof(hsep_real);
+    hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
+    self->place = self->bounded = self->solving = 0;
+    averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
+    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
+    memcpy(
+        hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(hsep_real));
+    for (hsep_int k = 0; k < self->preview; k++) {
+        path[self->preview - 1 - k] = task->x_d[k] - self->start;
+    }
+    averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
+    const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
+    self->samples = self->late + (pinned > 0 ? pinned : 1);
+    hsep_averaged_forecast(
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
+        hsep_at(self, self->e_h), self->samples);
+    self->planned = best > 0;
+    self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
+    self->follows = self->judges && best > 1 && self->paused == 0;
+    self->paused -= self->paused > 0;
+    averaged_planner_go_on(self, task);
 }

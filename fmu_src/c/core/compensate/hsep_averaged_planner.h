@@ -6,9 +6,9 @@
  * model's, and the remainder of the last one; the best is taken. Where its own asks for a larger change than
  * compensation is made for, it is wrong, and plans none for a time, which doubles.
  *
- * The work is cut into short parts: hsep_averaged_planner_advance does the next part, hsep_averaged_planner_next tells
- * its work, hsep_averaged_planner_left the most that all parts left may take. Both are counted in multiply-adds from
- * the sizes, so that samples can share the work equally. A block as hsep_layout.h has them.
+ * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
+ * hsep_averaged_planner_run does as many as a sample's equal share of the work that may be left. A block as
+ * hsep_layout.h has them.
  */
 #ifndef HSEP_AVERAGED_PLANNER_H
 #define HSEP_AVERAGED_PLANNER_H
@@ -27,41 +27,19 @@
 #define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
-typedef enum {
-    HSEP_AVERAGED_DONE = 0,
-    HSEP_AVERAGED_VARY,     /* the remainder of the last plan is to be predicted, with variances */
-    HSEP_AVERAGED_CHANGE,   /* what its linearisations have in common is to be computed */
-    HSEP_AVERAGED_BEGIN,    /* the physics model's plan begins, */
-    HSEP_AVERAGED_AIM,      /* its programme is to be made, */
-    HSEP_AVERAGED_AIMED,    /* it is to be factored, */
-    HSEP_AVERAGED_FACTORED, /* it is to be solved, */
-    HSEP_AVERAGED_PHYSICS,  /* it is bounded and being solved */
-    HSEP_AVERAGED_STEP,     /* a Newton step begins: slopes of the disturbances are to be computed, */
-    HSEP_AVERAGED_AT,       /* the model is to be linearised with them, */
-    HSEP_AVERAGED_COLUMN,   /* changes of x_h by the splines are to be computed, */
-    HSEP_AVERAGED_PRODUCT,  /* and their products */
-    HSEP_AVERAGED_FACTOR,   /* its programme is to be factored, if it does not follow a bounded one, */
-    HSEP_AVERAGED_SOLVE,    /* it is to be solved, */
-    HSEP_AVERAGED_BOUNDED,  /* it is bounded and being solved */
-    HSEP_AVERAGED_JUDGE,    /* a length of the step is to be judged */
-    HSEP_AVERAGED_COMPARE,  /* the physics model's plan is to be judged */
-    HSEP_AVERAGED_PREDICT   /* the window is to be predicted under the plan */
-} hsep_averaged_stage;
-
 typedef struct {
     hsep_int preview, p, Np;
     hsep_int late;        /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, n_pinned; /* splines of a plan, and the first ones, which stay as they were */
-    hsep_int stage;       /* hsep_averaged_stage */
+    hsep_int place;       /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;      /* whether the averaged model judges plans, */
     hsep_int follows;     /* and whether it may plan */
-    hsep_int steps;       /* Newton steps begun */
-    hsep_int varied;      /* samples that are predicted under the remainder of the last plan, with their variances */
-    hsep_int predicted;   /* samples of the plan at hand that are predicted; 0: none is at hand */
-    hsep_int columns;     /* splines that are pinned, or whose change of x_h is computed, */
-    hsep_int part;        /* parts of the next ones that are, */
-    hsep_int rows;        /* or whose row of the programme is */
-    hsep_int tries;       /* lengths of this step that were tried */
+    hsep_int steps;       /* Newton steps done, */
+    hsep_int gains;       /* whether the last one gained enough for another one, */
+    hsep_int tries;       /* and lengths of this one that were tried */
+    hsep_int samples;     /* samples that are predicted, */
+    hsep_int spline;      /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
+    hsep_int solving;     /* whether a bounded programme is being solved */
     hsep_int planned;     /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int bounded;     /* whether the limits bound the programme of the last Newton step */
     hsep_int paused;      /* windows that the averaged model does not plan, now */
@@ -69,6 +47,8 @@ typedef struct {
     hsep_real cost;       /* m2, of the best plan so far, */
     hsep_real unchanged;  /* and of the remainder of the last one */
     hsep_real start;      /* m, position of rest */
+    hsep_real next;       /* multiply-adds of the next part, 0: the plan is made; */
+    hsep_real left;       /* and that this part and all after it take at most */
     /* Offsets in words from the beginning of the struct */
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
@@ -84,7 +64,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 34);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 35);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -119,13 +99,13 @@ HSEP_API void hsep_averaged_planner_begin(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
     int warm);
 
-/* Multiply-adds of the next part; 0: the plan is made and predicted. */
-HSEP_API hsep_real hsep_averaged_planner_next(const hsep_averaged_planner *self, const hsep_averaged_task *task);
-
-/* Multiply-adds that the next part and all after it take at most. */
-HSEP_API hsep_real hsep_averaged_planner_left(const hsep_averaged_planner *self, const hsep_averaged_task *task);
-
-/* Do the next part. */
-HSEP_API void hsep_averaged_planner_advance(hsep_averaged_planner *self, const hsep_averaged_task *task);
+/* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
+ * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
+ * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
+ * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
+ * of the physics model's programme; 3 Newton steps of n preview p / 2 for each expert, n^2 preview / 4, 2 predictions,
+ * and 5, 3 and 3 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
+ * (m + 60) for each expert, and 700 all. */
+HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 
 #endif

@@ -52,7 +52,6 @@ HSEP_API void hsep_averaged_planner_init(
     (void)averaged_planner_lay_out(self, parameters, planner);
     self->start = start;
     self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * settings->T_s) + 0.5);
-    self->columns = self->rows = self->n_pinned;
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
     for (int i = 0; i < 2; i++) {
         hsep_physics_init(

@@ -137,22 +137,6 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
-/* Do parts of a plan with averaging, at least one: this sample's equal share of the work that may be left until the
- * plan is due, to the nearest part. Return whether the plan is made. */
-static int compensator_advance(hsep_compensator *self, hsep_int samples)
-{
-    hsep_averaged_planner *averaged = hsep_compensator_averaged(self);
-    const hsep_averaged_task task = compensator_task(self);
-    hsep_real next = hsep_averaged_planner_next(averaged, &task), done = 0.0, due = INFINITY;
-    while (next > 0.0 && done + 0.5 * next <= due) {
-        hsep_averaged_planner_advance(averaged, &task);
-        done += next;
-        next = hsep_averaged_planner_next(averaged, &task);
-        due = samples > 1 ? (done + hsep_averaged_planner_left(averaged, &task)) / (hsep_real)samples : INFINITY;
-    }
-    return !(next > 0.0);
-}
-
 /* Parts of the solver's steps of a bounded plan; return whether it is solved. */
 static int compensator_step(hsep_compensator *self, hsep_int due)
 {
@@ -170,7 +154,9 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
     const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
-    if (self->averaged ? compensator_advance(self, left) : compensator_step(self, due)) {
+    const hsep_averaged_task task = compensator_task(self);
+    if (self->averaged ? hsep_averaged_planner_run(hsep_compensator_averaged(self), &task, left)
+                       : compensator_step(self, due)) {
         self->state = self->averaged ? hsep_compensator_averaged(self)->planned : self->state;
         compensator_publish(self, predictor->Np);
     }

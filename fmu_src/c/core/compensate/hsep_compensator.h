@@ -6,7 +6,7 @@
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
  * while the command follows the last plan. With averaging every plan is solved so, over HSEP_PLANNING_PINNED_AVERAGED
  * samples: each of these does an equal share of the work that may be left, counted in multiply-adds
- * (hsep_averaged_planner_left).
+ * (hsep_averaged_planner_run).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
  * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms

@@ -30,7 +30,8 @@ static hsep_real linearised_weight(const hsep_averaged *model, hsep_int expert, 
     return model->predicted[expert] && of_kind ? model->shares[expert] : 0.0;
 }
 
-HSEP_API int hsep_linearised_counts(const hsep_averaged *model, hsep_int expert)
+/* Whether columns take work for an expert: it counts, and predicts the residual of the physics model. */
+static int linearised_counts(const hsep_averaged *model, hsep_int expert)
 {
     return linearised_weight(model, expert, HSEP_MODEL_RESIDUAL) > 0.0;
 }
@@ -228,7 +229,7 @@ static void linearised_command(hsep_linearised *self, hsep_averaged *model, cons
 /* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of each stop operator
  * with the command since it was at its stop, 1/m, of the stiffness with the position, m, of the damping with its
  * velocity, m/s, and of what repeats with the position, 1/m. */
-HSEP_API void hsep_linearised_slopes(
+static void linearised_slopes(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(model);
@@ -287,9 +288,11 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
     }
 }
 
-HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_averaged *model)
+HSEP_API void hsep_linearised_at(
+    hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
     const hsep_int n = self->n, first = linearised_first(self, model);
+    linearised_slopes(self, model, x_d, x_pb, reach);
     for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
         const hsep_int place = linearised_of_command[i];
         const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
@@ -465,18 +468,32 @@ static void linearised_add(
     }
 }
 
-HSEP_API int hsep_linearised_columns(
-    hsep_linearised *self, hsep_averaged *model, hsep_int part, hsep_int first, hsep_int spacing, hsep_int count,
+HSEP_API void hsep_linearised_columns(
+    hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
-    hsep_int before = 0;
-    for (hsep_int c = 0; part == 0 && c < count; c++) {
+    for (hsep_int c = 0; c < count; c++) {
         linearised_begin_column(self, model, first + c * spacing, columns[c]);
     }
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (hsep_linearised_counts(model, linearised_experts[i]) && before++ == part) {
+        if (linearised_counts(model, linearised_experts[i])) {
             linearised_add(self, model, i, first, spacing, count, columns);
         }
     }
-    return part + 1 < before;
+}
+
+HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averaged *model, hsep_int first)
+{
+    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    const hsep_real length = (hsep_real)(self->preview - first);
+    hsep_real sum = 0.0;
+    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        if (linearised_counts(model, linearised_experts[i])) {
+            const hsep_real p = (hsep_real)hsep_averaged_expert(model, linearised_experts[i])->p;
+            const hsep_real lags = hsep_fmin(p, length); /* of a sample; the first ones have fewer */
+            sum += lags * (length - 0.5 * lags) +
+                   length * (HSEP_WORK_MODE * (hsep_real)physics->n_modes + 8.0 + HSEP_FEATURES_N_STOPS);
+        }
+    }
+    return HSEP_PHYSICS_ABREAST * (sum + length);
 }

@@ -18,6 +18,11 @@
 #include "hsep_real.h"
 #include "hsep_averaged_model.h"
 
+/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
+ * branches, divisions or loads for itself alone; and a sample of a mode. */
+#define HSEP_WORK_NUMBER 20.0
+#define HSEP_WORK_MODE 9.0
+
 #define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
 
 typedef struct {
@@ -65,24 +70,20 @@ typedef struct {
  * depend on the commands. Cost: p multiply-adds a sample for each expert of the command. */
 HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change);
 
-/* Slopes of the disturbances at commands x_d that the model was last tried with, with the response x_pb, both (n,), m,
- * newest first. reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity
- * scale; 0: the tangent. Cost: 12 tanh a sample. */
-HSEP_API void hsep_linearised_slopes(
+/* Linearise at commands x_d that the model was last tried with, with the response x_pb, both (n,), m, newest first.
+ * reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity scale; 0: the
+ * tangent. Cost: 12 tanh a sample. */
+HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
 
-/* Linearise there, with these slopes. */
-HSEP_API void hsep_linearised_at(hsep_linearised *self, hsep_averaged *model);
-
-/* Whether columns take work for an expert: it counts, and predicts the residual of the physics model. */
-HSEP_API int hsep_linearised_counts(const hsep_averaged *model, hsep_int expert);
-
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). They are computed in parts, one for
- * each expert of hsep_linearised_counts, which begin with part 0; return whether there are more.
- * Cost of a part: HSEP_PHYSICS_ABREAST (9 n_modes + p + 8) multiply-adds a sample. */
-HSEP_API int hsep_linearised_columns(
-    hsep_linearised *self, hsep_averaged *model, hsep_int part, hsep_int first, hsep_int spacing, hsep_int count,
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: hsep_linearised_work. */
+HSEP_API void hsep_linearised_columns(
+    hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST]);
+
+/* Multiply-adds of the columns whose first one begins at a sample: HSEP_PHYSICS_ABREAST (9 n_modes + p + 11) a sample
+ * for each expert that predicts the residual of the physics model, and counts. */
+HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averaged *model, hsep_int first);
 
 #endif

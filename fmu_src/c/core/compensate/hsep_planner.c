@@ -229,16 +229,6 @@ HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start
     hsep_interior_again(planner_interior(self), hsep_planner_splines(self), hsep_at(self, self->P), tolerance);
 }
 
-HSEP_API hsep_int hsep_planner_steps(const hsep_planner *self)
-{
-    return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
-}
-
-HSEP_API hsep_int hsep_planner_part(const hsep_planner *self)
-{
-    return ((const hsep_interior *)hsep_at_const(self, self->interior))->part;
-}
-
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);

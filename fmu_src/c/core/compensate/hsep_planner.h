@@ -93,10 +93,6 @@ HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
-/* Steps that the last bounded plan took so far; the part of one that comes next. */
-HSEP_API hsep_int hsep_planner_steps(const hsep_planner *self);
-HSEP_API hsep_int hsep_planner_part(const hsep_planner *self);
-
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
 
