@@ -344,19 +344,11 @@ static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int f
     const hsep_real *x_2 = hsep_at(self, self->position), *x_1 = x_2 + 1, *x = x_1 + 1; /* the samples before, now */
     const hsep_real *v_1 = hsep_at(self, self->velocity) + 1, *v_d = v_1 + 1;
     const hsep_real *g0 = gains + 2 * n, *g1 = gains + 3 * n, *g2 = gains + 4 * n;
-    hsep_real *to = hsep_at(self, self->disturbance) + c;
-    hsep_int u = 0;
-    for (; u + HSEP_LANES <= count; u += HSEP_LANES) {
-        hsep_lanes_spread(
-            to + HSEP_PHYSICS_ABREAST * u, HSEP_PHYSICS_ABREAST,
-            *hsep_lanes_const(g0 + u) * *hsep_lanes_const(x + u) +
-                *hsep_lanes_const(g1 + u) * *hsep_lanes_const(x_1 + u) +
-                *hsep_lanes_const(g2 + u) * *hsep_lanes_const(x_2 + u));
-    }
-    for (; u < count; u++) {
+    hsep_real *restrict to = hsep_at(self, self->disturbance) + c;
+    for (hsep_int u = 0; u < count; u++) {
         to[HSEP_PHYSICS_ABREAST * u] = g0[u] * x[u] + g1[u] * x_1[u] + g2[u] * x_2[u];
     }
-    for (u = 0; u < moves; u++) {
+    for (hsep_int u = 0; u < moves; u++) {
         to[HSEP_PHYSICS_ABREAST * u] += gains[u] * v_d[u] + gains[n + u] * v_1[u];
     }
     linearised_add_stops(self, i, first, c);

@@ -120,25 +120,17 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     const hsep_int preview = self->preview;
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-        const hsep_real *of = rows + (order - 1) * preview;
-        hsep_real *to = rows + order * preview;
-        hsep_int k = 1;
+        const hsep_real *restrict of = rows + (order - 1) * preview;
+        hsep_real *restrict to = rows + order * preview;
         to[0] = of[0];
-        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
-            *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
-        }
-        for (; k < preview; k++) {
+        for (hsep_int k = 1; k < preview; k++) {
             to[k] = of[k] - of[k - 1];
         }
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
         const hsep_real share = self->share[order];
-        hsep_int k = 0;
-        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
-            *hsep_lanes_at(row + k) *= share;
-        }
-        for (; k < preview; k++) {
+        for (hsep_int k = 0; k < preview; k++) {
             row[k] *= share;
         }
     }

@@ -12,7 +12,6 @@
     (defined(__GNUC__) || defined(__clang__)) && !defined(HSEP_NO_VECTORS)
 #define HSEP_LANES 2
 typedef hsep_real hsep_lanes __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
-typedef long long hsep_bits __attribute__((vector_size(2 * sizeof(hsep_real)), aligned(sizeof(hsep_real)), may_alias));
 #else
 #define HSEP_LANES 1
 typedef hsep_real hsep_lanes;
@@ -26,29 +25,6 @@ typedef hsep_real hsep_lanes;
 /* The vectors that begin at a number, in any alignment of numbers. */
 static inline hsep_lanes *hsep_lanes_at(hsep_real *a) { return (hsep_lanes *)(void *)a; }
 static inline const hsep_lanes *hsep_lanes_const(const hsep_real *a) { return (const hsep_lanes *)(const void *)a; }
-
-/* Entry by entry a where it is larger than b, else b. */
-static inline hsep_lanes hsep_lanes_larger(hsep_lanes a, hsep_lanes b)
-{
-#if HSEP_LANES == 2
-    const hsep_bits larger = (hsep_bits)(a > b);
-    return (hsep_lanes)((larger & (hsep_bits)a) | (~larger & (hsep_bits)b));
-#else
-    return a > b ? a : b;
-#endif
-}
-
-/* Entries of a vector to places stride apart. */
-static inline void hsep_lanes_spread(hsep_real to[], hsep_int stride, hsep_lanes a)
-{
-#if HSEP_LANES == 2
-    to[0] = a[0];
-    to[stride] = a[1];
-#else
-    (void)stride;
-    to[0] = a;
-#endif
-}
 
 /* sum_i a_i b_i, both (n,). */
 static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_int n)
@@ -118,15 +94,7 @@ static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const h
 /* y += a x, both (n,). */
 static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real *restrict x, hsep_int n)
 {
-    hsep_int i = 0;
-    for (; i + 4 <= n; i += 4) {
-        hsep_lanes *to = hsep_lanes_at(y + i);
-        const hsep_lanes *from = hsep_lanes_const(x + i);
-        for (int l = 0; l < HSEP_OF_FOUR; l++) {
-            to[l] += a * from[l];
-        }
-    }
-    for (; i < n; i++) {
+    for (hsep_int i = 0; i < n; i++) {
         y[i] += a * x[i];
     }
 }
@@ -136,41 +104,8 @@ static inline void hsep_take_four(hsep_real *restrict y, const hsep_real a[4], c
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
     const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3];
-    hsep_int j = 0;
-    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        *hsep_lanes_at(y + j) =
-            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
-             a2 * *hsep_lanes_const(x2 + j)) -
-            a3 * *hsep_lanes_const(x3 + j);
-    }
-    for (; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         y[j] = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
-    }
-}
-
-/* The same over one, two or three arrays. */
-static inline void hsep_take_few(
-    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_int count, hsep_int n)
-{
-    const hsep_real a0 = a[0], *x0 = x[0];
-    hsep_int j = 0;
-    if (count == 1) {
-        for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-            *hsep_lanes_at(y + j) -= a0 * *hsep_lanes_const(x0 + j);
-        }
-        for (; j < n; j++) {
-            y[j] -= a0 * x0[j];
-        }
-        return;
-    }
-    const hsep_real a1 = a[1], a2 = count > 2 ? a[2] : 0.0, *x1 = x[1], *x2 = count > 2 ? x[2] : x1;
-    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        *hsep_lanes_at(y + j) =
-            ((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
-            a2 * *hsep_lanes_const(x2 + j);
-    }
-    for (; j < n; j++) {
-        y[j] = ((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j];
     }
 }
 
@@ -178,19 +113,22 @@ static inline void hsep_take_eight(hsep_real *restrict y, const hsep_real a[8], 
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4], a5 = a[5], a6 = a[6], a7 = a[7];
     const hsep_real *x0 = x[0], *x1 = x[1], *x2 = x[2], *x3 = x[3], *x4 = x[4], *x5 = x[5], *x6 = x[6], *x7 = x[7];
-    hsep_int j = 0;
-    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        const hsep_lanes first =
-            (((*hsep_lanes_at(y + j) - a0 * *hsep_lanes_const(x0 + j)) - a1 * *hsep_lanes_const(x1 + j)) -
-             a2 * *hsep_lanes_const(x2 + j)) -
-            a3 * *hsep_lanes_const(x3 + j);
-        *hsep_lanes_at(y + j) = (((first - a4 * *hsep_lanes_const(x4 + j)) - a5 * *hsep_lanes_const(x5 + j)) -
-                                 a6 * *hsep_lanes_const(x6 + j)) -
-                                a7 * *hsep_lanes_const(x7 + j);
-    }
-    for (; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         const hsep_real first = (((y[j] - a0 * x0[j]) - a1 * x1[j]) - a2 * x2[j]) - a3 * x3[j];
         y[j] = (((first - a4 * x4[j]) - a5 * x5[j]) - a6 * x6[j]) - a7 * x7[j];
+    }
+}
+
+/* The same over one, two or three arrays. */
+static inline void hsep_take_few(
+    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_int count, hsep_int n)
+{
+    hsep_axpy(y, -a[0], x[0], n);
+    if (count > 1) {
+        const hsep_real a1 = a[1], a2 = count > 2 ? a[2] : 0.0, *x1 = x[1], *x2 = count > 2 ? x[2] : x1;
+        for (hsep_int j = 0; j < n; j++) {
+            y[j] = (y[j] - a1 * x1[j]) - a2 * x2[j];
+        }
     }
 }
 
