@@ -1,5 +1,6 @@
 /* What modelDescription.xml says is absent: clocks, events, adjoint derivatives, dependencies of single elements, and
- * the other kinds of FMUs. The functions are there, since importers look them all up, and are refused in every state. */
+ * the other kinds of FMUs. The functions are there, since importers look them all up; they are refused in every state.
+ */
 #include "hsep_fmi3_calls.h"
 
 /* Refuse a call; its further arguments are only named, so that no compiler finds them unused. */
