@@ -72,13 +72,20 @@ HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters
 HSEP_API void hsep_compensator_block_init(
     hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start);
 
-/* The predictor, for a warm start between hsep_compensator_block_init and hsep_compensator_begin. */
-HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
-
-HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self);
-
-/* The planner with averaging, if there is one. */
-HSEP_API hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self);
+/* Parts of the block: the predictor, for a warm start between hsep_compensator_block_init and hsep_compensator_begin;
+ * the planner, and the one with averaging, if there is one. */
+static inline hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
+{
+    return (hsep_predictor *)hsep_at(self, self->predictor);
+}
+static inline hsep_planner *hsep_compensator_planner(hsep_compensator *self)
+{
+    return (hsep_planner *)hsep_at(self, self->planner);
+}
+static inline hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self)
+{
+    return (hsep_averaged_planner *)hsep_at(self, self->averaged);
+}
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);

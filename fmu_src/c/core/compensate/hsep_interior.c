@@ -2,11 +2,239 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
-#include "hsep_slacks.h"
 #include "hsep_vector.h"
 
 #include <stddef.h>
 #include <string.h>
+
+/* Slacks and multipliers of the bounds  low <= A x <= high, row by row. Side 0 are the lower bounds, B x >= b with B = A
+ * and b = low, side 1 the upper ones, B = -A and b = -high. A proximal term rho regularises the multipliers:
+ * ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z). */
+
+/* One side of the bounds, all (4 preview,): slack s = B x - b and multiplier z, both > 0. */
+typedef struct {
+    hsep_real *b;       /* low or high */
+    hsep_real *s, *z;   /* shares; m2 */
+    hsep_real *inverse; /* 1 / (s + rho z) */
+    hsep_real *r_c;     /* complementarity that a step aims at, times inverse */
+    hsep_real *r_p;     /* primal residual B x - b - s */
+    hsep_real *ds, *dz; /* steps of s and z, once their lengths are known */
+} slacks_side;
+
+typedef struct {
+    hsep_real rho;       /* 1/m2, proximal regularisation of the multipliers */
+    hsep_real sides;     /* number of bounds, low and high ones */
+    hsep_real *Ax, *Adx; /* rows of the iterate and of its step */
+    hsep_real *work;     /* a row's value of both sides together */
+    slacks_side side[2]; /* low and high */
+    struct {
+        hsep_int begin, end;
+    } range[HSEP_ORDERS]; /* the rows of an order that x touches, begin ... end - 1 */
+} slacks;
+
+/* Lengths of a step, 0 ... 1. */
+typedef struct {
+    hsep_real primal, dual;
+} slacks_step_lengths;
+
+/* Of the sides: B = A, B = -A. */
+static const hsep_real slacks_sign[2] = {1.0, -1.0};
+
+/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. again: whether z are
+ * those of a programme with the same bounds and nearly the same cost. */
+static void slacks_begin(const slacks *self, hsep_real cost, int again)
+{
+    const hsep_real least = again ? HSEP_QP_SLACK_AGAIN : HSEP_QP_FIRST_SLACK;
+    const hsep_real mu = (again ? HSEP_QP_MU_AGAIN : HSEP_QP_FIRST_MU) * cost;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
+            for (int i = 0; i < 2; i++) {
+                const slacks_side *side = &self->side[i];
+                side->s[r] = hsep_fmax(slacks_sign[i] * (self->Ax[r] - side->b[r]), least);
+                side->z[r] = hsep_fmax(again ? side->z[r] : 0.0, mu / side->s[r]);
+                side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
+            }
+        }
+    }
+}
+
+/* Sums or maxima of rows, four side by side, and of the rows left over, so that compilers find vectors and results are
+ * the same to the last bit whatever they find. */
+typedef struct {
+    hsep_real of[5];
+} slacks_values;
+
+static hsep_real slacks_sum(const slacks_values *values)
+{
+    const hsep_real *s = values->of;
+    return ((s[0] + s[1]) + (s[2] + s[3])) + s[4];
+}
+
+static hsep_real slacks_larger(hsep_real a, hsep_real b) { return a > b ? a : b; }
+
+static hsep_real slacks_largest(const slacks_values *values)
+{
+    hsep_real largest = values->of[4];
+    for (int i = 0; i < 4; i++) {
+        largest = slacks_larger(values->of[i], largest);
+    }
+    return largest;
+}
+
+/* work := B' sides of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
+static void slacks_push(const slacks *self)
+{
+    const slacks_side *low = &self->side[0], *high = &self->side[1];
+    hsep_real *restrict work = self->work;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
+            work[r] = (low->r_c[r] - low->z[r] * low->inverse[r] * low->r_p[r]) -
+                      (high->r_c[r] - high->z[r] * high->inverse[r] * high->r_p[r]);
+        }
+    }
+}
+
+/* Steps of count rows, ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z), and the largest -change /
+ * value of slacks and multipliers. */
+static inline void slacks_steps(
+    const slacks *self, int i, hsep_int r, hsep_int count, slacks_values *primal, slacks_values *dual)
+{
+    const slacks_side *side = &self->side[i];
+    const hsep_real *restrict Adx = self->Adx + r, *restrict r_p = side->r_p + r, *restrict r_c = side->r_c + r;
+    const hsep_real *restrict s = side->s + r, *restrict z = side->z + r, *restrict inverse = side->inverse + r;
+    hsep_real *restrict ds = side->ds + r, *restrict dz = side->dz + r;
+    for (hsep_int l = 0; l < count; l++) {
+        const hsep_int at = count == 4 ? l : 4;
+        const hsep_real to = slacks_sign[i] * Adx[l] + r_p[l];
+        dz[l] = r_c[l] - z[l] * inverse[l] * to;
+        ds[l] = to + self->rho * dz[l];
+        primal->of[at] = slacks_larger(-ds[l] / s[l], primal->of[at]);
+        dual->of[at] = slacks_larger(-dz[l] / z[l], dual->of[at]);
+    }
+}
+
+/* Steps ds and dz, and their lengths to where all values + length change stay >= 0: the largest -change / value is its
+ * inverse. */
+static slacks_step_lengths slacks_lengths(const slacks *self)
+{
+    slacks_values primal = {{0.0}}, dual = {{0.0}};
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (int i = 0; i < 2; i++) {
+            hsep_int r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                slacks_steps(self, i, r, 4, &primal, &dual);
+            }
+            slacks_steps(self, i, r, self->range[order].end - r, &primal, &dual);
+        }
+    }
+    const hsep_real of_s = slacks_largest(&primal), of_z = slacks_largest(&dual);
+    return (slacks_step_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
+}
+
+/* Residuals of count rows: the sum of s z, the largest primal residual, and the bound that is exceeded most. */
+static inline void slacks_residuals(
+    const slacks *self, int i, hsep_int r, hsep_int count, slacks_values *sum, slacks_values *largest,
+    slacks_values *outside)
+{
+    const slacks_side *side = &self->side[i];
+    const hsep_real *restrict Ax = self->Ax + r, *restrict b = side->b + r, *restrict s = side->s + r;
+    const hsep_real *restrict z = side->z + r, *restrict inverse = side->inverse + r;
+    hsep_real *restrict r_p = side->r_p + r, *restrict r_c = side->r_c + r;
+    hsep_real *restrict Adx = self->Adx + r, *restrict work = self->work + r;
+    for (hsep_int l = 0; l < count; l++) {
+        const hsep_int at = count == 4 ? l : 4;
+        const hsep_real product = s[l] * z[l], weight = z[l] * inverse[l], distance = slacks_sign[i] * (Ax[l] - b[l]);
+        r_p[l] = distance - s[l];
+        r_c[l] = -product * inverse[l];
+        sum->of[at] += product;
+        largest->of[at] = slacks_larger(slacks_larger(r_p[l], -r_p[l]), largest->of[at]);
+        outside->of[at] = slacks_larger(-distance, outside->of[at]);
+        Adx[l] = i == 0 ? weight : Adx[l] + weight;
+        work[l] = i == 0 ? z[l] : work[l] - z[l];
+    }
+}
+
+/* Return mu, the mean of s z; *primal: the largest primal residual; *beyond: by how much the worst bound is exceeded,
+ * negative inside all of them. The weights of A' W A go to Adx, z's difference of
+ * the sides to work, and the predictor's r_c is set, as if s z = 0 could be reached at once. */
+static hsep_real slacks_take_residuals(const slacks *self, hsep_real *primal, hsep_real *beyond)
+{
+    slacks_values sum = {{0.0}}, largest = {{0.0}};
+    slacks_values outside = {{-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY}};
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (int i = 0; i < 2; i++) {
+            hsep_int r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                slacks_residuals(self, i, r, 4, &sum, &largest, &outside);
+            }
+            slacks_residuals(self, i, r, self->range[order].end - r, &sum, &largest, &outside);
+        }
+    }
+    *primal = slacks_largest(&largest);
+    *beyond = slacks_largest(&outside);
+    return slacks_sum(&sum) / self->sides;
+}
+
+/* Sum of s z of count rows after a step. */
+static inline void slacks_after(
+    const slacks_side *side, const slacks_step_lengths *alpha, hsep_int r, hsep_int count, slacks_values *sum)
+{
+    for (hsep_int l = 0; l < count; l++) {
+        sum->of[count == 4 ? l : 4] +=
+            (side->s[r + l] + alpha->primal * side->ds[r + l]) * (side->z[r + l] + alpha->dual * side->dz[r + l]);
+    }
+}
+
+/* mu after the predictor's step, as far as s and z stay >= 0. */
+static hsep_real slacks_predicted(const slacks *self)
+{
+    const slacks_step_lengths alpha = slacks_lengths(self);
+    slacks_values sum = {{0.0}};
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (int i = 0; i < 2; i++) {
+            hsep_int r = self->range[order].begin;
+            for (; r + 4 <= self->range[order].end; r += 4) {
+                slacks_after(&self->side[i], &alpha, r, 4, &sum);
+            }
+            slacks_after(&self->side[i], &alpha, r, self->range[order].end - r, &sum);
+        }
+    }
+    return slacks_sum(&sum) / self->sides;
+}
+
+/* The corrector's r_c: the centre sigma mu, with the curvature ds dz that the predictor shows. */
+static void slacks_correct(const slacks *self, hsep_real sigma_mu)
+{
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (int i = 0; i < 2; i++) {
+            const slacks_side *side = &self->side[i];
+            hsep_real *restrict r_c = side->r_c;
+            for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
+                r_c[r] = (sigma_mu - side->s[r] * side->z[r] - side->ds[r] * side->dz[r]) * side->inverse[r];
+            }
+        }
+    }
+}
+
+/* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */
+static hsep_real slacks_move(const slacks *self)
+{
+    const slacks_step_lengths alpha = slacks_lengths(self);
+    const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.primal;
+    const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.dual;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (int i = 0; i < 2; i++) {
+            const slacks_side *side = &self->side[i];
+            hsep_real *restrict s = side->s, *restrict z = side->z, *restrict inverse = side->inverse;
+            for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
+                s[r] += primal * side->ds[r];
+                z[r] += dual * side->dz[r];
+                inverse[r] = 1.0 / (s[r] + self->rho * z[r]);
+            }
+        }
+    }
+    return primal;
+}
 
 /* The arrays behind the struct. */
 typedef struct {
@@ -15,7 +243,7 @@ typedef struct {
     hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
     hsep_real *factor;   /* triangle of n rows */
-    hsep_slacks slacks;
+    slacks slacks;
 } interior_arrays;
 
 /* Take count numbers of a block; NULL if there is no block but only its size is asked for. */
@@ -39,7 +267,7 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
     a->slacks.Adx = interior_take(block, &end, rows);
     a->slacks.work = interior_take(block, &end, rows);
     for (int i = 0; i < 2; i++) {
-        hsep_side *side = &a->slacks.side[i];
+        slacks_side *side = &a->slacks.side[i];
         side->b = interior_take(block, &end, rows);
         side->s = interior_take(block, &end, rows);
         side->z = interior_take(block, &end, rows);
@@ -113,7 +341,7 @@ static void interior_start(
     self->steps = self->part = 0;
     a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
     hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
-    hsep_slacks_begin(&a.slacks, self->cost, again);
+    slacks_begin(&a.slacks, self->cost, again);
 }
 
 HSEP_API void hsep_interior_begin(
@@ -170,7 +398,7 @@ static hsep_real interior_dual_residual(
 /* dx := (P + A' W A)^-1 (r_d + A' push), and what it does to the rows. */
 static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_int first)
 {
-    hsep_slacks_push(&a->slacks);
+    slacks_push(&a->slacks);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
     hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
@@ -183,7 +411,7 @@ static int interior_residuals(
 {
     hsep_real r_p, beyond;
     hsep_splines_rows(splines, a->x, self->first, a->slacks.Ax);
-    const hsep_real mu = hsep_slacks_residuals(&a->slacks, &r_p, &beyond);
+    const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
         memcpy(a->inner, a->x, (size_t)a->n * sizeof(hsep_real));
@@ -222,10 +450,10 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    const hsep_real mu = self->mu, ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
-    hsep_slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
+    const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
+    slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
     interior_direction(&a, splines, self->first);
-    const hsep_real alpha = hsep_slacks_move(&a.slacks);
+    const hsep_real alpha = slacks_move(&a.slacks);
     for (hsep_int j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];
     }
