@@ -7,8 +7,8 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Slacks and multipliers of the bounds  low <= A x <= high, row by row. Side 0 are the lower bounds, B x >= b with B = A
- * and b = low, side 1 the upper ones, B = -A and b = -high. A proximal term rho regularises the multipliers:
+/* Slacks and multipliers of the bounds  low <= A x <= high, row by row. Side 0 are the lower bounds, B x >= b with
+ * B = A and b = low, side 1 the upper ones, B = -A and b = -high. A proximal term rho regularises the multipliers:
  * ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z). */
 
 /* One side of the bounds, all (4 preview,): slack s = B x - b and multiplier z, both > 0. */
