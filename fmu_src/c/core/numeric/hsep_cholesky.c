@@ -128,14 +128,7 @@ HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_int n, hsep_int 
             const cholesky_reflection h = cholesky_reflect(row[0], x + k, 0, 1);
             const hsep_real v = h.v[0], tau = h.tau;
             hsep_real *restrict r = row, *restrict y = x + k;
-            hsep_int j = 1;
-            for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
-                hsep_lanes *to = hsep_lanes_at(r + j), *from = hsep_lanes_at(y + j);
-                const hsep_lanes w = tau * (*to + v * *from);
-                *to = w - *to;
-                *from -= v * w;
-            }
-            for (; j < length; j++) {
+            for (hsep_int j = 1; j < length; j++) {
                 const hsep_real w = tau * (r[j] + v * y[j]);
                 r[j] = w - r[j];
                 y[j] -= v * w;
@@ -151,7 +144,8 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_int n, hsep_int
     hsep_real *row = triangle;
     for (hsep_int k = 0; k < n; k++) {
         const hsep_int length = n - k;
-        hsep_real *x0 = x + k, *x1 = x0 + n, *x2 = x1 + n, *x3 = x2 + n;
+        hsep_real *restrict r = row, *restrict x0 = x + k, *restrict x1 = x0 + n;
+        hsep_real *restrict x2 = x1 + n, *restrict x3 = x2 + n;
         if (k >= head) {
             const hsep_real a[4] = {-x0[0], -x1[0], -x2[0], -x3[0]};
             const hsep_real *const all[4] = {x0, x1, x2, x3};
@@ -159,20 +153,9 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_int n, hsep_int
         } else {
             const cholesky_reflection h = cholesky_reflect(row[0], x0, n, 4);
             const hsep_real v0 = h.v[0], v1 = h.v[1], v2 = h.v[2], v3 = h.v[3], tau = h.tau;
-            hsep_int j = 1;
-            for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
-                hsep_lanes *to = hsep_lanes_at(row + j), *y0 = hsep_lanes_at(x0 + j), *y1 = hsep_lanes_at(x1 + j);
-                hsep_lanes *y2 = hsep_lanes_at(x2 + j), *y3 = hsep_lanes_at(x3 + j);
-                const hsep_lanes w = tau * (*to + ((v0 * *y0 + v1 * *y1) + (v2 * *y2 + v3 * *y3)));
-                *to = w - *to;
-                *y0 -= v0 * w;
-                *y1 -= v1 * w;
-                *y2 -= v2 * w;
-                *y3 -= v3 * w;
-            }
-            for (; j < length; j++) {
-                const hsep_real w = tau * (row[j] + ((v0 * x0[j] + v1 * x1[j]) + (v2 * x2[j] + v3 * x3[j])));
-                row[j] = w - row[j];
+            for (hsep_int j = 1; j < length; j++) {
+                const hsep_real w = tau * (r[j] + ((v0 * x0[j] + v1 * x1[j]) + (v2 * x2[j] + v3 * x3[j])));
+                r[j] = w - r[j];
                 x0[j] -= v0 * w, x1[j] -= v1 * w, x2[j] -= v2 * w, x3[j] -= v3 * w;
             }
             row[0] = h.norm;

@@ -33,18 +33,7 @@ static void gram_add_row(
     const hsep_real *restrict x1, const hsep_real *restrict x2, const hsep_real *restrict x3, hsep_int n)
 {
     const hsep_real a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
-    hsep_int j = 0;
-    for (; j + HSEP_LANES <= n; j += HSEP_LANES) {
-        hsep_lanes *sum = hsep_lanes_at(sums + j), *carry = hsep_lanes_at(carries + j);
-        const hsep_lanes before = *sum;
-        const hsep_lanes change = ((a0 * *hsep_lanes_const(x0 + j) + a1 * *hsep_lanes_const(x1 + j)) +
-                                   (a2 * *hsep_lanes_const(x2 + j) + a3 * *hsep_lanes_const(x3 + j))) +
-                                  *carry;
-        const hsep_lanes after = before + change;
-        *carry = change - (after - before);
-        *sum = after;
-    }
-    for (; j < n; j++) {
+    for (hsep_int j = 0; j < n; j++) {
         const hsep_real before = sums[j];
         const hsep_real change = ((a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j])) + carries[j];
         const hsep_real after = before + change;
