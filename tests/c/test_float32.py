@@ -17,8 +17,9 @@ from benchmarks.targets.cases import KINDS, OUTPUTS, Case, header, recorded
 from benchmarks.targets.targets import FLOAT32, HERE, TARGETS, Replay, build, core_sources, replay
 
 SIZES = [(20, 20), (100, 50)]
-AGREES = 5e-3
-"""Relative difference of the RMS of predictions' errors that the README states for the paper's drive."""
+AGREES, AGREES_PLANNED = 5e-3, 1e-2
+"""Relative difference of the RMS of predictions' errors that the README states for the paper's drive, without a
+compensator and behind one, whose bounded plans differ."""
 
 
 def options(*, single: bool) -> list[str]:
@@ -98,7 +99,8 @@ def test_a_processor_without_doubles_predicts_as_well(
     machine = target_or_skip("m4f-float32")
     there = replay(machine, build(machine, case, tmp_path / "there"), count=False)
     assert there.began == 0
-    assert error(case, there) == pytest.approx(errors(case, False)[0], rel=AGREES)
+    agrees = AGREES_PLANNED if kind == "compensator" else AGREES
+    assert error(case, there) == pytest.approx(errors(case, False)[0], rel=agrees)
 
 
 @pytest.mark.nightly

@@ -253,6 +253,7 @@ def with_fmucontainer(system: ClosedSystem, folder: Path, *, sequential: bool = 
         "start": [[fmu_of[system.look_ahead], "measurement_delay", -1]] if sequential else [],
         "link": [[fmu_of[a], output, fmu_of[b], name] for a, output, b, name in system.connections],
         "output": [[fmu_of[component], name, name] for component, name in system.observed],
+        "auto_output": False,  # of FMI 3.0 it knows no arrays that a structural parameter sizes
         "step_size": STEP,
     }
     (folder / "container.json").write_text(json.dumps(description))
