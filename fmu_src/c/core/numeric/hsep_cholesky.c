@@ -37,9 +37,8 @@ static int cholesky_panel(
         if (r >= 4) {
             hsep_take_four(rows[r], a, x, length - r);
         }
-        if (r % 4 > 0) {
-            const hsep_int few = r - r % 4;
-            hsep_take_few(rows[r], a + few, x + few, r % 4, length - r);
+        for (hsep_int above = r - r % 4; above < r; above++) {
+            hsep_axpy(rows[r], -a[above], x[above], length - r);
         }
         if (!cholesky_pivot(rows[r], length - r, least != NULL ? least + r : NULL)) {
             return 0;

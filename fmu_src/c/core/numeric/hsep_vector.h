@@ -119,17 +119,4 @@ static inline void hsep_take_eight(hsep_real *restrict y, const hsep_real a[8], 
     }
 }
 
-/* The same over one, two or three arrays. */
-static inline void hsep_take_few(
-    hsep_real *restrict y, const hsep_real a[], const hsep_real *const x[], hsep_int count, hsep_int n)
-{
-    hsep_axpy(y, -a[0], x[0], n);
-    if (count > 1) {
-        const hsep_real a1 = a[1], a2 = count > 2 ? a[2] : 0.0, *x1 = x[1], *x2 = count > 2 ? x[2] : x1;
-        for (hsep_int j = 0; j < n; j++) {
-            y[j] = (y[j] - a1 * x1[j]) - a2 * x2[j];
-        }
-    }
-}
-
 #endif
