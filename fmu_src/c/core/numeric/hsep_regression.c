@@ -1,10 +1,26 @@
 #include "hsep_regression.h"
 
 #include "hsep_math.h"
-#include "hsep_tiles.h"
 
 #include <stddef.h>
 #include <string.h>
+
+/* The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
+ * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
+ * vectors of a tile's rows without knowing how long they are. Columns behind the target are 0 for ever.
+ * Each tile is followed by its carry: the rounding errors of its entries, to be added back with the next row. Without
+ * it an entry drifts at random, by half a unit in its last place a row. */
+#define REGRESSION_TILE 4
+#define REGRESSION_TILE_ENTRIES 16 /* of a tile */
+#define REGRESSION_TILE_STRIDE 32  /* numbers from tile to tile: the entries, then their carries */
+
+/* Entry (i, j), i <= j, of [U z]. */
+static hsep_real *regression_entry(hsep_regression *self, hsep_int i, hsep_int j)
+{
+    const hsep_int row = i / REGRESSION_TILE, column = j / REGRESSION_TILE;
+    const hsep_int tile = row * self->n_tiles - row * (row + 1) / 2 + column; /* fewer by one in each row of them */
+    return hsep_at(self, self->tiles) + REGRESSION_TILE_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
+}
 
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 
@@ -13,11 +29,11 @@ static hsep_real regression_lay_out(hsep_regression *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_regression);
     self->n = n;
-    self->n_tiles = n / HSEP_TILE + 1;
+    self->n_tiles = n / REGRESSION_TILE + 1;
     const hsep_real n_tiles = (hsep_real)self->n_tiles;
-    self->inverse_d = hsep_take(&end, HSEP_TILE * n_tiles);
-    self->row = hsep_take(&end, HSEP_TILE * n_tiles);
-    self->tiles = hsep_take(&end, HSEP_TILE_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
+    self->inverse_d = hsep_take(&end, REGRESSION_TILE * n_tiles);
+    self->row = hsep_take(&end, REGRESSION_TILE * n_tiles);
+    self->tiles = hsep_take(&end, REGRESSION_TILE_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
     return end * sizeof(hsep_real);
 }
 
@@ -29,7 +45,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real 
     (void)regression_lay_out(self, n);
     for (hsep_int i = 0; i < n; i++) {
         hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
-        *hsep_regression_entry(self, i, i) = 1.0;
+        *regression_entry(self, i, i) = 1.0;
     }
 }
 
@@ -47,7 +63,7 @@ static inline void regression_add(hsep_real *restrict u, hsep_real *restrict car
  * Written out, as regression_add has it, for compilers to make vectors of it. */
 static inline void regression_four(hsep_real *restrict u, hsep_real *restrict x, hsep_real pivot, hsep_real gain)
 {
-    hsep_real *restrict carry = u + HSEP_TILE_ENTRIES;
+    hsep_real *restrict carry = u + REGRESSION_TILE_ENTRIES;
     const hsep_real u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
     const hsep_real x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
     const hsep_real c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
@@ -65,7 +81,7 @@ static inline void regression_sweep(
 {
     const hsep_real p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
     const hsep_real g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
-    for (hsep_int t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+    for (hsep_int t = 0; t < n; t++, tile += REGRESSION_TILE_STRIDE, x += 4) {
         hsep_real y[4] = {x[0], x[1], x[2], x[3]};
         regression_four(tile, y, p0, g0);
         regression_four(tile + 4, y, p1, g1);
@@ -81,7 +97,7 @@ static void regression_sweep_large(
     hsep_real *restrict tile, hsep_real *restrict x, hsep_int n, const hsep_real pivot[4], const hsep_real gain[4],
     const hsep_real keep[4], const int large[4])
 {
-    for (hsep_int t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+    for (hsep_int t = 0; t < n; t++, tile += REGRESSION_TILE_STRIDE, x += 4) {
         for (int r = 0; r < 4; r++) {
             hsep_real *restrict u = tile + 4 * r;
             if (!large[r]) {
@@ -92,7 +108,7 @@ static void regression_sweep_large(
             const hsep_real u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3], x0 = x[0], x1 = x[1], x2 = x[2], x3 = x[3];
             u[0] = k * u0 + g * x0, u[1] = k * u1 + g * x1, u[2] = k * u2 + g * x2, u[3] = k * u3 + g * x3;
             x[0] = x0 - p * u0, x[1] = x1 - p * u1, x[2] = x2 - p * u2, x[3] = x3 - p * u3;
-            memset(u + HSEP_TILE_ENTRIES, 0, 4 * sizeof(hsep_real));
+            memset(u + REGRESSION_TILE_ENTRIES, 0, 4 * sizeof(hsep_real));
         }
     }
 }
@@ -101,7 +117,7 @@ static void regression_sweep_large(
 static void regression_rotate(
     hsep_real *tile, int place, hsep_real *x, hsep_real pivot, hsep_real gain, hsep_real keep, int large)
 {
-    hsep_real *u = &tile[place], *carry = &tile[HSEP_TILE_ENTRIES + place];
+    hsep_real *u = &tile[place], *carry = &tile[REGRESSION_TILE_ENTRIES + place];
     const hsep_real before = *x;
     *x = before - pivot * *u;
     if (large) {
@@ -125,7 +141,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
     hsep_real v = 1.0;
     hsep_int rows = self->n;
     for (hsep_int left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
-        const unsigned height = rows < HSEP_TILE ? (unsigned)rows : HSEP_TILE;
+        const unsigned height = rows < REGRESSION_TILE ? (unsigned)rows : REGRESSION_TILE;
         rows -= height;
         hsep_real pivot[4], gain[4], keep[4];
         int large[4], any_large = 0;
@@ -144,13 +160,13 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
             }
         }
         if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
-            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
+            regression_sweep(tile + REGRESSION_TILE_STRIDE, x + 4, left - 1, pivot, gain);
         } else if (left > 1) {
-            regression_sweep_large(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, keep, large);
+            regression_sweep_large(tile + REGRESSION_TILE_STRIDE, x + 4, left - 1, pivot, gain, keep, large);
         } else {
             self->residual_sum += x[height] * (x[height] / v); /* rho'^2 = rho^2 + x_n^2 / v */
         }
-        tile += HSEP_TILE_STRIDE * left;
+        tile += REGRESSION_TILE_STRIDE * left;
     }
     self->n_rows += 1.0;
 }
@@ -158,24 +174,26 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
     const hsep_int n = self->n, n_tiles = self->n_tiles;
-    const hsep_real *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
+    const hsep_real *tile = hsep_at_const(self, self->tiles) + REGRESSION_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
     for (hsep_int band = n_tiles; band-- > 0;) {
-        const hsep_int first = HSEP_TILE * band, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
-        tile -= HSEP_TILE_STRIDE * (n_tiles - band);
+        const hsep_int first = REGRESSION_TILE * band,
+                       height = n - first < REGRESSION_TILE ? n - first : REGRESSION_TILE;
+        tile -= REGRESSION_TILE_STRIDE * (n_tiles - band);
         hsep_real sum[4] = {0.0, 0.0, 0.0, 0.0};
-        const hsep_real *t = tile + HSEP_TILE_STRIDE;
-        for (hsep_int j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
+        const hsep_real *t = tile + REGRESSION_TILE_STRIDE;
+        for (hsep_int j = first + 4; j + 4 <= n;
+             j += 4, t += REGRESSION_TILE_STRIDE) { /* tiles that are all features */
             for (int r = 0; r < 4; r++) {
                 sum[r] += t[4 * r] * w[j] + t[4 * r + 1] * w[j + 1] + t[4 * r + 2] * w[j + 2] + t[4 * r + 3] * w[j + 3];
             }
         }
         for (hsep_int r = height; r-- > 0;) {
             /* w_r = z_r - sum_j>r u_rj w_j: the target's tile has the last features and z, and may be this one. */
-            const hsep_real *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
-            hsep_real w_r = last[n % HSEP_TILE] - sum[r];
-            for (hsep_int c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
-                w_r -= last[c] * w[n - n % HSEP_TILE + c];
+            const hsep_real *last = tile + REGRESSION_TILE_STRIDE * (n_tiles - 1 - band) + 4 * r;
+            hsep_real w_r = last[n % REGRESSION_TILE] - sum[r];
+            for (hsep_int c = 0; height == REGRESSION_TILE && c < n % REGRESSION_TILE; c++) {
+                w_r -= last[c] * w[n - n % REGRESSION_TILE + c];
             }
             for (hsep_int c = r + 1; c < height; c++) {
                 w_r -= tile[4 * r + c] * w[first + c];
@@ -195,8 +213,8 @@ HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i)
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / hsep_fmax(row[0] * row[0], regression_lambda_min);
     for (hsep_int j = i + 1; j <= n; j++) {
-        hsep_real *entry = hsep_regression_entry(self, i, j);
+        hsep_real *entry = regression_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
-        entry[HSEP_TILE_ENTRIES] = 0.0;
+        entry[REGRESSION_TILE_ENTRIES] = 0.0;
     }
 }

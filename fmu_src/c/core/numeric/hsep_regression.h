@@ -16,7 +16,6 @@
 #include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_real.h"
-#include "hsep_tiles.h"
 
 typedef struct {
     hsep_int n;             /* features */
@@ -51,16 +50,5 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Cost: n divisions. */
 HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i);
-
-/* Entry (i, j), i <= j, of [U z]. */
-static inline const hsep_real *hsep_regression_entry_const(const hsep_regression *self, hsep_int i, hsep_int j)
-{
-    return hsep_at_const(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
-}
-
-static inline hsep_real *hsep_regression_entry(hsep_regression *self, hsep_int i, hsep_int j)
-{
-    return hsep_at(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
-}
 
 #endif
