@@ -7,7 +7,6 @@
  */
 #include "hsep.h"
 
-#include "hsep_constraints.h"
 #include "hsep_paper.h"
 #include "hsep_parameters.h"
 #include "hsep_planner.h"
@@ -151,10 +150,10 @@ void prove_constraints(void)
     fill(x_d, PREVIEW - SHORT);
     fill(from, HSEP_ORDERS * PREVIEW);
     fill(way, HSEP_ORDERS * PREVIEW);
-    hsep_constraints_total(planner, x_d);
-    hsep_constraints_range(planner, (uint64_t)Frama_C_interval(0, HSEP_ORDERS * PREVIEW - 1), &least, &most);
-    (void)hsep_constraints_share(planner, from, way);
-    (void)hsep_constraints_allow(planner, way);
+    hsep_planner_total(planner, x_d);
+    hsep_planner_range(planner, (uint64_t)Frama_C_interval(0, HSEP_ORDERS * PREVIEW - 1), &least, &most);
+    (void)hsep_planner_share(planner, from, way);
+    (void)hsep_planner_allow(planner, way);
 }
 
 /* Parameters of any bits, NaN among them, are judged. Eva cannot see that spacing is judged before it divides, so

@@ -1,7 +1,6 @@
 #include "hsep_planner.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_constraints.h"
 #include "hsep_math.h"
 
 #include <stddef.h>
@@ -67,6 +66,84 @@ HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_int k)
     return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_N_DECIDED, k);
 }
 
+HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int preview = splines->preview;
+    hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
+    hsep_real last = self->x_d_before[2];
+    hsep_real before[HSEP_ORDERS]; /* differences of orders 0 to 2 at the sample before */
+    hsep_real y[3];
+    for (int i = 0; i < 3; i++) {
+        y[i] = self->x_d_before[i] + self->delta_before[i];
+    }
+    before[0] = y[2];
+    before[1] = y[2] - y[1];
+    before[2] = (y[2] - y[1]) - (y[1] - y[0]);
+    for (hsep_int k = 0; k < preview; k++) {
+        const hsep_real delta = hsep_planner_delta(self, k), step = x_d[k] - last;
+        hsep_real now[HSEP_ORDERS];
+        last = x_d[k];
+        moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
+        now[0] = x_d[k] + delta;
+        total[k] = delta * splines->share[0];
+        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+            now[order] = now[order - 1] - before[order - 1];
+            total[order * preview + k] = now[order] * splines->share[order];
+        }
+        for (unsigned order = 0; order < HSEP_ORDERS - 1; order++) {
+            before[order] = now[order];
+        }
+    }
+}
+
+HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
+{
+    const hsep_int preview = hsep_planner_splines(self)->preview;
+    const hsep_real total = hsep_at_const(self, self->total)[r];
+    *most = 1.0 - HSEP_QP_ROUNDING;
+    *least = -*most;
+    if (r >= preview && r < 2 * preview) { /* velocities */
+        const hsep_real moves = hsep_at_const(self, self->moves)[r - preview];
+        *least = moves > 0.0 ? 0.0 : *least;
+        *most = moves < 0.0 ? 0.0 : *most;
+    }
+    *least = hsep_fmin(*least, total - HSEP_QP_INTERIOR);
+    *most = hsep_fmax(*most, total + HSEP_QP_INTERIOR);
+}
+
+HSEP_API hsep_real hsep_planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
+{
+    const hsep_real *total = hsep_at_const(self, self->total);
+    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
+    hsep_real share = 1.0;
+    for (hsep_int r = 0; r < rows; r++) {
+        hsep_real least, most;
+        hsep_planner_range(self, r, &least, &most);
+        const hsep_real here = total[r] + from[r];
+        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - here : here - least;
+        if (to > HSEP_QP_ROUNDING && room < share * to) {
+            share = room / to;
+        }
+    }
+    return share;
+}
+
+HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[])
+{
+    const hsep_real *total = hsep_at_const(self, self->total);
+    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
+    for (hsep_int r = 0; r < rows; r++) {
+        const hsep_real there = total[r] + way[r];
+        hsep_real least, most;
+        hsep_planner_range(self, r, &least, &most);
+        if (!(there <= most && there >= least)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* The third differences of the first count splines of delta. */
 static void planner_third(hsep_planner *self, hsep_int count)
 {
@@ -97,7 +174,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     planner_third(self, HSEP_N_DECIDED);
-    hsep_constraints_total(self, x_d);
+    hsep_planner_total(self, x_d);
 }
 
 HSEP_API void hsep_planner_let_turn(hsep_planner *self)
@@ -165,7 +242,7 @@ static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
-        hsep_constraints_range(self, r, &least, &most);
+        hsep_planner_range(self, r, &least, &most);
         low[r] = least - other + margin;
         high[r] = most - other - margin;
     }
@@ -201,7 +278,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
         return HSEP_PLAN_FAILED;
     }
     hsep_splines_rows(splines, free_minimum, first, rows);
-    if (hsep_constraints_allow(self, rows)) {
+    if (hsep_planner_allow(self, rows)) {
         for (hsep_int j = 0; j < n; j++) {
             rest[j] += free_minimum[j];
         }
@@ -250,7 +327,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     if (isfinite(finite)) { /* bounds that are exceeded, as steps are limited, are so by little */
         hsep_splines_rows(splines, way, self->n_pinned, rows);
         hsep_splines_rows(splines, at, self->n_pinned, from);
-        const hsep_real share = hsep_constraints_share(self, from, rows);
+        const hsep_real share = hsep_planner_share(self, from, rows);
         for (hsep_int j = 0; j < n; j++) {
             rest[j] += at[j] + share * way[j];
         }

@@ -13,7 +13,7 @@
 
 #include "hsep_api.h"
 #include "hsep_interior.h"
-#include "hsep_plan.h"
+#include "hsep_layout.h"
 #include "hsep_real.h"
 #include "hsep_splines.h"
 
@@ -26,6 +26,37 @@ typedef struct {
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
     hsep_int pinned;              /* samples that follow the last plan, or Np / 2 if less */
 } hsep_planner_parameters;
+
+typedef struct {
+    hsep_int Np;
+    hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
+    hsep_int no_reversal;
+    hsep_real jerk_weight;
+    hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
+    /* Offsets in words from the beginning of the struct */
+    hsep_int c;      /* (3 + n,) m, coefficients */
+    hsep_int total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
+    hsep_int moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
+    hsep_int third;  /* (preview,) m, third differences of what is decided */
+    hsep_int P;      /* triangle of n rows */
+    hsep_int factor; /* triangle of n rows */
+    hsep_int splines, interior;
+} hsep_planner;
+
+HSEP_ASSERT_WORDS(hsep_planner, 18);
+
+/* The splines of a plan; hsep_splines_shape is to be filtered. */
+static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
+{
+    return (const hsep_splines *)hsep_at_const(self, self->splines);
+}
+
+/* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
+static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_int k)
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_N_DECIDED + splines->n, k);
+}
 
 typedef enum {
     HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
@@ -95,5 +126,21 @@ HSEP_API int hsep_planner_advance(hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
+
+/* The drive's limits as linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
+
+/* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
+HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[]);
+
+/* Bounds of a row, in shares. The remainder of the last plan is always feasible, with a small margin: an
+ * interior-point method needs an interior. */
+HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most);
+
+/* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
+ * remainder and from. */
+HSEP_API hsep_real hsep_planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[]);
+
+/* Whether the remainder and a step with rows way are feasible. */
+HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[]);
 
 #endif
