@@ -177,13 +177,11 @@ static void splines_sort(const hsep_splines *self, const hsep_real weights[], hs
 
 /* sums, (count,), count <= SPLINES_TOGETHER: products of splines i ... i + count - 1, each with the spline d behind it.
  * sorted: (4, preview). */
-static void splines_products(
+static inline void splines_products(
     const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int count, hsep_int d, hsep_real sums[])
 {
     const hsep_int spacing = self->spacing;
-    hsep_lanes acc[SPLINES_TOGETHER / HSEP_LANES];
-    memset(sums, 0, SPLINES_TOGETHER * sizeof *sums);
-    memcpy(acc, sums, sizeof acc);
+    hsep_real acc[SPLINES_TOGETHER] = {0.0};
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_real *e = splines_differences(self, order);
         const hsep_int length = splines_length(self, order);
@@ -195,22 +193,14 @@ static void splines_products(
                     continue;
                 }
                 const hsep_real product = e[k] * e[k - d * spacing];
-                if (count == SPLINES_TOGETHER) {
-                    for (int l = 0; l < SPLINES_TOGETHER / HSEP_LANES; l++) {
-                        acc[l] += product * hsep_lanes_const(weight + m)[l];
-                    }
-                } else {
-                    for (hsep_int l = 0; l < count; l++) {
-                        sums[l] += product * weight[m + l];
-                    }
+                for (hsep_int l = 0; l < count; l++) {
+                    acc[l] += product * weight[m + l];
                 }
             }
             begin += (self->preview - phase - 1) / spacing + 1;
         }
     }
-    if (count == SPLINES_TOGETHER) {
-        memcpy(sums, acc, sizeof acc);
-    }
+    memcpy(sums, acc, sizeof acc);
 }
 
 HSEP_API void hsep_splines_gram(
@@ -225,7 +215,11 @@ HSEP_API void hsep_splines_gram(
         hsep_real *entry = triangle + d;
         for (hsep_int i = 0; i + d < n; i += SPLINES_TOGETHER) {
             const hsep_int left = n - d - i, count = left < SPLINES_TOGETHER ? left : SPLINES_TOGETHER;
-            splines_products(self, work, first + i, count, d, sums);
+            if (count == SPLINES_TOGETHER) { /* of known length: registers */
+                splines_products(self, work, first + i, SPLINES_TOGETHER, d, sums);
+            } else {
+                splines_products(self, work, first + i, count, d, sums);
+            }
             for (hsep_int l = 0; l < count; l++) {
                 *entry += sums[l];
                 entry += n - (i + l);
