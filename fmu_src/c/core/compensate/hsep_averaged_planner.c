@@ -1,6 +1,5 @@
 #include "hsep_averaged_planner.h"
 
-#include "hsep_cholesky.h"
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
