@@ -22,15 +22,7 @@ from ..logs.log import read_log
 if TYPE_CHECKING:
     import ruckig
 
-__all__ = [
-    "PAPER_LIMITS",
-    "along_path",
-    "archimedean_spiral",
-    "read_trajectory",
-    "rest_to_rest",
-    "spiral",
-    "staircase",
-]
+__all__ = ["PAPER_LIMITS", "along_path", "archimedean_spiral", "read_trajectory", "rest_to_rest", "spiral", "staircase"]
 
 Curve = Callable[[Array], Array]
 
