@@ -74,5 +74,5 @@ class LookAheadSlave(TableSlave):
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
         *others, x_meas = meta["inputs"]
-        self.inputs = LookAheadInputs.from_state([*others, math.nan if meta["missing"] else x_meas])
-        self.look_ahead = LookAhead.from_bytes(blob, self.model_type)
+        inputs = LookAheadInputs.from_state([*others, math.nan if meta["missing"] else x_meas])
+        self.look_ahead, self.inputs = LookAhead.from_bytes(blob, self.model_type), inputs

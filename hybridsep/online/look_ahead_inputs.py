@@ -31,8 +31,6 @@ class LookAheadInputs:
         If samples cannot be counted from ``t_start``.
     """
 
-    STATE_SIZE = len(SampleClock._fields) + 2
-
     def __init__(self, t_start: float, T_s: float, start: float) -> None:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
