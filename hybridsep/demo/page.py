@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.metrics import shown_figure
-from ..evaluate.report import Report
+from ..evaluate.html_report import Report
 
 __all__ = ["PRINTED", "Table", "compensation_table", "prediction_table", "write_page"]
 

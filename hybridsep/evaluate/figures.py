@@ -26,7 +26,7 @@ from ..cosim.contour import Contour
 from ..cosim.run import Run
 from ..logs.units import DisplayUnits, shown_in
 from ..online.look_ahead import SepState
-from .report import HOLD, HYBRID, PHYSICS
+from .html_report import HOLD, HYBRID, PHYSICS
 
 __all__ = ["CASES", "contour_figure", "prediction_figure", "save_figure", "tracking_figure"]
 

@@ -12,7 +12,7 @@ from scipy.signal import welch
 
 from ..base.metrics import coverage
 from ..base.signals import Array
-from ..evaluate.report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
+from ..evaluate.html_report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..evaluate.reversals import friction_table, reversal_curve
 from ..identify.model import IdentifiedModel
 from ..identify.validation import FrequencyResponse, ResidualTest, frequency_response, model_response, residual_test

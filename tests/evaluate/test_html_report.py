@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsep.evaluate.report import Chart, Line, Report, drawn_places
+from hybridsep.evaluate.html_report import Chart, Line, Report, drawn_places
 
 
 class Tags(HTMLParser):
