@@ -169,7 +169,8 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
 
     They begin where the log began, as stiffness and what is learned of the position count from there.
     """
-    found = max((one.x_d for one in recordings), key=lambda x_d: float(np.abs(np.diff(x_d)).sum()))
+    distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
+    found = recordings[distances.index(max(distances))].x_d
     moving = np.flatnonzero(np.diff(found))
     found = found[max(int(moving[0]) - _LEAD_IN, 0) if len(moving) else 0 :][:_TRIED_MAX]
     steps = np.abs(np.diff(found))

@@ -72,7 +72,7 @@ def test_both_implementations_move_the_same() -> None:
     core.initialise(0.0)
     model = ModalModel([Mode(**mode) for mode in c_core.STAGE_MODES])
     drive = StageDrive(model, values["f"], values["kappa"], values["T_s"], "motion")
-    for k, x_d in enumerate(spiral()[0][:150].tolist()):
+    for k, x_d in enumerate(spiral()[0][:90].tolist()):
         core["x_d"] = x_d
         core.step(k * TS, TS)
         drive.step(x_d, TS)

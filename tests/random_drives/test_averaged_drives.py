@@ -14,7 +14,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-N, N_INTERVALS = 16, 8
+N, N_INTERVALS = 10, 8
 
 
 @dataclass

@@ -89,6 +89,7 @@ def environment(tmp_path: Path, scripts: Path) -> dict[str, str]:
     return {**kept, "PATH": str(scripts), "HOME": str(tmp_path), "USERPROFILE": str(tmp_path), "COLUMNS": "200"}
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_the_wheel_follows_from_the_sdist(archives: Path, tmp_path: Path) -> None:
     (wheel,) = (archives / "wheel").iterdir()
@@ -105,6 +106,7 @@ def test_the_wheel_follows_from_the_sdist(archives: Path, tmp_path: Path) -> Non
     assert not [name for name in names if "__pycache__" in name or name.startswith("tests/")]
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_the_wheel_runs_without_a_compiler(scripts: Path, environment: dict[str, str], tmp_path: Path) -> None:
     def hybridsep(*arguments: object) -> str:
