@@ -77,50 +77,55 @@ def print_judged(judged: Judged, title: str, verdict: str) -> None:
         console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
-def print_run(run: Run, as_json: bool, title: str, limits: Mapping[str, Any] | None = None) -> None:
-    """Print the figures of a run: prediction errors, or tracking errors and what ``limits`` says binds them."""
+def print_run(run: Run, as_json: bool, title: str, unit: str, limits: Mapping[str, Any] | None = None) -> None:
+    """Print the figures of a run of positions in ``unit``, m or rad; of ``limits`` what binds the command."""
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
+    from ..logs.units import shown_in
 
     summary = run.summary()
-    if run.kind != PREDICTOR:
-        _print_tracking(summary, as_json, title, limits)
-        return
     if as_json:
-        print_json({**summary, "verdict": str(verdict_of(run))})
+        named = {name.replace("_um", f"_u{unit}").replace("_m_s", f"_{unit}_s"): one for name, one in summary.items()}
+        print_json({**named, **({"verdict": str(verdict_of(run))} if run.kind == PREDICTOR else limits or {})})
         return
-    table = Table("", title=f"{title}: prediction error in µm against the measured position", box=box.SIMPLE)
+    if run.kind != PREDICTOR:
+        _print_tracking(summary, title, unit, limits)
+        return
+    scale, shown = shown_in(unit).error(1e-6 * summary["rms_pb_um"])
+    table = Table("", title=f"{title}: prediction error in {shown} against the measured position", box=box.SIMPLE)
     for column in ("physics", "hold", "hybrid", "× hold"):
         table.add_column(column, justify="right", no_wrap=True)
     for label, size in (("RMS", "rms"), ("largest", "max")):
-        figures = [summary[f"{size}_{name}_um"] for name in ("pb", "hold", "h")]
+        figures = [1e-6 * scale * summary[f"{size}_{name}_um"] for name in ("pb", "hold", "h")]
         table.add_row(label, *map(shown_figure, figures), shown_figure(rms_ratio(figures[2], figures[1])))
     console.print(table)
     console.print(str(verdict_of(run)))
 
 
 def _print_tracking(
-    summary: Mapping[str, float | int], as_json: bool, title: str, limits: Mapping[str, Any] | None
+    summary: Mapping[str, float | int], title: str, unit: str, limits: Mapping[str, Any] | None
 ) -> None:
     """Print tracking errors, change of the command and its peaks."""
     from ..fitting.compensation import binding_words
+    from ..logs.units import shown_in
 
-    if as_json:
-        print_json({**summary, **(limits or {})})
-        return
+    factor, position = shown_in(unit).position
+    scale, shown = shown_in(unit).error(1e-6 * summary["tracking_rms_um"])
     table = Table(title=title)
-    for column in ("", "RMS [µm]", "max [µm]"):
+    for column in ("", f"RMS [{shown}]", f"max [{shown}]"):
         table.add_column(column, justify="right" if column else "left")
     for name, label in (
         ("tracking", "tracking error, true position"),
         ("tracking_measured", "tracking error, measured position"),
         ("change", "change of the command"),
     ):
-        table.add_row(label, *(shown_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
+        figures = (1e-6 * scale * summary[f"{name}_{quantity}_um"] for quantity in ("rms", "max"))
+        table.add_row(label, *map(shown_figure, figures))
     console.print(table)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(
-        f"command to the drive: at most {1e3 * peaks[0]:.1f} mm/s, {peaks[1]:.2f} m/s², {peaks[2]:.0f} m/s³\n"
+        f"command to the drive: at most {factor * peaks[0]:.1f} {position}/s, {peaks[1]:.2f} {unit}/s², "
+        f"{peaks[2]:.0f} {unit}/s³\n"
         f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
         f"not compensated {summary['share_off']:.1%}, tripped {summary['share_tripped']:.1%} of the samples"
     )

@@ -90,6 +90,7 @@ def cosim(
     if compensate is not None:
         check("compensate", compensate, label="--compensate")
     axis = load_machine(machine, entries or ())
+    shown = shown_in(axis.unit)
     model = "HybridPredictor" if compensate is None else "SepCompensator"
     trajectory, command = _command(trajectory, machine, axis, unit)
     flavour = default_flavour()
@@ -121,12 +122,13 @@ def cosim(
     if out is not None:
         run.save(out)
     if figure is not None and compensate is None:
-        prediction_figure(run, title, figure)
+        prediction_figure(run, title, figure, shown)
     elif figure is not None:
-        tracking_figure({str(compensate): run}, title, figure)
-    print_run(run, as_json, title, None if limits is None else {"limits_that_bind": limits, "limit_costs": costs})
+        tracking_figure({str(compensate): run}, title, figure, shown)
+    bound = None if limits is None else {"limits_that_bind": limits, "limit_costs": costs}
+    print_run(run, as_json, title, axis.unit, bound)
     if not as_json:
-        for line in () if costs is None else costs.lines(shown_in(axis.unit), "--set drive_limits.{entry}="):
+        for line in () if costs is None else costs.lines(shown, "--set drive_limits.{entry}="):
             console.print(line)
         print_written(out, figure)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from .errors import ParameterError, brief
 
-__all__ = ["Parameter", "choice", "flag", "real", "whole"]
+__all__ = ["Parameter", "angular_unit", "choice", "flag", "real", "whole"]
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,25 @@ class Parameter:
         if not math.isfinite(number):
             raise ParameterError(f"{shown} must be finite, got {brief(value)}")
         return number
+
+
+_ANGULAR = {
+    "m": "rad",
+    "m2": "rad2",
+    "m/s": "rad/s",
+    "m/s2": "rad/s2",
+    "m/s3": "rad/s3",
+    "1/m": "1/rad",
+    "mm": "deg",
+    "um": "urad",
+    "mm/s": "deg/s",
+}
+"""Unit of a linear axis, or unit in which it is shown → unit of a rotary axis."""
+
+
+def angular_unit(unit: str | None) -> str | None:
+    """Return the unit of a rotary axis for the unit of a linear one; the same if it has no length."""
+    return _ANGULAR.get(unit, unit) if unit is not None else None
 
 
 def whole(default: int | None, minimum: int, maximum: int, description: str, **more: Any) -> Any:

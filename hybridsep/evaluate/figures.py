@@ -136,11 +136,14 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
     _legend_above(axes, handles)
 
 
-def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> None:
+def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:
     """Draw command, tracking error and change of the command of runs over the same command to a PNG.
 
-    They are by the keys of :data:`CASES`. Of one run alone, the spans are shaded that a lesser model planned.
+    They are by the keys of :data:`CASES`. Of one run alone, the spans are shaded that a lesser model planned. Positions
+    are in the units ``shown``, mm and µm if left out.
     """
+    shown = shown or shown_in("m")
+    (factor, position), (scale, unit) = shown.position, shown.small
     compensated = {key: run for key, run in runs.items() if key != "off"}
     enlarged = 0 < len(compensated) < len(runs)
     ratios = [1.0, 1.6, *([1.8] if enlarged else []), 1.5]
@@ -148,15 +151,15 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     panels: Sequence[Axes] = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     figure.suptitle(title)
     first = next(iter(runs.values()))
-    panels[0].plot(first.t - first.t[0], 1e3 * first.x_d, linewidth=1.2, color="black")
-    panels[0].set_ylabel("commanded\nposition [mm]")
-    _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs)
-    panels[1].set_ylabel("tracking error\nx_d − x [µm]")
+    panels[0].plot(first.t - first.t[0], factor * first.x_d, linewidth=1.2, color="black")
+    panels[0].set_ylabel(f"commanded\nposition [{position}]")
+    _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs, scale, unit)
+    panels[1].set_ylabel(f"tracking error\nx_d − x [{unit}]")
     if enlarged:
-        _draw_signals(panels[2], {key: run.error for key, run in compensated.items()}, runs)
-        panels[2].set_ylabel("tracking error,\nenlarged [µm]")
-    _draw_signals(panels[-1], {key: run.change for key, run in (compensated or runs).items()}, runs)
-    panels[-1].set_ylabel("change of command\nx_dm − x_d [µm]")
+        _draw_signals(panels[2], {key: run.error for key, run in compensated.items()}, runs, scale, unit)
+        panels[2].set_ylabel(f"tracking error,\nenlarged [{unit}]")
+    _draw_signals(panels[-1], {key: run.change for key, run in (compensated or runs).items()}, runs, scale, unit)
+    panels[-1].set_ylabel(f"change of command\nx_dm − x_d [{unit}]")
     panels[-1].set_xlabel("time [s]")
     handles = [*panels[1].get_lines(), *(_shade(panels[1:], first) if len(runs) == 1 else [])]
     figure.legend(
@@ -172,12 +175,12 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     save_figure(figure, path)
 
 
-def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, Run]) -> None:
-    """Draw one signal of each run in µm, labelled with the run's tracking error."""
+def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, Run], scale: float, unit: str) -> None:
+    """Draw one signal of each run in a unit of which ``scale`` are one m or rad, labelled with its tracking error."""
     for key, signal in signals.items():
         (label, color), run = CASES[key], runs[key]
-        label = f"{label}: {1e6 * rms(run.error):.1f} µm"
-        axes.plot(run.t - run.t[0], 1e6 * signal, linewidth=0.9, color=color, label=label)
+        label = f"{label}: {scale * rms(run.error):.1f} {unit}"
+        axes.plot(run.t - run.t[0], scale * signal, linewidth=0.9, color=color, label=label)
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:

@@ -25,8 +25,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..base.files import data_folder
+from ..base.parameters import angular_unit
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, FmuTable, Value, Variable, angular_unit
+from .variables import INTERPOLATED, FmuTable, Value, Variable
 
 __all__ = [
     "FMI_HEADERS",

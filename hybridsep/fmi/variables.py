@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from ..base.parameters import Parameter
+from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
 __all__ = [
@@ -24,7 +24,6 @@ __all__ = [
     "FmuTable",
     "Value",
     "Variable",
-    "angular_unit",
     "modes_from",
 ]
 
@@ -341,25 +340,6 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
     "ReferenceTrajectory": (),
 }
 """The first variables of each model: inputs that a native FMU extrapolates by their time derivative."""
-
-
-_ANGULAR = {
-    "m": "rad",
-    "m2": "rad2",
-    "m/s": "rad/s",
-    "m/s2": "rad/s2",
-    "m/s3": "rad/s3",
-    "1/m": "1/rad",
-    "mm": "deg",
-    "um": "urad",
-    "mm/s": "deg/s",
-}
-"""Unit of a linear axis, or unit in which it is shown → unit of a rotary axis."""
-
-
-def angular_unit(unit: str | None) -> str | None:
-    """Return the unit of a rotary axis for the unit of a linear one; the same if it has no length."""
-    return _ANGULAR.get(unit, unit) if unit is not None else None
 
 
 SAMPLES_TRAJECTORY = len(PARAMETERS["trajectory"].choices) - 1

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..base.settings import PARAMETERS
+from ..base.parameters import Parameter, angular_unit
+from ..base.settings import PARAMETERS, Limits
 from .machine import Machine
 
 __all__ = ["machine_text"]
@@ -20,32 +21,32 @@ def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: b
     ``comments`` are lines at its head; if it is ``annotated``, each entry says what it is, besides its unit.
     """
     head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
-    lines = _lines("", {**machine.table, "T_s": machine.T_s}, annotated, "")
+    declared = {**PARAMETERS, **Limits.parameters()}
+    words = {name: _words(one, machine.unit == "rad", annotated) for name, one in declared.items()}
+    lines = _lines("", {**machine.table, "T_s": machine.T_s}, words, "")
     return "\n".join([*head, *lines]).strip("\n") + "\n"
 
 
-def _lines(place: str, table: Mapping[str, Any], annotated: bool, heading: str) -> list[str]:
+def _lines(place: str, table: Mapping[str, Any], words: Mapping[str, str], heading: str) -> list[str]:
     """Return the lines of a table's own entries below its heading, then of the tables in it."""
     own, tables = [], []
     for name, value in table.items():
         inner = f"{place}.{name}" if place else name
         if isinstance(value, Mapping):
-            tables += _lines(inner, value, annotated, f"[{inner}]")
+            tables += _lines(inner, value, words, f"[{inner}]")
         elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
-            tables += [line for item in value for line in _lines(inner, item, annotated, f"[[{inner}]]")]
+            tables += [line for item in value for line in _lines(inner, item, words, f"[[{inner}]]")]
         else:
-            own.append(_with_comment(f"{name} = {_value(value)}", name, annotated))
+            line, said = f"{name} = {_value(value)}", words.get(name, "")
+            own.append(f"{line:<{_COLUMN}}# {said}" if said and "\n" not in line else line)
     return ["", heading, *own, *tables] if own and heading else [*own, *tables]
 
 
-def _with_comment(line: str, name: str, annotated: bool) -> str:
-    """Return an entry with its unit and, if it is annotated, its description."""
-    parameter = PARAMETERS.get(name)
-    if parameter is None or "\n" in line:
-        return line
-    parts = [parameter.unit] if parameter.kind is float and parameter.unit != "1" else []
-    parts += [parameter.description] if annotated else []
-    return f"{line:<{_COLUMN}}# {', '.join(parts)}" if parts else line
+def _words(parameter: Parameter, rotary: bool, annotated: bool) -> str:
+    """Return the unit of a parameter and, if it is annotated, its description."""
+    unit = (angular_unit(parameter.unit) or "") if rotary else parameter.unit
+    parts = [unit] if parameter.kind is float and unit != "1" else []
+    return ", ".join([*parts, *([parameter.description] if annotated else [])])
 
 
 def _value(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 from drawn import cut_off, figures_drawn, hiding_legends
 
+from hybridsep.app.console import print_run
 from hybridsep.cosim.contour import Contour
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
 from hybridsep.evaluate.figures import contour_figure, prediction_figure, tracking_figure
+from hybridsep.logs.units import shown_in
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.path import PlanarPath
 
@@ -55,3 +58,17 @@ def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
     for figure in drawn:
         assert cut_off(figure) == []
         assert hiding_legends(figure) == 0
+
+
+def test_a_rotary_axis_is_shown_in_angles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = made_run(COMPENSATOR, 300)
+    print_run(run, False, "Table", "rad")
+    print_run(made_run(PREDICTOR, 300), False, "Table", "rad")
+    said = capsys.readouterr().out
+    assert "RMS [µrad]" in said
+    assert re.search(r"at most 60\.0 mrad/s, \S+ rad/s², \S+ rad/s³", said)
+    assert "prediction error in µrad" in said
+    with figures_drawn() as drawn:
+        tracking_figure({"hybrid": run}, "Table", tmp_path / "a.png", shown_in("deg"))
+    labels = [axes.get_ylabel().partition("[")[2] for axes in drawn[0].axes]
+    assert labels == ["deg]", "mdeg]", "mdeg]"]
