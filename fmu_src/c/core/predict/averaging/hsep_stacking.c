@@ -12,89 +12,82 @@ HSEP_API void hsep_stack_init(hsep_stack *self)
     }
 }
 
-/* Solve A [u v] = [a b] for n unknowns, A positive definite; it is used up. */
-static void stack_solve(
-    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], hsep_real u[HSEP_N_EXPERTS], hsep_real v[HSEP_N_EXPERTS], int n)
+/* Support of weights, with R' R = H on it: R' is lower triangular, z = R'^-1 l, ones = R'^-1 1. A support that has one
+ * more keeps what was before it. */
+typedef struct {
+    int places[HSEP_N_EXPERTS];
+    hsep_real rows[HSEP_N_EXPERTS][HSEP_N_EXPERTS], z[HSEP_N_EXPERTS], ones[HSEP_N_EXPERTS];
+    hsep_real z_z[HSEP_N_EXPERTS + 1], z_ones[HSEP_N_EXPERTS + 1], ones_ones[HSEP_N_EXPERTS + 1]; /* products so far */
+} stack_support;
+
+/* Add an expert to a support of n; return whether H is positive definite on it. */
+static int stack_extend(
+    stack_support *self, int n, int place, hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS],
+    const hsep_real l[HSEP_N_EXPERTS])
 {
+    hsep_real *row = self->rows[n], pivot = H[place][place], z = l[place], one = 1.0;
     for (int i = 0; i < n; i++) {
-        for (int r = i + 1; r < n; r++) {
-            const hsep_real factor = A[r][i] / A[i][i];
-            for (int c = i; c < n; c++) {
-                A[r][c] -= factor * A[i][c];
-            }
-            u[r] -= factor * u[i];
-            v[r] -= factor * v[i];
+        hsep_real entry = H[place][self->places[i]];
+        for (int j = 0; j < i; j++) {
+            entry -= row[j] * self->rows[i][j];
         }
+        row[i] = entry /= self->rows[i][i];
+        pivot -= entry * entry;
+        z -= entry * self->z[i];
+        one -= entry * self->ones[i];
     }
+    if (!(pivot > 0.0)) {
+        return 0;
+    }
+    row[n] = hsep_sqrt(pivot);
+    self->places[n] = place;
+    self->z[n] = z /= row[n];
+    self->ones[n] = one /= row[n];
+    self->z_z[n + 1] = self->z_z[n] + z * z;
+    self->z_ones[n + 1] = self->z_ones[n] + z * one;
+    self->ones_ones[n + 1] = self->ones_ones[n] + one * one;
+    return 1;
+}
+
+/* The weights on a support of n, R w = z - multiplier ones; return whether none is negative. */
+static int stack_weigh(const stack_support *self, int n, hsep_real multiplier, hsep_real weights[HSEP_N_EXPERTS])
+{
+    hsep_real found[HSEP_N_EXPERTS] = {0.0};
     for (int i = n; i-- > 0;) {
-        for (int c = i + 1; c < n; c++) {
-            u[i] -= A[i][c] * u[c];
-            v[i] -= A[i][c] * v[c];
+        hsep_real weight = self->z[i] - multiplier * self->ones[i];
+        for (int j = i + 1; j < n; j++) {
+            weight -= self->rows[j][i] * found[self->places[j]];
         }
-        u[i] /= A[i][i];
-        v[i] /= A[i][i];
+        found[self->places[i]] = weight /= self->rows[i][i];
+        if (!(weight >= 0.0)) {
+            return 0;
+        }
     }
+    memcpy(weights, found, sizeof found);
+    return 1;
 }
 
-/* Minimise 1/2 pi' H pi - l' pi over the pi >= 0, sum pi <= 1 that are 0 outside a support of n experts. Return the
- * minimum, or infinity if a weight would be negative. */
-static hsep_real stack_try(
-    hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], const int support[], int n,
-    hsep_real pi[HSEP_N_EXPERTS])
-{
-    hsep_real A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], found[HSEP_N_EXPERTS], ones[HSEP_N_EXPERTS];
-    hsep_real sum = 0.0, of_ones = 0.0, cost = 0.0;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            A[i][j] = H[support[i]][support[j]];
-        }
-        found[i] = l[support[i]];
-        ones[i] = 1.0;
-    }
-    stack_solve(A, found, ones, n);
-    for (int i = 0; i < n; i++) {
-        sum += found[i];
-        of_ones += ones[i];
-    }
-    for (int i = 0; i < n; i++) {
-        found[i] -= sum > 1.0 ? (sum - 1.0) / of_ones * ones[i] : 0.0; /* then sum pi = 1 is active */
-        if (!(found[i] >= 0.0)) {
-            return INFINITY;
-        }
-    }
-    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-        pi[i] = 0.0;
-    }
-    for (int i = 0; i < n; i++) {
-        pi[support[i]] = found[i];
-    }
-    for (int i = 0; i < n; i++) {
-        hsep_real row = 0.0;
-        for (int j = 0; j < n; j++) {
-            row += H[support[i]][support[j]] * found[j];
-        }
-        cost += (0.5 * row - l[support[i]]) * found[i];
-    }
-    return cost;
-}
-
-/* The weights by their active set: all supports are tried. */
+/* The pi >= 0, sum pi <= 1 that minimise 1/2 pi' H pi - l' pi, by their active set: all supports are tried, each from
+ * the one without its last expert. On one the minimum is -z' z / 2, and (z' ones - 1)^2 / (2 ones' ones) more where the
+ * sum z' ones would exceed 1; weights are solved for where it is less than what was found. */
 static void stack_minimise(
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], hsep_real weights[HSEP_N_EXPERTS])
 {
-    hsep_real least = 0.0, tried[HSEP_N_EXPERTS] = {0.0};
+    stack_support support = {{0}, {{0.0}}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
+    hsep_real least = 0.0;
+    int n = 0, next = 0;
     memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
-    for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
-        int support[HSEP_N_EXPERTS], n = 0;
-        for (int i = 0; i < HSEP_N_EXPERTS; i++) {
-            if ((set >> i & 1U) != 0U) {
-                support[n++] = i;
+    while (n > 0 || next < HSEP_N_EXPERTS) {
+        if (next == HSEP_N_EXPERTS) {
+            next = support.places[--n] + 1;
+        } else if (stack_extend(&support, n, next++, H, l)) {
+            n++;
+            const hsep_real excess = hsep_fmax(support.z_ones[n] - 1.0, 0.0);
+            const hsep_real multiplier = excess / support.ones_ones[n];
+            const hsep_real cost = 0.5 * (multiplier * excess - support.z_z[n]);
+            if (cost < least && stack_weigh(&support, n, multiplier, weights)) {
+                least = cost;
             }
-        }
-        const hsep_real cost = stack_try(H, l, support, n, tried);
-        if (cost < least) {
-            least = cost;
-            memcpy(weights, tried, sizeof tried);
         }
     }
 }
