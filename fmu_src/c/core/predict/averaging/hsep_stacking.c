@@ -12,41 +12,36 @@ HSEP_API void hsep_stack_init(hsep_stack *self)
     }
 }
 
-/* Support of weights, with R' R = H on it: R' is lower triangular, z = R'^-1 l, ones = R'^-1 1. A support that has one
- * more keeps what was before it. */
+/* Support of weights, with R' R = H on it: R' is lower triangular, z = R'^-1 l, ones = R'^-1 1; and the products of both
+ * up to each place. */
 typedef struct {
     int places[HSEP_N_EXPERTS];
     hsep_real rows[HSEP_N_EXPERTS][HSEP_N_EXPERTS], z[HSEP_N_EXPERTS], ones[HSEP_N_EXPERTS];
-    hsep_real z_z[HSEP_N_EXPERTS + 1], z_ones[HSEP_N_EXPERTS + 1], ones_ones[HSEP_N_EXPERTS + 1]; /* products so far */
+    hsep_real z_z[HSEP_N_EXPERTS + 1], z_ones[HSEP_N_EXPERTS + 1], ones_ones[HSEP_N_EXPERTS + 1];
 } stack_support;
 
-/* Add an expert to a support of n; return whether H is positive definite on it. */
-static int stack_extend(
-    stack_support *self, int n, int place, hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS],
-    const hsep_real l[HSEP_N_EXPERTS])
+/* Add row n, where those before it are known; an expert that rounding does not resolve weighs nothing. */
+static void stack_extend(
+    stack_support *self, int n, hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS])
 {
+    const int place = self->places[n];
     hsep_real *row = self->rows[n], pivot = H[place][place], z = l[place], one = 1.0;
     for (int i = 0; i < n; i++) {
-        hsep_real entry = H[place][self->places[i]];
+        row[i] = H[place][self->places[i]];
         for (int j = 0; j < i; j++) {
-            entry -= row[j] * self->rows[i][j];
+            row[i] -= row[j] * self->rows[i][j];
         }
-        row[i] = entry /= self->rows[i][i];
-        pivot -= entry * entry;
-        z -= entry * self->z[i];
-        one -= entry * self->ones[i];
+        row[i] /= self->rows[i][i];
+        pivot -= row[i] * row[i];
+        z -= row[i] * self->z[i];
+        one -= row[i] * self->ones[i];
     }
-    if (!(pivot > 0.0)) {
-        return 0;
-    }
-    row[n] = hsep_sqrt(pivot);
-    self->places[n] = place;
+    row[n] = pivot > 0.0 ? hsep_sqrt(pivot) : INFINITY;
     self->z[n] = z /= row[n];
     self->ones[n] = one /= row[n];
     self->z_z[n + 1] = self->z_z[n] + z * z;
     self->z_ones[n + 1] = self->z_ones[n] + z * one;
     self->ones_ones[n + 1] = self->ones_ones[n] + one * one;
-    return 1;
 }
 
 /* The weights on a support of n, R w = z - multiplier ones; return whether none is negative. */
@@ -58,8 +53,8 @@ static int stack_weigh(const stack_support *self, int n, hsep_real multiplier, h
         for (int j = i + 1; j < n; j++) {
             weight -= self->rows[j][i] * found[self->places[j]];
         }
-        found[self->places[i]] = weight /= self->rows[i][i];
-        if (!(weight >= 0.0)) {
+        found[self->places[i]] = weight / self->rows[i][i];
+        if (!(found[self->places[i]] >= 0.0)) {
             return 0;
         }
     }
@@ -67,27 +62,27 @@ static int stack_weigh(const stack_support *self, int n, hsep_real multiplier, h
     return 1;
 }
 
-/* The pi >= 0, sum pi <= 1 that minimise 1/2 pi' H pi - l' pi, by their active set: all supports are tried, each from
- * the one without its last expert. On one the minimum is -z' z / 2, and (z' ones - 1)^2 / (2 ones' ones) more where the
- * sum z' ones would exceed 1; weights are solved for where it is less than what was found. */
+/* The pi >= 0, sum pi <= 1 that minimise 1/2 pi' H pi - l' pi, by their active set: all supports are tried, each with
+ * the rows of the one without its lowest place, which was tried before. On a support the minimum is -z' z / 2, and
+ * (z' ones - 1)^2 / (2 ones' ones) more where the sum z' ones would exceed 1. */
 static void stack_minimise(
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const hsep_real l[HSEP_N_EXPERTS], hsep_real weights[HSEP_N_EXPERTS])
 {
     stack_support support = {{0}, {{0.0}}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
     hsep_real least = 0.0;
-    int n = 0, next = 0;
     memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
-    while (n > 0 || next < HSEP_N_EXPERTS) {
-        if (next == HSEP_N_EXPERTS) {
-            next = support.places[--n] + 1;
-        } else if (stack_extend(&support, n, next++, H, l)) {
-            n++;
-            const hsep_real excess = hsep_fmax(support.z_ones[n] - 1.0, 0.0);
-            const hsep_real multiplier = excess / support.ones_ones[n];
-            const hsep_real cost = 0.5 * (multiplier * excess - support.z_z[n]);
-            if (cost < least && stack_weigh(&support, n, multiplier, weights)) {
-                least = cost;
+    for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
+        int n = 0;
+        for (int i = HSEP_N_EXPERTS; i-- > 0;) {
+            if ((set >> i & 1U) != 0U) {
+                support.places[n++] = i;
             }
+        }
+        stack_extend(&support, n - 1, H, l);
+        const hsep_real excess = hsep_fmax(support.z_ones[n] - 1.0, 0.0);
+        const hsep_real multiplier = excess / support.ones_ones[n], cost = multiplier * excess - support.z_z[n];
+        if (cost < least && stack_weigh(&support, n, multiplier, weights)) {
+            least = cost;
         }
     }
 }
