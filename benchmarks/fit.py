@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 
 from hybridsep.base.errors import HybridSepError
@@ -61,7 +62,9 @@ class Row:
 
     def __str__(self) -> str:
         def shown(*names: str) -> str:
-            return " / ".join(f"{self.rms[name]:.4g}".replace("inf", "diverged") for name in names)
+            return " / ".join(
+                f"{self.rms.get(name, nan):.4g}".replace("inf", "diverged").replace("nan", "–") for name in names
+            )
 
         ways = [shown(f"{name} (frozen)", f"{name} (refitted)") for name in ("ARX20", "ARX40")]
         cells = [shown("lag + hold"), shown("hold"), *ways, shown("physics model"), shown("hybrid")]

@@ -129,8 +129,10 @@ FINDINGS: Mapping[str, Explanation] = {
         "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",
     ),
     "outliers": Explanation(
-        "Single samples leave the signal: glitches of the encoder or of the transmission.",
-        "None is needed with `averaging = true`, which rejects what is out of reach.",
+        "Single samples leave the signal: glitches of the encoder or of the transmission, a sensor that was not ready "
+        "yet, a number that is cut off at the file's end.",
+        "A run rejects what is out of reach (`averaging = true`); a fit identifies and judges with every sample: leave "
+        "wrong measured positions blank in the file.",
     ),
     "repeated samples": Explanation(
         "The position was sampled more slowly than the log was written, and unevenly.",

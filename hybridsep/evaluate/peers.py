@@ -63,12 +63,12 @@ class FirstOrderLag:
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     """Return the lag that fits commanded and measured positions ``(n,)``, m, NaN where missing, best."""
-    known = [~np.isnan(x) for _, x in recordings]
+    recordings = [one for one in recordings if not np.isnan(one[1]).all()]
 
     def misfit(log_tau: float, late: int) -> float:
         lag = FirstOrderLag(math.exp(log_tau), late)
-        errors = [(x - lag.position(x_d))[at] for (x_d, x), at in zip(recordings, known, strict=True)]
-        return float(sum(error @ error for error in errors))
+        errors = [x - lag.position(x_d) for x_d, x in recordings]
+        return float(sum(np.nansum((error - np.nanmean(error)) ** 2) for error in errors))  # their zeros may differ
 
     bounds = [math.log(samples) for samples in _TIME_CONSTANTS]
     fits = [

@@ -412,19 +412,20 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
             height = float(heights.max())
             words = (
                 f"{len(wrong)} {name} position{'s leave' if len(wrong) > 1 else ' leaves'} the signal for one sample, "
-                f"by up to {log.shown.words(height)}, first sample {wrong[0] + 1}"
+                f"by up to {log.shown.words(height)}, first sample {wrong[0] + 1}: identified and judged as recorded; "
+                "blank in the file it counts as missing"
             )
             evidence = {"n": float(len(wrong)), "largest": height}
             yield Finding("outliers", words, evidence, _over_time(log, "Outliers", wrong))
 
 
 def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
-    """Return the samples that leave a signal, (n,), and come back, and by how much."""
-    steps = np.diff(x)
+    """Return the samples that leave a signal, (n,), and by how much; it comes back, but at its ends."""
+    steps = np.diff(np.pad(x, 1, mode="reflect"))
     heights = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
     usual = float(np.nanquantile(np.abs(steps), _USUAL))
     wrong = np.flatnonzero(heights > max(_ALONE * usual, _SIZE * travel))
-    return wrong + 1, heights[wrong]
+    return wrong, heights[wrong]
 
 
 def _note_held(log: Log) -> Iterator[Finding]:

@@ -165,19 +165,18 @@ def _only_clock(source: Source) -> str | None:
 
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
-    there = listed(source.names)
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
         kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
         raise LogError(
-            f"{source.path}: has no line of names, its first line is numbers ({there}); put one above, such as "
+            f"{source.path}: has no line of names, its first line is numbers ({listed(plain)}); put one above, such as "
             f"{kinds}: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
         )
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{role} NAME" for role in names)
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
+    return LogError(f"{source.path}: {which} missing, the file has {listed(source.names)}; name {it}: {options}{other}")
 
 
 def _stated(source: Source, name: str) -> str:

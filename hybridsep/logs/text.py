@@ -188,7 +188,7 @@ class TextSource(Source):
                     self._row(text, number, use)  # a decimal comma is the likelier fault
                     raise LogError(
                         f"{self.path}, line {number}: {expected} columns were expected as in line "
-                        f"{self._table.header}, got {len(fields)}"
+                        f"{self._table.header}, got {len(fields)}; correct the line, or take it out"
                     )
         stamps = dict.fromkeys(self._table.clocks.intersection(use), nanoseconds)
         try:

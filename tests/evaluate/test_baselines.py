@@ -110,7 +110,7 @@ def test_a_lag_needs_motion_to_be_fitted_to() -> None:
 def test_a_lag_is_found_and_its_last_measured_residual_held() -> None:
     x_d, _ = axis(2000)
     true = FirstOrderLag(12.0, 4)
-    x = true.position(x_d) + 5e-6
+    x = true.position(x_d) + 2e-3  # another zero
     x[1190:1200] = np.nan
     lag = fitted_lag([(x_d[:1000], x[:1000])])
     assert lag.tau == pytest.approx(12.0, rel=1e-2)
