@@ -16,8 +16,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from two_mass.generator import SEED, Recipe
@@ -85,35 +83,33 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
         return (rms(error), largest(error)) if np.isfinite(error).all() else (np.inf, np.inf)
 
     found = []
-    with TemporaryDirectory() as folder:
-        for name, condition in CONDITIONS.items():
-            if only not in name:
+    for name, condition in CONDITIONS.items():
+        if only not in name:
+            continue
+        axis, sensor = condition.axis(recipe.axis, x_d), condition.sensor(x_d, T_s)
+        x = TwoMassDrive(axis, start).run(x_d)
+        weights = _learned(recipe, x_d, x) if name == SOUND else None
+        physics = (np.inf, np.inf)
+        for run, (compensate, warm) in RUNS.items():
+            if warm and weights is None:
                 continue
-            axis, sensor = condition.axis(recipe.axis, x_d), condition.sensor(x_d, T_s)
-            x = TwoMassDrive(axis, start).run(x_d)
-            if name == SOUND:
-                _learn(recipe, x_d, x, Path(folder))
-            physics = (np.inf, np.inf)
-            for run, (compensate, warm) in RUNS.items():
-                if warm and name != SOUND:
-                    continue
-                loop = closed_loop(recipe, axis, compensate, sensor, Path(folder) if warm else None)
-                sent = loop.x_dm[np.isfinite(loop.x_dm)]
-                excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), limits, strict=True)]
-                excess.append(largest(sent - x_d[: len(sent)]) / compensator.change_max - 1)
-                physics = errors(loop.x) if run == "physics" else physics
-                text = f"drive {index}, {recipe.description}"
-                found.append(Result(name, run, text, errors(x), physics, errors(loop.x), max(excess)))
+            loop = closed_loop(recipe, axis, compensate, sensor, weights if warm else None)
+            sent = loop.x_dm[np.isfinite(loop.x_dm)]
+            excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), limits, strict=True)]
+            excess.append(largest(sent - x_d[: len(sent)]) / compensator.change_max - 1)
+            physics = errors(loop.x) if run == "physics" else physics
+            text = f"drive {index}, {recipe.description}"
+            found.append(Result(name, run, text, errors(x), physics, errors(loop.x), max(excess)))
     return found
 
 
-def _learn(recipe: Recipe, x_d: Array, x: Array, folder: Path) -> None:
-    """Write the weights that a run without compensation leaves."""
+def _learned(recipe: Recipe, x_d: Array, x: Array) -> bytes:
+    """Return the weights that a run without compensation leaves."""
     settings, _, _ = settings_of(recipe)
     predictor = HybridPredictor(recipe.model, settings, start=float(x_d[0]))
     quantum, n = recipe.encoder.quantum, len(x_d) // settings.Np * settings.Np  # whole windows
     backtest(predictor, x_d[:n], quantum * np.round((x[:n] + recipe.noise[:n]) / quantum))
-    (folder / "weights.bin").write_bytes(weights_file(predictor))
+    return weights_file(predictor)
 
 
 def rows(found: Sequence[Result]) -> Iterator[str]:

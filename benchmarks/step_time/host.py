@@ -91,7 +91,7 @@ def warm(predictor: HybridPredictor, folder: Path) -> dict[str, Any]:
     """Return the values that make a run begin with what a predictor has learned, which is written to a new folder."""
     folder.mkdir()
     (folder / WEIGHTS_FILE).write_bytes(weights_file(predictor))
-    return {"resources": f"{folder}/"}
+    return {"weights": folder / WEIGHTS_FILE}
 
 
 def timed(host: Host, values: dict[str, Any], steps: int, folder: Path) -> tuple[dict[str, Any], Array]:

@@ -3,7 +3,7 @@
  *
  * Usage: step_time STEPS LOG TIMES name=value ...
  *   LOG    x_d, then x, doubles, m, as many of each; played over and over; in closed loop x_d alone is used
- *   resources=FOLDER/ where weights.bin is: a warm run
+ *   weights=FILE what was learned before: a warm run
  *   TIMES  written: STEPS doubles, ns, the steps; then STEPS doubles, ns, the empty loop; "-" for none
  * Prints one line of JSON. Pinned to the processor it starts on where the system allows it.
  */
@@ -48,6 +48,23 @@ static void fail(const char *what)
 {
     fprintf(stderr, "step_time: %s\n", what);
     exit(2);
+}
+
+/* The content of a file, to be freed. */
+static void *content_of(const char *path, size_t *size)
+{
+    FILE *file = fopen(path, "rb");
+    void *content = NULL;
+    if (file != NULL && fseek(file, 0, SEEK_END) == 0) {
+        *size = (size_t)ftell(file);
+        content = malloc(*size + 1);
+        rewind(file);
+    }
+    if (content == NULL || fread(content, 1, *size, file) != *size) {
+        fail("a file cannot be read");
+    }
+    fclose(file);
+    return content;
 }
 
 static int by_size(const void *a, const void *b)
@@ -117,8 +134,8 @@ int main(int n_arguments, char *arguments[])
     }
     const size_t steps = strtoul(arguments[1], NULL, 10);
     for (int a = 4; a < n_arguments; a++) {
-        if (strncmp(arguments[a], "resources=", strlen("resources=")) == 0) {
-            context.resources = arguments[a] + strlen("resources=");
+        if (strncmp(arguments[a], "weights=", strlen("weights=")) == 0) {
+            context.weights = content_of(arguments[a] + strlen("weights="), &context.weights_size);
         }
     }
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
@@ -131,19 +148,13 @@ int main(int n_arguments, char *arguments[])
         }
     }
 
-    FILE *file = fopen(arguments[2], "rb");
-    if (file == NULL || fseek(file, 0, SEEK_END) != 0) {
-        fail("the log cannot be read");
-    }
-    const size_t n_log = (size_t)ftell(file) / (2 * sizeof(double));
-    double *x_d = malloc(2 * n_log * sizeof *x_d), *x = x_d + n_log;
-    rewind(file);
-    if (x_d == NULL || n_log == 0 || fread(x_d, 2 * sizeof *x_d, n_log, file) != n_log) {
-        fail("the log cannot be read");
-    }
-    fclose(file);
-
     size_t size = 0;
+    double *x_d = content_of(arguments[2], &size);
+    const size_t n_log = size / (2 * sizeof *x_d);
+    const double *x = x_d + n_log;
+    if (n_log == 0) {
+        fail("the log has no samples");
+    }
     if (hsep_model_size(&context, values, &size, message) != HSEP_OK) {
         fail(message);
     }

@@ -101,7 +101,7 @@ def layout_of(table: Sequence[Variable]) -> _Layout:
 
 def kind_header(kind: str) -> str:
     """Return the header with which a library serves all FMUs of a kind, of :data:`KINDS`."""
-    table = "/* The table of each FMU, its GUID and start values, is in its resources (hsep_table_file.h). */\n"
+    table = "/* The table of each FMU, its GUID and start values, is in its resources (hsep_opening.c). */\n"
     return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
 
 

@@ -87,7 +87,6 @@ typedef struct {
 typedef struct {
     axis_pins *pins;
     hsep_instance instance; /* the model and its memory */
-    void *weights;          /* what weights.bin holds; NULL: none */
     double *ring;           /* (n_ring,) the last commands */
     size_t n_ring, at;
     double limit[3];                       /* m, of the differences of the change of orders 1 to 3 */
@@ -396,29 +395,6 @@ static void axis_step(void *data, long period)
     }
 }
 
-/* Read a whole file of the axis' folder into memory; NULL: there is none, or no memory. */
-static void *axis_read(const hsep_instance *instance, const char *name, size_t *size)
-{
-    FILE *file = hsep_resource_open(&instance->context, name);
-    if (file == NULL) {
-        return NULL;
-    }
-    void *bytes = NULL;
-    if (fseek(file, 0, SEEK_END) == 0) {
-        const long end = ftell(file);
-        if (end > 0 && fseek(file, 0, SEEK_SET) == 0) {
-            bytes = malloc((size_t)end);
-            if (bytes != NULL && fread(bytes, 1, (size_t)end, file) != (size_t)end) {
-                free(bytes);
-                bytes = NULL;
-            }
-            *size = (size_t)end;
-        }
-    }
-    fclose(file);
-    return bytes;
-}
-
 /* Whether an axis may be opened: its folder is one that hybridsep hal has written, and its name is no other one's. */
 static int axis_allowed(const axis_data *self, const char *folder, const char *name)
 {
@@ -471,10 +447,6 @@ static int axis_open(axis_data *self, const char *folder)
             axis_message);
         return 0;
     }
-    size_t size = 0;
-    self->weights = axis_read(instance, "weights.bin", &size);
-    instance->context.weights = self->weights;
-    instance->context.weights_size = size;
     hsep_instance_reset(instance);
     if (hsep_instance_initialise(instance, "loadrt " HSEP_COMPONENT, axis_message) != HSEP_OK) {
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", name, axis_message);
@@ -544,10 +516,10 @@ static void axis_free(void)
             hsep_instance_drop_state(instance);
             hsep_delete(instance, instance->values);
             hsep_delete(instance, instance->table);
+            hsep_delete(instance, instance->weights);
             hsep_delete(instance, instance->resources);
             hsep_delete(instance, instance->name);
         }
-        free(self->weights);
         free(self->ring);
         *self = (axis_data){0};
     }

@@ -27,7 +27,7 @@ from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.spec import fmu_names
-from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
+from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -152,39 +152,34 @@ def test_no_mutation_of_the_file_is_accepted_in_either_language() -> None:
     for changed in mutations(content, share(1500)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
-        model.context.weights, model.context.weights_size = changed, len(changed)
+        model.learn(changed)
         assert refusal(model.initialise)
     assert not predictor.weights.any()
-    model.context.weights, model.context.weights_size = content, len(content)
+    model.learn(content)
     model.initialise()
     restore_weights(predictor, content)
     assert predictor.weights.any()
 
 
-def test_spoiled_files_are_refused_in_both_flavours(tmp_path: Path) -> None:
+def test_spoiled_files_are_refused_in_both_flavours() -> None:
     content, predictor = weights_file(small_predictor(20)), small_predictor()
-    from_file, in_memory = CModel("predictor", SMALL, tmp_path), CModel("predictor", SMALL)
+    model = CModel("predictor", SMALL)
     damaged, other = spoiled(content)
     for name, changed in (damaged | other).items():
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
-        (tmp_path / WEIGHTS_FILE).write_bytes(changed)
-        in_memory.context.weights, in_memory.context.weights_size = changed, len(changed)
-        said = refusal(from_file.initialise)
+        model.learn(changed)
+        said = refusal(model.initialise)
         assert "damaged, truncated or another version" in said if name in damaged else "weights.bin" in said, name
-        assert said == refusal(in_memory.initialise), name
     assert predictor.regression.n_rows == 0.0
-    (tmp_path / WEIGHTS_FILE).write_bytes(content)
-    in_memory.context.weights, in_memory.context.weights_size = content, len(content)
-    states = [model.initialise().state.tobytes() for model in (from_file, in_memory, CModel("predictor", SMALL))]
-    assert states[0] == states[1] != states[2]
+    model.learn(content)
+    assert model.initialise().state.tobytes() != CModel("predictor", SMALL).initialise().state.tobytes()
 
 
-def test_another_number_of_modes_is_named(tmp_path: Path) -> None:
+def test_another_number_of_modes_is_named() -> None:
     stage = [Mode(**mode) for mode in c_core.TABLES["predictor_2"].modes]
     learned = HybridPredictor(ModalModel(stage), PredictorSettings.from_fmi(c_core.PREDICTOR))
-    (tmp_path / WEIGHTS_FILE).write_bytes(weights_file(learned))
-    said = refusal(CModel("predictor", resources=tmp_path).initialise)
+    said = refusal(CModel("predictor", weights=weights_file(learned)).initialise)
     assert "the number of modes must be 4, with which this FMU was trained (weights.bin), got 1" in said
 
 

@@ -182,9 +182,17 @@ class CModel:
         Values that differ from the table's start values.
     resources : Path, optional
         Resources folder.
+    weights : bytes, optional
+        Content of ``weights.bin``, with which it starts.
     """
 
-    def __init__(self, name: str, start: Mapping[str, float] | None = None, resources: Path | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        start: Mapping[str, float] | None = None,
+        resources: Path | None = None,
+        weights: bytes | None = None,
+    ) -> None:
         self.library = library(name)
         table = TABLES[name].variables
         self.place = {variable.name: i for i, variable in enumerate(table)}
@@ -193,6 +201,7 @@ class CModel:
         self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
         self.context = Context.from_buffer_copy(self.library.test_table().contents)
         self.context.resources = f"{resources}/".encode() if resources else None
+        self.learn(weights)
         for key, value in (start or {}).items():
             self[key] = value
         self.state: Array = np.zeros(0)
@@ -202,6 +211,10 @@ class CModel:
 
     def __setitem__(self, name: str, value: float) -> None:
         self.values[self.place[name]] = value
+
+    def learn(self, weights: bytes | None) -> None:
+        """Take the content of ``weights.bin`` that the next initialization starts with, none for a cold one."""
+        self.context.weights, self.context.weights_size = weights, len(weights or b"")
 
     def size(self) -> int:
         """Return the bytes of the state."""

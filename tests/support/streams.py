@@ -55,16 +55,16 @@ class CoreStream:
     model : str
     resources : Path
         Folder of the files that the model reads.
-    warm : bool
-        Whether the folder has learned weights, so that no warm-up is needed.
+    learned : bytes, optional
+        Content of ``weights.bin``, with which no warm-up is needed.
     """
 
-    def __init__(self, model: str, resources: Path, *, warm: bool = False) -> None:
+    def __init__(self, model: str, resources: Path, learned: bytes | None = None) -> None:
         TABLES.setdefault(model, table_of_model(model))
         self.model = model
         self._kind = f"core {model}"
-        self._start = {"t_init": 0.0} if warm else {}
-        self._resources = resources
+        self._start = {"t_init": 0.0} if learned else {}
+        self._resources, self._learned = resources, learned or None
         self.reset()
         self._outputs = OUTPUTS[kind_of(model)]
         self._warnings: list[str] = []
@@ -110,7 +110,7 @@ class CoreStream:
         self._core.state = arrays["state"].copy()
 
     def reset(self) -> None:
-        self._core = CModel(self.model, self._start, self._resources)
+        self._core = CModel(self.model, self._start, self._resources, self._learned)
 
     def warnings(self) -> list[str]:
         return self._warnings
@@ -233,12 +233,10 @@ class StreamMaker:
         learned = planted or learned_file(weights)
         if self.implementation == LIBRARY:
             return PlantStream(model) if "FeedDrive" in model else LookAheadStream(model, learned)
-        if learned:
-            (folder / WEIGHTS_FILE).write_bytes(learned)
         if model == TRAJECTORY:
             write_trajectory(folder, staircase())
             (folder / "trajectory_3.bin").rename(folder / "trajectory_0.bin")
-        return CoreStream(model, folder, warm=bool(learned))
+        return CoreStream(model, folder, learned)
 
 
 _SUFFIX = {NATIVE: "", PYTHON: "Py", FMI3: "Fmi3"}

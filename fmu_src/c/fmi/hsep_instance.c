@@ -111,6 +111,7 @@ HSEP_API void hsep_instance_free(hsep_instance *instance)
     hsep_instance_drop_state(instance);
     hsep_delete(instance, instance->values);
     hsep_delete(instance, instance->table);
+    hsep_delete(instance, instance->weights);
     hsep_delete(instance, instance->resources);
     hsep_delete(instance, instance->name);
     instance->release(instance);

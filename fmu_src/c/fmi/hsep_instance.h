@@ -24,6 +24,8 @@ typedef enum {
     HSEP_CONFIGURATION = 16 /* FMI 3.0's; no state is saved in it */
 } hsep_phase;
 
+#define HSEP_GUID_SIZE 48 /* a GUID in braces, padded with zeros */
+
 /* The importer's memory functions, or the C library's. */
 typedef void *(*hsep_allocate)(size_t count, size_t size);
 typedef void (*hsep_release)(void *block);
@@ -58,6 +60,7 @@ typedef struct {
     char *name;      /* NULL until it is known */
     char *resources; /* NULL if there is no usable folder */
     void *table;     /* what the context points to, where it was read from the resources; else NULL */
+    void *weights;   /* likewise */
     hsep_context context;
     hsep_experiment experiment;
     void *state; /* the model's, NULL before the initialization has ended */

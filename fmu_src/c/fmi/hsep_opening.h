@@ -5,9 +5,10 @@
 #include "hsep_api.h"
 #include "hsep_instance.h"
 
-/* Keep name and resources, a URI, a path or NULL, and take the table of the FMU's variables: from the header, or from
- * the resources (hsep_table_file.h), which are the resources beside the library where the location leads to none. Fails
- * if there is no memory, or no table; HSEP_WARNED: the location is not used. */
+/* Keep name and resources, a URI, a path or NULL, and take the table of the FMU's variables and what was learned: from
+ * the header, or from variables.bin and weights.bin of the resources, which are the resources beside the library where
+ * the location leads to none. Fails if there is no memory, or no table, or it is not one of this binary, damaged or out
+ * of a range; HSEP_WARNED: the location is not used. */
 HSEP_API hsep_status hsep_open(hsep_instance *instance, const char *name, const char *resources, char message[]);
 
 #endif

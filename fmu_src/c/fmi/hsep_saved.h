@@ -12,7 +12,6 @@
 
 #include "hsep_api.h"
 #include "hsep_instance.h"
-#include "hsep_table_file.h"
 #include "hsep_layout.h"
 
 #include <stdint.h>

@@ -88,7 +88,7 @@ HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double 
     } else if (whole && value != floor(value)) {
         hsep_message_add(message, "%s must be a whole number, got %s", name, number);
     } else {
-        check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
+        check_range_text(range, sizeof range, v, context->angular ? v->angular_unit : v->unit);
         hsep_message_add(message, "%s must be %s, got %s", name, range, number);
     }
     return 0;
@@ -102,34 +102,6 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
         problems += is_parameter && !hsep_check_parameter(context, i, values[i], message);
     }
     return problems;
-}
-
-HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
-{
-    int problems = 0;
-    if (!(p >= 1.0 && p <= Np)) {
-        hsep_message_add(message, "p must be 1 " HSEP_TO " Np = %.0f, got %.0f; lower p or raise Np", Np, p);
-        problems++;
-    }
-    if (!(q >= 0.0 && q < Np)) {
-        hsep_message_add(
-            message, "q must be 0 " HSEP_TO " Np " HSEP_MINUS " 1 = %.0f, got %.0f; lower q or raise Np", Np - 1.0, q);
-        problems++;
-    }
-    return problems;
-}
-
-HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[])
-{
-    static const char *const names[] = {"", "x_pb", "x_h", "x_dm"};
-    if (divergence == HSEP_CONVERGES) {
-        return HSEP_OK;
-    }
-    message[0] = '\0'; /* a warning of the step no longer matters */
-    return hsep_message_add(
-        message,
-        "%s must stay within " HSEP_PLUS_MINUS "%g m: the learned recursion diverges; raise lambda, lower p or reset",
-        names[divergence], HSEP_PREDICTION_MAX);
 }
 
 HSEP_API hsep_status hsep_check_position(

@@ -3,10 +3,8 @@
 #ifndef HSEP_CHECK_H
 #define HSEP_CHECK_H
 
-#include "hsep.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
-#include "hsep_range.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
 
@@ -29,12 +27,6 @@ HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double 
 
 /* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
-
-/* Check 1 <= p <= Np and 0 <= q < Np; return how many are wrong, each added to message. */
-HSEP_API int hsep_check_lags(double Np, double p, double q, char message[]);
-
-/* Refuse outputs of a window that diverges. */
-HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);
 
 /* Check that a position, m or rad, is finite and no further out than any machine is. where: format of at, the end of
  * the message. */

@@ -65,7 +65,7 @@ typedef struct {
     const char *guid;
     int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
-    const void *weights;   /* content of weights.bin in memory, taken instead of the resources' file; NULL: the file */
+    const void *weights;   /* content of weights.bin, learned before, in any alignment; NULL: none, start cold */
     size_t weights_size;   /* bytes */
 } hsep_context;
 
@@ -76,8 +76,9 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 
 /* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs of t_start go to
  * values.
- * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
- * Fails if a start value is not finite, a resource cannot be read or has changed so that size does not fit. */
+ * ReferenceTrajectory reads its resource, as in hsep_model_size and hsep_model_start_values; no step touches a file.
+ * Fails if a start value is not finite, the weights are damaged or were learned with other settings, each of which is
+ * named, or a resource cannot be read or has changed so that size does not fit. */
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[]);
 

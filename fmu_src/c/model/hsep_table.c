@@ -43,12 +43,6 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
     return text;
 }
 
-HSEP_API const char *hsep_table_unit(const hsep_context *context, size_t place)
-{
-    const hsep_variable *row = hsep_table_row(context, place);
-    return context->angular ? row->angular_unit : row->unit;
-}
-
 HSEP_API double hsep_table_start(const hsep_context *context, size_t place)
 {
     return place < table_before_windows(context) ? context->starts[place] : 0.0;

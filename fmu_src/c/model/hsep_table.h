@@ -14,9 +14,6 @@ HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t
 /* The name of a variable, mode[1].f_n and x_h_window[1] too; return text. */
 HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE]);
 
-/* Its unit; "" if it has none. */
-HSEP_API const char *hsep_table_unit(const hsep_context *context, size_t place);
-
 /* The start value of a variable. */
 HSEP_API double hsep_table_start(const hsep_context *context, size_t place);
 

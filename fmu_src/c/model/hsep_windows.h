@@ -6,11 +6,6 @@
 
 #if HSEP_N_WINDOWS > 0
 
-#include "hsep_predictor.h"
-
-/* The predictor in a state. */
-HSEP_API hsep_predictor *hsep_model_predictor(void *state);
-
 /* Write the samples of all windows to values. Steps leave part of a prediction to the next ones: what is left of it is
  * done here. All later outputs are the same. Nothing is written if the window diverges. */
 HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[]);

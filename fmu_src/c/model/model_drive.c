@@ -1,18 +1,29 @@
-/* FeedDrive: a drive with its encoder.
+/* FeedDrive: a drive with its encoder, the nonlinear one of eq. (13), or a linear-motor stage: modes, with friction and
+ * cable stiffness. One of them is compiled into an FMU.
  *
  * The command is constant over a step of any length up to 100 s. The encoder draws once when the initialization ends
  * and once a step. Cost of a step: 4 slopes for each 0.1 ms of it.
  */
-#include "hsep_drive.h"
+#include "hsep_fmu.h"
 
-#if defined(HSEP_DRIVE)
+#if defined(HSEP_MODEL_FEED_DRIVE) || defined(HSEP_MODEL_STAGE_DRIVE)
 
 #include "hsep_check.h"
 #include "hsep_encoder.h"
-#include "hsep_model.h"
+#include "hsep_plant.h"
 #include "hsep_state.h"
+#include "hsep_table.h"
 
 #include <math.h>
+#include <string.h>
+
+#if defined(HSEP_MODEL_FEED_DRIVE)
+#define DRIVE(function) hsep_feed_drive_##function
+typedef hsep_feed_drive drive_plant;
+#else
+#define DRIVE(function) hsep_stage_##function
+typedef hsep_stage drive_plant;
+#endif
 
 static const double drive_seed_max = 2147483647.0;
 static const double drive_time_tolerance = 0.5; /* of a step: rounding of the importer's times */
@@ -21,25 +32,128 @@ typedef struct {
     hsep_state_header header;
     double end; /* s, of the last step in the importer's time */
     hsep_encoder encoder;
-    hsep_drive drive; /* its arrays may follow */
+    drive_plant plant; /* its arrays may follow */
 } drive_state;
+
+/* The plant's own ---------------------------------------------------------------------------------------------------
+ * drive_check: of its parameters together, after each alone; *bytes: of its block, counted in double. drive_begin: at
+ * rest at the start value of x_d. drive_step: by h, s, with the command x_d, m, held; fails, with the state unchanged,
+ * if the state overflows. drive_velocity: the true one, under the last step's command, m/s. */
+
+#if defined(HSEP_MODEL_FEED_DRIVE)
+
+static hsep_status drive_check(const hsep_context *context, const double values[], double *bytes, char message[])
+{
+    (void)context;
+    const double rate = hsep_feed_drive_rate(
+        &(hsep_feed_drive){.m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
+    *bytes = sizeof(hsep_feed_drive);
+    if (rate > HSEP_PLANT_RATE_MAX) {
+        return hsep_message_add(
+            message, "sqrt(k/m) and c/m must be at most %g 1/s, got %g; lower k or c, or raise m", HSEP_PLANT_RATE_MAX,
+            rate);
+    }
+    return HSEP_OK;
+}
+
+static void drive_begin(const hsep_context *context, hsep_feed_drive *self, const double values[])
+{
+    (void)context;
+    self->m = values[HSEP_VR_m];
+    self->c = values[HSEP_VR_c];
+    self->k = values[HSEP_VR_k];
+    self->c_nl = values[HSEP_VR_c_nl];
+    self->k_nl = values[HSEP_VR_k_nl];
+    hsep_feed_drive_reset(self, values[HSEP_VR_x_d]);
+}
+
+static hsep_status drive_step(hsep_feed_drive *self, double x_d, double h, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    double x = 0.0;
+    if (!hsep_feed_drive_step(self, x_d, h, &x)) {
+        return hsep_message_add(
+            message, "the drive's state overflowed (x = %s, command %g m)", hsep_number(number, x, HSEP_REAL), x_d);
+    }
+    return HSEP_OK;
+}
+
+static double drive_velocity(const hsep_feed_drive *self) { return hsep_feed_drive_v(self); }
+
+#else
+
+/* Work space for a step lies behind the stage: zeros between steps. */
+static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
+
+static hsep_stage_settings stage_settings(const double values[])
+{
+    return (hsep_stage_settings){
+        .f = values[HSEP_VR_f],
+        .kappa = values[HSEP_VR_kappa],
+        .v_friction = values[HSEP_VR_v_friction],
+        .friction_on = (uint64_t)values[HSEP_VR_friction_on],
+        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
+        .input_hold = (uint64_t)values[HSEP_VR_input_hold],
+    };
+}
+
+static hsep_status drive_check(const hsep_context *context, const double values[], double *bytes, char message[])
+{
+    const hsep_mode *modes = hsep_table_modes(context, values);
+    const hsep_stage_settings settings = stage_settings(values);
+    *bytes = hsep_stage_size(context->n_modes, &settings) + (double)stage_work_size(context->n_modes);
+    for (size_t i = 0; i < context->n_modes; i++) {
+        const double rate = hsep_plant_mode_rate(&modes[i]);
+        if (rate > HSEP_PLANT_RATE_MAX) {
+            return hsep_message_add(
+                message,
+                "2 pi f_n and 4 pi f_n zeta of mode[%lu] must be at most %g 1/s in a plant, got %g; lower f_n or zeta",
+                (unsigned long)i + 1, HSEP_PLANT_RATE_MAX, rate);
+        }
+    }
+    return HSEP_OK;
+}
+
+static void drive_begin(const hsep_context *context, hsep_stage *self, const double values[])
+{
+    const hsep_stage_settings settings = stage_settings(values);
+    hsep_stage_init(
+        self, hsep_table_modes(context, values), context->n_modes, &settings, values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
+}
+
+static hsep_status drive_step(hsep_stage *self, double x_d, double h, char message[])
+{
+    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes, &self->settings) / sizeof(double));
+    const int done = hsep_stage_step(self, x_d, h, work);
+    memset(work, 0, stage_work_size(self->n_modes));
+    if (!done) {
+        return hsep_message_add(message, "the stage's state overflowed (command %g m)", x_d);
+    }
+    return HSEP_OK;
+}
+
+static double drive_velocity(const hsep_stage *self) { return self->v; }
+
+#endif
+
+/* Both plants' ---------------------------------------------------------------------------------------------------- */
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     double bytes = 0.0;
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0 ||
-        hsep_drive_check(context, values, &bytes, message) != HSEP_OK) {
+        drive_check(context, values, &bytes, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    return hsep_state_size((double)offsetof(drive_state, drive) + bytes, size, message);
+    return hsep_state_size((double)offsetof(drive_state, plant) + bytes, size, message);
 }
 
 /* Measure the position and write all outputs. */
 static void drive_write_outputs(drive_state *self, double values[])
 {
-    values[HSEP_VR_x] = HSEP_DRIVE(x)(&self->drive);
-    values[HSEP_VR_v] = hsep_drive_velocity(&self->drive);
+    values[HSEP_VR_x] = DRIVE(x)(&self->plant);
+    values[HSEP_VR_v] = drive_velocity(&self->plant);
     values[HSEP_VR_x_meas] = hsep_encoder_measure(&self->encoder, values[HSEP_VR_x]);
 }
 
@@ -56,7 +170,7 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     self->end = t_start;
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
-    hsep_drive_begin(context, &self->drive, values);
+    drive_begin(context, &self->plant, values);
     drive_write_outputs(self, values);
     return HSEP_OK;
 }
@@ -67,7 +181,7 @@ static hsep_status drive_check_step(
     const hsep_context *context, const drive_state *self, double x_d, double t, double h, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
-    const double rate = HSEP_DRIVE(rate)(&self->drive);
+    const double rate = DRIVE(rate)(&self->plant);
     if (hsep_check_position(context, "x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
         hsep_check_step_size(h, message) != HSEP_OK ||
         hsep_check_point(self->end, t, drive_time_tolerance * h, message) != HSEP_OK) {
@@ -89,7 +203,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     const double x_d = values[HSEP_VR_x_d];
     message[0] = '\0';
     if (drive_check_step(context, self, x_d, t, h, message) != HSEP_OK ||
-        hsep_drive_step(&self->drive, x_d, h, message) != HSEP_OK) {
+        drive_step(&self->plant, x_d, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     self->end = t + h;

@@ -1,60 +1,314 @@
-/* HybridPredictor and SepCompensator: sizes, initialization, steps and states.
+/* HybridPredictor, the look-ahead buffer that predicts the drive's position one window early, and SepCompensator, which
+ * modifies the command too, so that the drive follows it. One of them is compiled into an FMU.
  *
  * Inputs are latched at the instants t_k that lie in a step, outputs belong to the last instant that was reached; the
- * core does the arithmetic. If the resources hold weights (hsep_weights.h), it starts with them.
+ * core does the arithmetic. If the context has weights, it starts with them.
  */
-#include "hsep_online.h"
+#include "hsep_fmu.h"
 
-#if defined(HSEP_ONLINE)
+#if defined(HSEP_MODEL_HYBRID_PREDICTOR) || defined(HSEP_MODEL_SEP_COMPENSATOR)
 
 #include "hsep_check.h"
+#include "hsep_compensator.h"
 #include "hsep_inputs.h"
-#include "hsep_model.h"
+#include "hsep_learned.h"
+#include "hsep_parameters.h"
+#include "hsep_range.h"
 #include "hsep_state.h"
 #include "hsep_table.h"
-#include "hsep_weights.h"
 #include "hsep_windows.h"
+
+#include <math.h>
+#include <string.h>
+
+#if defined(HSEP_MODEL_HYBRID_PREDICTOR)
+#define ONLINE(function) hsep_predictor_##function
+typedef hsep_predictor online_block;
+typedef hsep_predictor_parameters online_parameters;
+#else
+#define ONLINE(function) hsep_compensator_##function
+typedef hsep_compensator online_block;
+typedef hsep_compensator_parameters online_parameters;
+#endif
 
 typedef struct {
     hsep_state_header header;
     hsep_inputs inputs;
-    hsep_online online; /* its arrays follow */
+    online_block online; /* its arrays follow */
 } online_state;
 
 /* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
 
-/* Check all parameters and read them; the modes stay in values. */
-static hsep_status online_checked(
-    const hsep_context *context, const double values[], hsep_online_parameters *parameters, char message[])
+/* Write the outputs that both models have. */
+static void online_write_predicted(const hsep_predictor_outputs *outputs, double values[])
 {
+    values[HSEP_VR_x_d] = outputs->x_d;
+    values[HSEP_VR_x_pb] = outputs->x_pb;
+    values[HSEP_VR_x_h] = outputs->x_h;
+    values[HSEP_VR_x_h_std] = outputs->x_h_std;
+    values[HSEP_VR_e_servo] =
+        outputs->x_d - outputs->x_h; /* the predicted servo error, of a compensator what is left */
+    values[HSEP_VR_rms_pb] = outputs->rms_pb;
+    values[HSEP_VR_rms_h] = outputs->rms_h;
+    values[HSEP_VR_rms_hold] = outputs->rms_hold;
+    values[HSEP_VR_batch] = (double)outputs->batch;
+    values[HSEP_VR_n_rejected] = (double)outputs->n_rejected;
+}
+
+/* The model's own ---------------------------------------------------------------------------------------------------
+ * online_check: of its settings together, each problem added to message. online_derive: its parameters, after all were
+ * checked and the common ones read. online_tune: the tunable parameters, from the next window on. online_begin: after
+ * learned weights were loaded. */
+
+#if defined(HSEP_MODEL_HYBRID_PREDICTOR)
+
+static void online_check(const double values[], char message[]) { (void)values, (void)message; }
+static void online_tune(hsep_predictor *self, const double values[]) { (void)self, (void)values; }
+static void online_begin(hsep_predictor *self) { (void)self; }
+static hsep_predictor *online_predictor(hsep_predictor *self) { return self; }
+
+static hsep_predictor_parameters online_derive(const double values[], hsep_parameters *parameters)
+{
+    (void)values;
+    return hsep_predictor_derive(parameters);
+}
+
+static void online_write(const hsep_predictor *self, double values[])
+{
+    hsep_predictor_outputs outputs;
+    hsep_predictor_read(self, &outputs);
+    online_write_predicted(&outputs, values);
+    values[HSEP_VR_hybrid_active] = outputs.hybrid_active;
+}
+
+HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[])
+{
+    hsep_predictor *self = &((online_state *)state)->online;
+    hsep_predictor_complete(self);
+    /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
+    for (size_t i = 0; self->divergence == HSEP_CONVERGES && i < context->window; i++) {
+        const int shown = i < self->Np;
+        values[HSEP_VR_x_d_window(context) + i] = shown ? hsep_at_const(self, self->x_d)[i] : 0.0;
+        values[HSEP_VR_x_pb_window(context) + i] = shown ? hsep_at_const(self, self->x_pb)[i] : 0.0;
+        values[HSEP_VR_x_h_window(context) + i] = shown ? hsep_at_const(self, self->x_h)[i] : 0.0;
+        values[HSEP_VR_x_h_std_window(context) + i] = shown ? hsep_predictor_std(self, i) : 0.0;
+    }
+}
+
+HSEP_API hsep_status
+hsep_model_derivative(void *state, const double direction[], double x_h[], double *now, double work[], char message[])
+{
+    hsep_predictor *self = &((online_state *)state)->online;
+    if (hsep_residual_paper(hsep_predictor_model(self)) == NULL) {
+        return hsep_message_add(
+            message, "x_h is linear in x_d_window with averaging = false alone, got averaging = true");
+    }
+    hsep_predictor_respond(self, direction, work, x_h);
+    *now = x_h[self->k % self->Np];
+    return HSEP_OK;
+}
+
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
+    online_write_predicted(&(hsep_predictor_outputs){.x_d = start, .x_pb = start, .x_h = start}, values);
+    values[HSEP_VR_hybrid_active] = 0.0;
+    for (size_t i = 0; i < context->window; i++) {
+        const double position = (double)i < values[HSEP_VR_Np] ? start : 0.0;
+        values[HSEP_VR_x_d_window(context) + i] = position;
+        values[HSEP_VR_x_pb_window(context) + i] = position;
+        values[HSEP_VR_x_h_window(context) + i] = position;
+        values[HSEP_VR_x_h_std_window(context) + i] = 0.0;
+    }
+}
+
+#else
+
+static void online_check(const double values[], char message[])
+{
+    const double Np = values[HSEP_VR_Np], spacing = values[HSEP_VR_spacing], preview = values[HSEP_VR_preview];
+    const double least = Np + 4.0 * spacing + 3.0;
+    if (fmod(Np, spacing) != 0.0) {
+        hsep_message_add(message, "spacing must be " HSEP_AT_LEAST " 1 and divide Np = %.0f, got %.0f", Np, spacing);
+    }
+    if (preview < least) {
+        hsep_message_add(
+            message, "preview must be " HSEP_AT_LEAST " Np + 4" HSEP_DOT "spacing + 3 = %.0f, got %.0f", least,
+            preview);
+    }
+    if (values[HSEP_VR_measurement_delay] > 0.0 && values[HSEP_VR_averaging] == 0.0) {
+        hsep_message_add(
+            message,
+            "measurement_delay of a compensator must be 0 with averaging = false, got %.0f: only the model with "
+            "averaging plans from a late measurement",
+            values[HSEP_VR_measurement_delay]);
+    }
+}
+
+static void online_tune(hsep_compensator *self, const double values[])
+{
+    hsep_compensator_reset(self, values[HSEP_VR_reset] != 0.0);
+    (void)hsep_compensator_change(
+        self, (hsep_sep_state)values[HSEP_VR_compensate], values[HSEP_VR_change_max],
+        values[HSEP_VR_following_error_max]);
+}
+
+static void online_begin(hsep_compensator *self) { hsep_compensator_begin(self); }
+static hsep_predictor *online_predictor(hsep_compensator *self) { return hsep_compensator_predictor(self); }
+
+static hsep_compensator_parameters online_derive(const double values[], hsep_parameters *parameters)
+{
+#define READ(type, name) parameters->compensator.name = (type)values[HSEP_VR_##name];
+    HSEP_COMPENSATOR_SETTINGS(READ)
+#undef READ
+    return hsep_compensator_derive(parameters);
+}
+
+static void online_write(const hsep_compensator *self, double values[])
+{
+    hsep_compensator_outputs outputs;
+    hsep_compensator_read(self, &outputs);
+    online_write_predicted(&outputs.predicted, values);
+    values[HSEP_VR_x_dm] = outputs.x_dm;
+    values[HSEP_VR_sep_state] = (double)outputs.state;
+    values[HSEP_VR_rms_e] = outputs.predicted.rms_e;
+    values[HSEP_VR_no_measurement] = (double)outputs.no_measurement;
+    values[HSEP_VR_alarm] = (double)outputs.alarm;
+}
+
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    (void)context;
+    const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
+    /* The model with averaging predicts from the beginning, with the noise that is assumed. */
+    const double noise = hsep_uncertainty_first_variance(values[HSEP_VR_lambda], values[HSEP_VR_noise_std]);
+    const int predicts = values[HSEP_VR_averaging] > 0.0 && values[HSEP_VR_compensate] > 1.0;
+    const double x_h_std = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
+    online_write_predicted(
+        &(hsep_predictor_outputs){.x_d = start, .x_pb = start, .x_h = start, .x_h_std = x_h_std}, values);
+    values[HSEP_VR_x_dm] = start;
+    values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
+    values[HSEP_VR_rms_e] = values[HSEP_VR_no_measurement] = values[HSEP_VR_alarm] = 0.0;
+}
+
+#endif
+
+/* Both models' ---------------------------------------------------------------------------------------------------- */
+
+/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's. */
+static hsep_status online_checked(
+    const hsep_context *context, const double values[], hsep_parameters *parameters, online_parameters *derived,
+    char message[])
+{
+    const double Np = values[HSEP_VR_Np], p = values[HSEP_VR_p], q = values[HSEP_VR_q];
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
-    const int lags = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
-    if (hsep_online_check(values, message) + lags > 0) {
+    if (p > Np) {
+        hsep_message_add(message, "p must be 1 " HSEP_TO " Np = %.0f, got %.0f; lower p or raise Np", Np, p);
+    }
+    if (q >= Np) {
+        hsep_message_add(
+            message, "q must be 0 " HSEP_TO " Np " HSEP_MINUS " 1 = %.0f, got %.0f; lower q or raise Np", Np - 1.0, q);
+    }
+    online_check(values, message);
+    if (message[0] != '\0') {
         return HSEP_REFUSED;
     }
-    hsep_parameters common = {.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
-#define READ(type, name) common.predictor.name = (type)values[HSEP_VR_##name];
+    *parameters = (hsep_parameters){.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
+#define READ(type, name) parameters->predictor.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
 #undef READ
-#define READ(type, name) common.averaging.name = (type)values[HSEP_VR_##name];
+#define READ(type, name) parameters->averaging.name = (type)values[HSEP_VR_##name];
     HSEP_AVERAGING_SETTINGS(READ)
 #undef READ
-    *parameters = hsep_online_derive(values, &common);
+    *derived = online_derive(values, parameters);
     return HSEP_OK;
+}
+
+static hsep_status online_size(const online_parameters *derived, size_t *size, char message[])
+{
+    const double before = (double)(sizeof(online_state) - sizeof(online_block));
+    return hsep_state_size(before + ONLINE(block_size)(derived), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
-    hsep_online_parameters parameters;
-    if (online_checked(context, values, &parameters, message) != HSEP_OK) {
-        return HSEP_REFUSED;
+    hsep_parameters parameters;
+    online_parameters derived;
+    return online_checked(context, values, &parameters, &derived, message) == HSEP_OK
+               ? online_size(&derived, size, message)
+               : HSEP_REFUSED;
+}
+
+/* Add to message what differs from what the weights were learned with. */
+static void online_compare(const char *name, double learned, double got, hsep_kind kind, char message[])
+{
+    char then[HSEP_NUMBER_SIZE], now[HSEP_NUMBER_SIZE];
+    if (learned != got) {
+        hsep_message_add(
+            message, "%s must be %s, with which this FMU was trained (weights.bin), got %s", name,
+            hsep_number(then, learned, kind), hsep_number(now, got, kind));
     }
-    const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
-    return hsep_state_size(before + HSEP_ONLINE(block_size)(&parameters), size, message);
+}
+
+/* Say which settings differ from those of weights that are whole. One that the table does not have counts as 0; modes
+ * that only one side has show in the number of modes. */
+static void online_name_others(const hsep_context *context, const double values[], char message[])
+{
+    hsep_learned_bytes from = {context->weights, context->weights_size};
+    hsep_learned_head head;
+    hsep_learned_setting setting;
+    (void)hsep_learned_read(&from, &head, sizeof head);
+    online_compare("the number of modes", (double)head.n_modes, (double)context->n_modes, HSEP_INTEGER, message);
+    for (uint64_t i = 0; i < head.n_settings && hsep_learned_next(&from, &setting); i++) {
+        const size_t place = hsep_table_place(context, setting.name);
+        if (place < context->n_variables) {
+            const hsep_kind kind = hsep_table_row(context, place)->kind;
+            online_compare(setting.name, setting.value, values[place], kind, message);
+        } else if (strncmp(setting.name, "mode[", 5) != 0) {
+            online_compare(setting.name, setting.value, 0.0, HSEP_REAL, message);
+        }
+    }
+}
+
+/* Take over the weights of the context, if it has some. */
+static hsep_status online_load(
+    const hsep_context *context, const double values[], const hsep_parameters *parameters, hsep_predictor *predictor,
+    char message[])
+{
+    const hsep_began began = context->weights == NULL
+                                 ? HSEP_BEGAN
+                                 : hsep_learned_load(predictor, parameters, context->weights, context->weights_size);
+    if (began == HSEP_BEGAN) {
+        return HSEP_OK;
+    }
+    if (began == HSEP_WEIGHTS_OTHER) {
+        online_name_others(context, values, message);
+    }
+    if (message[0] == '\0') {
+        hsep_message_add(
+            message,
+            "weights.bin must be what this version has learned; it is damaged, truncated or another version's: "
+            "train again");
+    }
+    return HSEP_REFUSED;
+}
+
+/* Refuse outputs of a window that diverges. */
+static hsep_status online_converges(const hsep_predictor *predictor, char message[])
+{
+    static const char *const names[] = {"", "x_pb", "x_h", "x_dm"};
+    if (predictor->divergence == HSEP_CONVERGES) {
+        return HSEP_OK;
+    }
+    message[0] = '\0'; /* a warning of the step no longer matters */
+    return hsep_message_add(
+        message,
+        "%s must stay within " HSEP_PLUS_MINUS "%g m: the learned recursion diverges; raise lambda, lower p or reset",
+        names[predictor->divergence], HSEP_PREDICTION_MAX);
 }
 
 HSEP_API hsep_status hsep_model_initialise(
@@ -62,25 +316,26 @@ HSEP_API hsep_status hsep_model_initialise(
 {
     size_t needed = 0;
     online_state *self = state;
-    hsep_online_parameters parameters;
+    hsep_parameters parameters;
+    online_parameters derived;
     const double start = values[HSEP_VR_x_d_ahead];
-    if (online_checked(context, values, &parameters, message) != HSEP_OK ||
-        hsep_model_size(context, values, &needed, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, &derived, message) != HSEP_OK ||
+        online_size(&derived, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    HSEP_ONLINE(block_init)(&self->online, &parameters, start);
-    hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    if (hsep_weights_load(context, values, context->n_modes, predictor, message) != HSEP_OK) {
+    ONLINE(block_init)(&self->online, &derived, start);
+    hsep_predictor *predictor = online_predictor(&self->online);
+    if (online_load(context, values, &parameters, predictor, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_online_begin(&self->online);
-    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
+    online_begin(&self->online);
+    if (online_converges(predictor, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_online_write(&self->online, values);
+    online_write(&self->online, values);
     return HSEP_OK;
 }
 
@@ -95,34 +350,30 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 {
     online_state *self = state;
     const double *slopes = values + context->n_variables;
-    hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    const hsep_residual_model *model = hsep_predictor_model(predictor);
+    hsep_predictor *predictor = online_predictor(&self->online);
+    const int may_miss = hsep_residual_may_miss(hsep_predictor_model(predictor));
     const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]};
     const hsep_input x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]};
     hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
+    if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
-    const hsep_status status = hsep_inputs_count(
-        context, &self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
+    const hsep_status status =
+        hsep_inputs_count(context, &self->inputs, x_d_ahead, x_meas, may_miss, t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
-    hsep_online_tune(&self->online, values);
+    online_tune(&self->online, values);
     while (hsep_inputs_next(&self->inputs, &step)) {
-        (void)HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
-        if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
+        (void)ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
+        if (online_converges(predictor, message) != HSEP_OK) {
             return HSEP_REFUSED;
         }
     }
-    hsep_online_write(&self->online, values);
+    online_write(&self->online, values);
     return status;
 }
-
-#if HSEP_N_WINDOWS > 0
-HSEP_API hsep_predictor *hsep_model_predictor(void *state) { return &((online_state *)state)->online; }
-#endif
 
 #else
 typedef int hsep_no_online; /* a translation unit must not be empty */

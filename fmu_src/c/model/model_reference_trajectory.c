@@ -1,9 +1,8 @@
 /* ReferenceTrajectory: a source of commands, to be wired to HybridPredictor.x_d_ahead.
  *
- * The samples come from the resource trajectory_<n>.bin, n being the parameter trajectory:
- *   "HSEPTRJ1", their number as uint64, T_s as double, s, then the samples as doubles, m, all little-endian.
- * Sample k is the output from instant k on (hsep_clock.h); after the last one it stays. The samples are part of the
- * state, so a state's size follows from the file.
+ * The samples come from the resource trajectory_<n>.bin, n being the parameter trajectory: a head, then the samples as
+ * doubles, m, all little-endian. Sample k is the output from instant k on (hsep_clock.h); after the last one it stays.
+ * The samples are part of the state, so a state's size follows from the file.
  */
 #include "hsep_fmu.h"
 
@@ -14,12 +13,9 @@
 #endif
 
 #include "hsep_check.h"
-#include "hsep_clock.h"
-#include "hsep_model.h"
 #include "hsep_resource.h"
 #include "hsep_state.h"
 #include "hsep_text.h"
-#include "hsep_trajectory.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -32,37 +28,50 @@ static const double trajectory_tolerance = 1e-6; /* of T_s */
 typedef struct {
     hsep_state_header header;
     hsep_clock clock;
-    hsep_trajectory trajectory; /* its samples follow */
+    uint64_t count;   /* samples, >= 1 */
+    double samples[]; /* m */
 } trajectory_state;
+
+typedef struct {
+    char magic[8]; /* HSEPTRJ1 */
+    uint64_t count;
+    double T_s; /* s */
+} trajectory_head;
+
+HSEP_ASSERT_WORDS(trajectory_head, 3);
+
+/* Position at sample k >= 0, m: the last sample is held. */
+static double trajectory_position(const trajectory_state *self, int64_t k)
+{
+    return self->samples[(uint64_t)k < self->count ? (uint64_t)k : self->count - 1];
+}
 
 /* Check the parameters, open the chosen trajectory's file, read up to its first sample, and return the number of
  * samples. The caller closes it; NULL with a message if something does not fit. */
 static FILE *trajectory_open(const hsep_context *context, const double values[], uint64_t *count, char message[])
 {
     char name[TRAJECTORY_NAME_SIZE], expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
-    uint64_t head[2] = {0, 0};
-    double T_s = 0.0;
+    trajectory_head head;
     if (hsep_check_parameters(context, values, message) > 0) {
         return NULL;
     }
     hsep_text(name, sizeof name, "trajectory_%.0f.bin", values[HSEP_VR_trajectory]);
-    FILE *file = hsep_resource_open(context, name);
+    FILE *file = hsep_resource_open(context->resources, name);
     if (file == NULL) {
         hsep_message_add(
             message, "%s must be in the resources (%s) and readable", name,
             context->resources == NULL ? "none" : context->resources);
         return NULL;
     }
-    const double bytes = hsep_resource_head(file, "HSEPTRJ1", head, 2);
-    memcpy(&T_s, &head[1], sizeof T_s);
-    if (bytes < (double)sizeof(double) || (double)head[0] * (double)sizeof(double) != bytes) {
+    if (fread(&head, sizeof head, 1, file) != 1 || memcmp(head.magic, "HSEPTRJ1", sizeof head.magic) != 0 ||
+        head.count < 1 || (double)head.count * (double)sizeof(double) != (double)hsep_resource_left(file)) {
         hsep_message_add(message, "%s must be samples of a trajectory, at least one; it is damaged or truncated", name);
-    } else if (!(fabs(T_s - values[HSEP_VR_T_s]) <= trajectory_tolerance * values[HSEP_VR_T_s])) {
+    } else if (!(fabs(head.T_s - values[HSEP_VR_T_s]) <= trajectory_tolerance * values[HSEP_VR_T_s])) {
         hsep_message_add(
-            message, "T_s must be %s s, the interval of %s, got %s", hsep_number(expected, T_s, HSEP_REAL), name,
+            message, "T_s must be %s s, the interval of %s, got %s", hsep_number(expected, head.T_s, HSEP_REAL), name,
             hsep_number(got, values[HSEP_VR_T_s], HSEP_REAL));
     } else {
-        *count = head[0];
+        *count = head.count;
         return file;
     }
     fclose(file);
@@ -72,8 +81,7 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
 /* Size of a state with count samples, bytes. */
 static hsep_status trajectory_bytes(uint64_t count, size_t *size, char message[])
 {
-    const double before = (double)(sizeof(trajectory_state) - sizeof(hsep_trajectory));
-    return hsep_state_size(before + hsep_trajectory_size(count), size, message);
+    return hsep_state_size((double)sizeof(trajectory_state) + (double)count * (double)sizeof(double), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
@@ -109,18 +117,17 @@ HSEP_API hsep_status hsep_model_initialise(
         fclose(file);
         return HSEP_REFUSED;
     }
-    self->trajectory.count = count;
-    double *samples = hsep_trajectory_samples(&self->trajectory);
-    const size_t n_read = fread(samples, sizeof *samples, (size_t)count, file);
+    self->count = count;
+    const size_t n_read = fread(self->samples, sizeof self->samples[0], (size_t)count, file);
     fclose(file);
     for (uint64_t k = 0; k < count; k++) {
-        if (k >= n_read || !isfinite(samples[k])) {
+        if (k >= n_read || !isfinite(self->samples[k])) {
             return hsep_message_add(
                 message, "trajectory_%.0f.bin must be finite, got %s at sample %.0f", values[HSEP_VR_trajectory],
-                k < n_read ? hsep_number(number, samples[k], HSEP_REAL) : "nothing", (double)k);
+                k < n_read ? hsep_number(number, self->samples[k], HSEP_REAL) : "nothing", (double)k);
         }
     }
-    values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, 0);
+    values[HSEP_VR_r] = trajectory_position(self, 0);
     return HSEP_OK;
 }
 
@@ -135,7 +142,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     self->clock = step.after;
-    values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, self->clock.k);
+    values[HSEP_VR_r] = trajectory_position(self, self->clock.k);
     return hsep_check_moved(&step, message);
 }
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +70,7 @@ def closed_loop(
     axis: Axis,
     compensate: str,
     sensor: Sensor = lambda _k, x: x,
-    resources: Path | None = None,
+    weights: bytes | None = None,
     **more: float,
 ) -> Loop:
     """Return a run of a drive behind its compensator.
@@ -84,8 +83,8 @@ def closed_loop(
     compensate : {"off", "physics", "hybrid"}
     sensor : callable, optional
         Called as ``sensor(k, x_meas)``; returns what is measured in its place.
-    resources : Path, optional
-        Folder with weights that it starts with.
+    weights : bytes, optional
+        Content of ``weights.bin``, with which it starts.
     **more
         Parameters of the compensator's FMU besides.
     """
@@ -99,7 +98,7 @@ def closed_loop(
     values |= {**predictor.to_fmi(), **compensator.to_fmi(), "dead_time": recipe.model.dead_time}
     assert compensator.limits is not None
     values |= {**compensator.limits.to_fmi(), "compensate": PARAMETERS["compensate"].to_fmi(compensate), **more}
-    core = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}, resources).initialise()
+    core = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}, weights=weights).initialise()
     drive = TwoMassDrive(replace(axis, change_at=axis.change_at + late), start)
     ahead, measured, modified, state = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_dm", "sep_state"))
     n, T_s, noise, quantum = len(x_d), axis.T_s, recipe.noise.tolist(), recipe.encoder.quantum

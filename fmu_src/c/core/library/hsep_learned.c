@@ -5,33 +5,28 @@
 
 #include <string.h>
 
-#define LEARNED_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
-
-/* As hsep_learned_source's: from memory. */
-static size_t learned_read_memory(hsep_learned_source *self, void *to, size_t size)
+HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size)
 {
-    const size_t read = size < self->left ? size : self->left;
-    memcpy(to, self->bytes, read);
-    self->bytes += read;
-    self->left -= read;
-    return read;
+    if (size > from->left) {
+        return 0;
+    }
+    memcpy(to, from->bytes, size);
+    from->bytes += size;
+    from->left -= size;
+    return 1;
 }
 
-HSEP_API hsep_learned_source hsep_learned_in_memory(const void *bytes, size_t size)
+HSEP_API int hsep_learned_next(hsep_learned_bytes *from, hsep_learned_setting *setting)
 {
-    return (hsep_learned_source){.read = learned_read_memory, .bytes = bytes, .left = size};
+    return hsep_learned_read(from, setting, sizeof *setting) && setting->name[sizeof setting->name - 1] == '\0';
 }
 
-HSEP_API int hsep_learned_read(hsep_learned_source *source, void *to, size_t size)
-{
-    return source->read(source, to, size) == size;
-}
-
-HSEP_API int hsep_learned_numbers(hsep_learned_source *source, hsep_real to[], uint64_t n)
+/* Read n numbers, which a file has in 8 bytes each; 0 if there are less. */
+static int learned_numbers(hsep_learned_bytes *from, hsep_real to[], uint64_t n)
 {
     for (uint64_t i = 0; i < n; i++) {
         double number;
-        if (!hsep_learned_read(source, &number, sizeof number)) {
+        if (!hsep_learned_read(from, &number, sizeof number)) {
             return 0;
         }
         to[i] = (hsep_real)number;
@@ -39,46 +34,14 @@ HSEP_API int hsep_learned_numbers(hsep_learned_source *source, hsep_real to[], u
     return 1;
 }
 
-HSEP_API int hsep_learned_whole(hsep_learned_source *source, double *size)
-{
-    unsigned char bytes[LEARNED_CHUNK + sizeof(uint64_t)];
-    uint32_t crc = 0;
-    uint64_t sum = 0;
-    size_t held = 0; /* of the bytes: the last 8 so far may be the checksum */
-    *size = 0.0;
-    for (;;) {
-        const size_t read = source->read(source, bytes + held, sizeof bytes - held);
-        *size += (double)read;
-        held += read;
-        if (held < sizeof bytes) {
-            break;
-        }
-        crc = hsep_crc(crc, bytes, LEARNED_CHUNK);
-        held -= LEARNED_CHUNK;
-        memcpy(bytes, bytes + LEARNED_CHUNK, held);
-    }
-    if (held < sizeof sum) {
-        return 0;
-    }
-    memcpy(&sum, bytes + held - sizeof sum, sizeof sum);
-    return sum == hsep_crc(crc, bytes, held - sizeof sum);
-}
-
-/* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
-static int learned_take_numbers(hsep_learned_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
-{
-    return hsep_learned_numbers(source, hsep_residual_learned(model), hsep_residual_n_learned(model)) &&
-           hsep_learned_numbers(source, uncertainty->theta, HSEP_N_UNCERTAINTY);
-}
-
 /* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
-static int learned_take_factor(hsep_learned_source *source, hsep_residual_model *model, hsep_int factor)
+static int learned_take_factor(hsep_learned_bytes *from, hsep_residual_model *model, hsep_int factor)
 {
     const hsep_int n = hsep_residual_n_features(model, factor);
     hsep_real n_rows = 0.0;
-    int taken = hsep_learned_numbers(source, &n_rows, 1);
+    int taken = learned_numbers(from, &n_rows, 1);
     for (hsep_int i = 0; taken && i <= n; i++) {
-        taken = hsep_learned_numbers(source, hsep_residual_factor_row(model, factor), n + 1 - i);
+        taken = learned_numbers(from, hsep_residual_factor_row(model, factor), n + 1 - i);
         hsep_residual_load(model, factor, i, n_rows);
     }
     return taken;
@@ -95,16 +58,18 @@ static double learned_size(const hsep_learned_head *head, hsep_residual_model *m
     return (double)sizeof *head + words * (double)sizeof(double);
 }
 
-HSEP_API int hsep_learned_take(
-    hsep_learned_source *source, const hsep_learned_head *head, double size, hsep_predictor *predictor)
+/* Take what follows the settings, of a file of so many bytes: 0 if it is not what these settings learn. */
+static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head, size_t size, hsep_predictor *predictor)
 {
     hsep_residual_model *model = hsep_predictor_model(predictor);
-    if (head->n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) || size != learned_size(head, model) ||
-        !learned_take_numbers(source, model, hsep_predictor_uncertainty(predictor))) {
+    if (head->n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) ||
+        (double)size != learned_size(head, model) ||
+        !learned_numbers(from, hsep_residual_learned(model), hsep_residual_n_learned(model)) ||
+        !learned_numbers(from, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY)) {
         return 0;
     }
     for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!learned_take_factor(source, model, i)) {
+        if (!learned_take_factor(from, model, i)) {
             return 0;
         }
     }
@@ -167,17 +132,23 @@ static uint64_t learned_n_settings(const hsep_parameters *parameters)
     return n + n_mode * parameters->n_modes;
 }
 
+/* Whether the last 8 bytes are the checksum of the others. */
+static int learned_is_whole(const unsigned char *bytes, size_t size)
+{
+    uint64_t sum = 0;
+    if (size < sizeof sum) {
+        return 0;
+    }
+    memcpy(&sum, bytes + size - sizeof sum, sizeof sum);
+    return sum == hsep_crc(0, bytes, size - sizeof sum);
+}
+
 HSEP_API hsep_began
 hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, const void *bytes, size_t size)
 {
-    hsep_learned_source source = hsep_learned_in_memory(bytes, size);
+    hsep_learned_bytes from = {bytes, size};
     hsep_learned_head head;
-    double counted = 0.0;
-    if (!hsep_learned_whole(&source, &counted)) {
-        return HSEP_WEIGHTS_DAMAGED;
-    }
-    source = hsep_learned_in_memory(bytes, size);
-    if (!hsep_learned_read(&source, &head, sizeof head) ||
+    if (!learned_is_whole(bytes, size) || !hsep_learned_read(&from, &head, sizeof head) ||
         memcmp(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic) != 0) {
         return HSEP_WEIGHTS_DAMAGED;
     }
@@ -186,12 +157,12 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
     }
     for (uint64_t i = 0; i < head.n_settings; i++) {
         hsep_learned_setting setting;
-        if (!hsep_learned_read(&source, &setting, sizeof setting) || setting.name[sizeof setting.name - 1] != '\0') {
+        if (!hsep_learned_next(&from, &setting)) {
             return HSEP_WEIGHTS_DAMAGED;
         }
         if (!learned_agrees(&setting, parameters)) {
             return HSEP_WEIGHTS_OTHER;
         }
     }
-    return hsep_learned_take(&source, &head, counted, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
+    return learned_take(&from, &head, size, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
 }
