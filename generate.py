@@ -27,7 +27,6 @@ ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_settings.h"
 CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_predict_constants.h"
 PLAN_CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "compensate" / "hsep_plan_constants.h"
-RANGES_HEADER = ROOT / "fmu_src" / "c" / "core" / "library" / "hsep_ranges.h"
 
 Declared = Mapping[str, list[ModuleType]]
 
@@ -66,7 +65,6 @@ def generated() -> dict[Path, str]:
     """Return the files that are generated, as they must be."""
     headers = {
         SETTINGS_HEADER: settings_header(),
-        RANGES_HEADER: ranges_header(),
         CONSTANTS_HEADER: constants_header(),
         PLAN_CONSTANTS_HEADER: plan_constants_header(),
     }
@@ -74,14 +72,19 @@ def generated() -> dict[Path, str]:
 
 
 def settings_header() -> str:
-    """Return the C header of the settings of predictor and compensator."""
+    """Return the C header of the settings of predictor and compensator, with the ranges of a mode's numbers."""
     lists = (
-        ("PREDICTOR", PREDICTOR_SETTINGS),
-        ("AVERAGING", AVERAGING_SETTINGS),
-        ("COMPENSATOR", COMPENSATOR_SETTINGS),
+        ("predictor", PREDICTOR_SETTINGS),
+        ("averaging", AVERAGING_SETTINGS),
+        ("compensator", COMPENSATOR_SETTINGS),
+        ("mode", {name: PARAMETERS[name] for name in ("f_n", "zeta", "alpha", "beta")}),
     )
     return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
- * Whole numbers, truth values and choices are hsep_int, those that may be negative hsep_signed. */
+ * Whole numbers, truth values and choices are hsep_int, those that may be negative hsep_signed.
+ *
+ * SETTING(of, type, name, usual, least, most, nonzero, automatic, learned): the default; closed bounds; the least
+ * magnitude of what is not 0, 0 if there is none; a value beside the range that stands for an automatic choice, or
+ * least again; whether weights that were learned with another value mean something else. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 
@@ -90,7 +93,7 @@ def settings_header() -> str:
 /* clang-format off */
 {"".join(_list(name, settings) for name, settings in lists)}/* clang-format on */
 
-#define HSEP_SETTING(type, name) type name;
+#define HSEP_SETTING(of, type, name, ...) type name;
 
 typedef struct {{
     HSEP_PREDICTOR_SETTINGS(HSEP_SETTING)
@@ -109,30 +112,6 @@ static inline hsep_int hsep_late(const hsep_predictor_settings *settings)
 {{
     return settings->measurement_delay > 0 ? (hsep_int)settings->measurement_delay : 0;
 }}
-
-#endif
-"""
-
-
-def ranges_header() -> str:
-    """Return the C header of the ranges and defaults of the library's parameters."""
-    modes = {name: PARAMETERS[name] for name in ("f_n", "zeta", "alpha", "beta")}
-    lists = (
-        ("PREDICTOR", PREDICTOR_SETTINGS),
-        ("AVERAGING", AVERAGING_SETTINGS),
-        ("COMPENSATOR", COMPENSATOR_SETTINGS),
-        ("MODE", modes),
-    )
-    return f"""/* Ranges of the library's parameters, generated from hybridsep/base/settings.py.
- *
- * RANGE(type, name, usual, least, most, nonzero, automatic, learned): the default; closed bounds; the least magnitude
- * of what is not 0, 0 if there is none; a value beside the range that stands for an automatic choice, or least again;
- * whether weights that were learned with another value mean something else. */
-#ifndef HSEP_RANGES_H
-#define HSEP_RANGES_H
-
-/* clang-format off */
-{"".join(_ranges(name, settings) for name, settings in lists)}/* clang-format on */
 
 #endif
 """
@@ -229,27 +208,19 @@ def _c_type(parameter: Parameter) -> str:
     return "hsep_real" if parameter.kind is float else "hsep_signed" if parameter.minimum < 0 else "hsep_int"
 
 
-def _list(name: str, settings: Mapping[str, Parameter]) -> str:
+def _list(of: str, settings: Mapping[str, Parameter]) -> str:
     rows: list[str] = []
     for setting, parameter in settings.items():
-        kind = _c_type(parameter)
         unit = "" if parameter.unit == "1" else f", {parameter.unit}"
         items = ", ".join(f"{number} {item}" for number, item in enumerate(parameter.choices))
         meaning = parameter.description.replace("·", " ") + (f": {items}" if items else unit)
-        rows += [f"    /* {meaning} */", f"    SETTING({kind}, {setting})"]
-    return f"#define HSEP_{name}_SETTINGS(SETTING) \\\n" + " \\\n".join(rows) + "\n\n"
-
-
-def _ranges(name: str, settings: Mapping[str, Parameter]) -> str:
-    rows = []
-    for setting, parameter in settings.items():
-        kind = _c_type(parameter)
         usual = 0.0 if parameter.default is None else parameter.to_fmi(parameter.default)
         automatic = parameter.minimum if parameter.automatic is None else parameter.automatic
         numbers = (usual, parameter.minimum, parameter.maximum, parameter.nonzero, automatic)
         values = ", ".join(repr(float(number)) for number in numbers)
-        rows.append(f"    RANGE({kind}, {setting}, {values}, {int(parameter.learned)})")
-    return f"#define HSEP_{name}_RANGES(RANGE) \\\n" + " \\\n".join(rows) + "\n\n"
+        row = f"    SETTING({of}, {_c_type(parameter)}, {setting}, {values}, {int(parameter.learned)})"
+        rows += [f"    /* {meaning} */", row]
+    return f"#define HSEP_{of.upper()}_SETTINGS(SETTING) \\\n" + " \\\n".join(rows) + "\n\n"
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ typedef struct {
 /* How the command runs between samples, of the setting input_hold. */
 typedef enum { HSEP_ZERO_ORDER_HOLD = 0, HSEP_FIRST_ORDER_HOLD = 1 } hsep_hold;
 
-/* Settings, each with unit and meaning in hsep_settings.h, its range in hsep_ranges.h. */
+/* Settings, each with meaning, unit and range in hsep_settings.h. */
 typedef struct {
     hsep_predictor_settings predictor;
     hsep_averaging_settings averaging;

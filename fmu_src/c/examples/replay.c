@@ -188,7 +188,7 @@ int main(int argc, char *argv[])
     if (size == 0) {
         const char *refused = hsep_predictor_refused(&parameters);
         fprintf(
-            stderr, "%s is out of its range (hsep_ranges.h)\n", refused == NULL ? "the size of the block" : refused);
+            stderr, "%s is out of its range (hsep_settings.h)\n", refused == NULL ? "the size of the block" : refused);
         return 2;
     }
     double *log = read_log(argv[1], &n);

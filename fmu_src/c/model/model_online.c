@@ -159,7 +159,7 @@ static hsep_predictor *online_predictor(hsep_compensator *self) { return hsep_co
 
 static hsep_compensator_parameters online_derive(const double values[], hsep_parameters *parameters)
 {
-#define READ(type, name) parameters->compensator.name = (type)values[HSEP_VR_##name];
+#define READ(of, type, name, ...) parameters->of.name = (type)values[HSEP_VR_##name];
     HSEP_COMPENSATOR_SETTINGS(READ)
 #undef READ
     return hsep_compensator_derive(parameters);
@@ -218,10 +218,8 @@ static hsep_status online_checked(
         return HSEP_REFUSED;
     }
     *parameters = (hsep_parameters){.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
-#define READ(type, name) parameters->predictor.name = (type)values[HSEP_VR_##name];
+#define READ(of, type, name, ...) parameters->of.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
-#undef READ
-#define READ(type, name) parameters->averaging.name = (type)values[HSEP_VR_##name];
     HSEP_AVERAGING_SETTINGS(READ)
 #undef READ
     *derived = online_derive(values, parameters);

@@ -10,7 +10,6 @@
 #include "hsep_paper.h"
 #include "hsep_parameters.h"
 #include "hsep_planner.h"
-#include "hsep_ranges.h"
 #include "hsep_stacking.h"
 
 #include <limits.h>
@@ -181,17 +180,11 @@ void prove_sizes(void)
 {
     hsep_parameters parameters;
     hsep_mode modes[2 - SHORT];
-#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters.predictor.name = (type)Frama_C_double_interval(least, most);
-    HSEP_PREDICTOR_RANGES(ANY)
-#undef ANY
-#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters.averaging.name = (type)Frama_C_double_interval(least, most);
-    HSEP_AVERAGING_RANGES(ANY)
-#undef ANY
-#define ANY(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters.compensator.name = (type)Frama_C_double_interval(least, most);
-    HSEP_COMPENSATOR_RANGES(ANY)
+#define ANY(of, type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters.of.name = (type)Frama_C_double_interval(least, most);
+    HSEP_PREDICTOR_SETTINGS(ANY)
+    HSEP_AVERAGING_SETTINGS(ANY)
+    HSEP_COMPENSATOR_SETTINGS(ANY)
 #undef ANY
     parameters.n_modes = 2;
     parameters.modes = modes;

@@ -1,7 +1,6 @@
 #include "hsep_learned.h"
 
 #include "hsep_crc.h"
-#include "hsep_ranges.h"
 
 #include <string.h>
 
@@ -91,11 +90,11 @@ static const hsep_real *learned_mode_number(const hsep_parameters *parameters, c
         return NULL;
     }
     const hsep_mode *found = &parameters->modes[mode - 1];
-#define NUMBER(type, number, usual, least, most, nonzero, automatic, learned) \
+#define NUMBER(of, type, number, ...) \
     if (strcmp(name + 2, #number) == 0) { \
         return &found->number; \
     }
-    HSEP_MODE_RANGES(NUMBER)
+    HSEP_MODE_SETTINGS(NUMBER)
 #undef NUMBER
     return NULL;
 }
@@ -107,17 +106,12 @@ static int learned_agrees(const hsep_learned_setting *setting, const hsep_parame
     if (number != NULL) {
         return *number == (hsep_real)setting->value;
     }
-#define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
+#define SAME(of, type, own, usual, least, most, nonzero, automatic, learned) \
     if (learned && strcmp(setting->name, #own) == 0) { \
-        return (hsep_real)parameters->predictor.own == (hsep_real)setting->value; \
+        return (hsep_real)parameters->of.own == (hsep_real)setting->value; \
     }
-    HSEP_PREDICTOR_RANGES(SAME)
-#undef SAME
-#define SAME(type, own, usual, least, most, nonzero, automatic, learned) \
-    if (learned && strcmp(setting->name, #own) == 0) { \
-        return (hsep_real)parameters->averaging.own == (hsep_real)setting->value; \
-    }
-    HSEP_AVERAGING_RANGES(SAME)
+    HSEP_PREDICTOR_SETTINGS(SAME)
+    HSEP_AVERAGING_SETTINGS(SAME)
 #undef SAME
     return 0;
 }
@@ -125,9 +119,9 @@ static int learned_agrees(const hsep_learned_setting *setting, const hsep_parame
 /* Settings that weights depend on, the modes' numbers among them. */
 static uint64_t learned_n_settings(const hsep_parameters *parameters)
 {
-#define COUNT(type, own, usual, least, most, nonzero, automatic, learned) +(learned)
-    const uint64_t n = 0 HSEP_PREDICTOR_RANGES(COUNT) HSEP_AVERAGING_RANGES(COUNT);
-    const uint64_t n_mode = 0 HSEP_MODE_RANGES(COUNT);
+#define COUNT(of, type, own, usual, least, most, nonzero, automatic, learned) +(learned)
+    const uint64_t n = 0 HSEP_PREDICTOR_SETTINGS(COUNT) HSEP_AVERAGING_SETTINGS(COUNT);
+    const uint64_t n_mode = 0 HSEP_MODE_SETTINGS(COUNT);
 #undef COUNT
     return n + n_mode * parameters->n_modes;
 }

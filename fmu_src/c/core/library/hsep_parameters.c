@@ -1,7 +1,6 @@
 #include "hsep_parameters.h"
 
 #include "hsep_math.h"
-#include "hsep_ranges.h"
 
 #include <string.h>
 
@@ -11,61 +10,42 @@ static const hsep_real parameters_warm_up = 0.3;            /* s, where it is au
 HSEP_API void hsep_defaults(hsep_parameters *parameters)
 {
     memset(parameters, 0, sizeof *parameters);
-#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->predictor.name = (type)usual;
-    HSEP_PREDICTOR_RANGES(USUAL)
-#undef USUAL
-#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->averaging.name = (type)usual;
-    HSEP_AVERAGING_RANGES(USUAL)
-#undef USUAL
-#define USUAL(type, name, usual, least, most, nonzero, automatic, learned) parameters->compensator.name = (type)usual;
-    HSEP_COMPENSATOR_RANGES(USUAL)
+#define USUAL(of, type, name, usual, least, most, nonzero, automatic, learned) parameters->of.name = (type)usual;
+    HSEP_PREDICTOR_SETTINGS(USUAL)
+    HSEP_AVERAGING_SETTINGS(USUAL)
+    HSEP_COMPENSATOR_SETTINGS(USUAL)
 #undef USUAL
 }
 
-/* Whether a value is in a range, in which nonzero is the least magnitude but 0; NaN is not. */
-static int parameters_within(hsep_real value, hsep_real least, hsep_real most, hsep_real nonzero, hsep_real automatic)
-{
-    const int tiny = hsep_fabs(value) > 0.0 && hsep_fabs(value) < nonzero;
-    return (value >= least && value <= most && !tiny) || value == automatic;
-}
-
-/* Refuse a parameter whose value is out of its range, unless another one is refused already. */
+/* Refuse a parameter whose value is out of its range, in which nonzero is the least magnitude but 0, unless another one
+ * is refused already; NaN is in no range. */
 static void parameters_check(
     const char **refused, const char *name, hsep_real value, hsep_real least, hsep_real most, hsep_real nonzero,
     hsep_real automatic)
 {
-    if (*refused == NULL && !parameters_within(value, least, most, nonzero, automatic)) {
+    const int tiny = hsep_fabs(value) > 0.0 && hsep_fabs(value) < nonzero;
+    const int allowed = (value >= least && value <= most && !tiny) || value == automatic;
+    if (*refused == NULL && !allowed) {
         *refused = name;
     }
 }
 
-static const char *parameters_mode_refused(const hsep_mode *mode)
-{
-    const char *refused = NULL;
-#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters_check(&refused, #name, mode->name, least, most, nonzero, automatic);
-    HSEP_MODE_RANGES(CHECK)
-#undef CHECK
-    return refused;
-}
+#define CHECK(of, type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, (hsep_real)parameters->of.name, least, most, nonzero, automatic);
+#define CHECK_MODE(of, type, name, usual, least, most, nonzero, automatic, learned) \
+    parameters_check(&refused, #name, parameters->modes[i].name, least, most, nonzero, automatic);
 
 HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters)
 {
     const hsep_predictor_settings *settings = &parameters->predictor;
     const char *refused = NULL;
-#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters_check(&refused, #name, (hsep_real)settings->name, least, most, nonzero, automatic);
-    HSEP_PREDICTOR_RANGES(CHECK)
-#undef CHECK
-#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters_check(&refused, #name, (hsep_real)parameters->averaging.name, least, most, nonzero, automatic);
-    HSEP_AVERAGING_RANGES(CHECK)
-#undef CHECK
+    HSEP_PREDICTOR_SETTINGS(CHECK)
+    HSEP_AVERAGING_SETTINGS(CHECK)
     if (refused == NULL && (parameters->n_modes < 1 || parameters->modes == NULL)) {
         refused = "modes";
     }
     for (hsep_int i = 0; refused == NULL && i < parameters->n_modes; i++) {
-        refused = parameters_mode_refused(&parameters->modes[i]);
+        HSEP_MODE_SETTINGS(CHECK_MODE)
     }
     if (refused != NULL) {
         return refused;
@@ -78,10 +58,7 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
     const hsep_compensator_settings *settings = &parameters->compensator;
     const hsep_predictor_settings *predictor = &parameters->predictor;
     const char *refused = hsep_predictor_refused(parameters);
-#define CHECK(type, name, usual, least, most, nonzero, automatic, learned) \
-    parameters_check(&refused, #name, (hsep_real)settings->name, least, most, nonzero, automatic);
-    HSEP_COMPENSATOR_RANGES(CHECK)
-#undef CHECK
+    HSEP_COMPENSATOR_SETTINGS(CHECK)
     if (refused != NULL) {
         return refused;
     }
@@ -93,6 +70,9 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
     }
     return predictor->measurement_delay > 0 && !parameters->averaging.averaging ? "measurement_delay" : NULL;
 }
+
+#undef CHECK_MODE
+#undef CHECK
 
 /* Warm-up, s. */
 static hsep_real parameters_t_init(const hsep_parameters *parameters)
