@@ -134,13 +134,13 @@ class PlanModel:
     """
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
-        self._model, self._static, self._discrete = model, model.fixed.static, model.fixed.static.discrete
+        self._model, self._static, self._discrete = model, model.static, model.static.discrete
         self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
         window = self._window(x_d)
         self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
-        behind = counts[len(late) + model.fixed.settings.Np :]
+        behind = counts[len(late) + model.settings.Np :]
         behind -= np.arange(len(behind)) % _APART
         self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
@@ -195,7 +195,7 @@ class PlanModel:
 
     def _late_changes(self, changes: Array) -> Array:
         """Return what changes of the commands are after the dead time, ``(n, m)``, m."""
-        d = min(self._model.fixed.command.dead_time, len(changes))
+        d = min(self._model.command.dead_time, len(changes))
         return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
 
     def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:

@@ -236,7 +236,7 @@ class LookAhead:
     @property
     def may_miss(self) -> bool:
         """Whether measurements may be NaN, which is missing."""
-        return self.predictor.residual.may_miss
+        return self.predictor.settings.averaging
 
     @property
     def batch(self) -> int:

@@ -32,11 +32,9 @@ class PaperModel:
     regression : RidgeRegression
     """
 
-    may_miss: ClassVar[bool] = False
     n_rejected: ClassVar[int] = 0
     farthest: ClassVar[float] = 0.0
     learned: ClassVar[tuple[()]] = ()
-    n_scaled: ClassVar[int] = 0
 
     settings: PredictorSettings = field(metadata=FIXED)
     x_pb: Array

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,11 +28,14 @@ from .averaging.start import motion_before
 from .paper import PaperModel
 from .regression import RidgeRegression
 from .uncertainty import Uncertainty, first_variance
-from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualModel, ResidualWindow, WindowOperator
+from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualWindow, WindowOperator
 
 __all__ = ["HybridPredictor", "PredictorState"]
 
 _KIND = "predictor"
+
+ResidualModel: TypeAlias = PaperModel | AveragedModel
+"""Model of the residual: a record; its methods return another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,6 @@ class PredictorState:
     late : (n_late,) array, m
         Commands that are predicted and not measured yet.
     residual : ResidualModel
-        PaperModel or AveragedModel.
     uncertainty : Uncertainty
     """
 
@@ -235,14 +237,14 @@ class HybridPredictor:
         """
         if self.pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
-        state, (forecast, error) = self.state, self.pending
-        residual, physics = state.residual, state.physics
-        measured = as_measured(x, "x") if residual.may_miss else as_samples(x, "x")
+        state, forecast, error = self.state, cast(Any, self.pending.forecast), self.pending.error
+        residual, physics, may_miss = state.residual, state.physics, self.settings.averaging
+        measured = as_measured(x, "x") if may_miss else as_samples(x, "x")
         if not 1 <= len(measured) <= self.n_pending:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m, start, late = len(measured), forecast.window.start, len(state.late)
         e_pb = measured - start - forecast.window.x_pb[:m]
-        if state.k == 0 and residual.may_miss and not self.planned:
+        if state.k == 0 and may_miss and not self.planned:
             # The run may have begun in motion.
             x_d, x_pb, _, path = forecast.window
             before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)

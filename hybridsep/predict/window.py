@@ -1,9 +1,9 @@
-"""Look-ahead window: its prediction, pending and published, its lifted affine operator, and its residual's model."""
+"""Look-ahead window: its prediction, pending and published, and its lifted affine operator."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,6 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
-from .regression import RidgeRegression
 from .uncertainty import PredictedError
 
 __all__ = [
@@ -19,7 +18,6 @@ __all__ = [
     "Forecast",
     "PredictedWindow",
     "Prediction",
-    "ResidualModel",
     "ResidualWindow",
     "WindowOperator",
 ]
@@ -172,64 +170,3 @@ class WindowOperator:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
         command = as_samples(x_d, "x_d", len(self.g_h))
         return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free
-
-
-class ResidualModel(Protocol):
-    """State of a model of the residual ``e_pb = x − x_pb``: what the paper's and the averaged one have in common.
-
-    A state is a record; a method returns another.
-    """
-
-    @property
-    def may_miss(self) -> bool:
-        """Whether a measurement may be missing, and a run begin in motion."""
-
-    @property
-    def learned(self) -> Any:
-        """What has been learned besides the rows: a record of the numbers of a weights file."""
-
-    @property
-    def regressions(self) -> tuple[RidgeRegression, ...]:
-        """All regressions that another run begins with."""
-
-    @property
-    def lag_weights(self) -> Array:
-        """Autoregressive weights, ``(p,)``."""
-
-    @property
-    def n_scaled(self) -> int:
-        """Features with scales; 0 if it has none."""
-
-    @property
-    def last(self) -> float:
-        """Last residual that counts, m."""
-
-    @property
-    def farthest(self) -> float:
-        """Largest residual among the last samples, m, where these were rejected; else 0."""
-
-    @property
-    def n_rejected(self) -> int:
-        """Measurements of this run that were missing or not plausible."""
-
-    def restart(self) -> ResidualModel:
-        """Return the model at the beginning of another run, at rest; what was learned is kept."""
-
-    def plan_ahead(self) -> ResidualModel:
-        """Return the model where a compensator decides the commands."""
-
-    def take_over(self, learned: Any, regressions: tuple[RidgeRegression, ...]) -> ResidualModel:
-        """Return the model with what another one of its kind has learned."""
-
-    def begin_in_motion(self, window: ResidualWindow, scales: Any) -> ResidualModel:
-        """Return the model at the beginning of a run whose first window, of ``scales``, has motion before it."""
-
-    def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:
-        """Predict the residual over the next window; a compensator gives the ``scales`` of its preview."""
-
-    def learn(self, forecast: Any, x: Array, *, fold: bool = True) -> tuple[ResidualModel, NDArray[np.bool_]]:
-        """Return the model that has learned from a window measured at ``x``, and which samples it accepted, ``(m,)``.
-
-        Positions, m, are relative to the start, NaN where missing. Without ``fold`` they are not learned; the next
-        window starts from them in any case.
-        """

@@ -57,7 +57,7 @@ def test_windows_are_predicted_from_the_last_measurement_on(delay: int, settings
     predictor, peer = new(delay, **settings), new(0, **settings)
     if settings["averaging"]:  # only what is published is judged
         model = averaged_model(peer)
-        model = replace(model, fixed=replace(model.fixed, settings=predictor.settings))
+        model = replace(model, settings=predictor.settings)
         peer.state = replace(peer.state, residual=model)
     commands = np.concatenate((np.full(delay, x_d[0]), x_d))
     for k in range(0, N, NP):

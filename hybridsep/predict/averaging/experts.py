@@ -384,7 +384,7 @@ class Regression(Expert):
 
     def solve(self, model: Any, scales: FeatureScales) -> SolvedExpert | None:
         """Return the expert with the weights that follow from all rows; None if it knows nothing."""
-        like, settings = self.like(model), model.fixed.settings
+        like, settings = self.like(model), model.settings
         kind, variance = like.target, model.noise_of(self)
         square = model.learned.scales[kind].largest_square
         outgrown = kind == MODEL_RESIDUAL and scales.velocity != model.learned.velocity_scale
@@ -394,10 +394,10 @@ class Regression(Expert):
         if rows.n_rows == 0.0:
             return None
         if kind == COMMAND_RESIDUAL:
-            command, square = model.fixed.command, scales.command_square
+            command, square = model.command, scales.command_square
             p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
         else:
-            p, shares, largest = settings.p, model.fixed.static.shares, scales.largest
+            p, shares, largest = settings.p, model.static.shares, scales.largest
         effect = settings.effect or math.sqrt(square)
         priors = effect * shares / np.maximum(largest, _LEAST)
         return solve(rows, variance, priors, p if like.has_lags else 0)
@@ -411,7 +411,7 @@ class Regression(Expert):
         if kind == COMMAND_RESIDUAL:
             scale = scale.grown(at.growth)
             most = CONSTANTS.bound_of_command * scale.largest
-            rows = model.fixed.command.rows(model.run.commands, at.window.x_d)
+            rows = model.command.rows(model.run.commands, at.window.x_d)
         return at.solved[self].predict(rows, model.run.past[kind], scale.largest_square, most, held, counts)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
@@ -421,7 +421,7 @@ class Regression(Expert):
         e_h, model = at.predictions[self].e_h, at.model
         if self.like(model).target == MODEL_RESIDUAL:
             return e_h
-        command, most = model.fixed.command.late(model.run.commands, at.window.x_d), at.growth * at.bound
+        command, most = model.command.late(model.run.commands, at.window.x_d), at.growth * at.bound
         return np.asarray(np.clip(e_h + (command - at.window.x_pb), -most, most))
 
 
@@ -431,7 +431,7 @@ class Recall(Expert):
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return it within the bound, moved to the last residual, which fades."""
-        n, Np = len(at.window.x_d), at.model.fixed.settings.Np
+        n, Np = len(at.window.x_d), at.model.settings.Np
         residuals, before, _ = at.recalled
         fade = np.exp(-np.arange(1, n + 1) / (CONSTANTS.recall_fade * Np))
         return np.asarray(np.clip(residuals[:n] + (at.last - before) * fade, -at.bound, at.bound))

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,28 +47,11 @@ from .recall import Memory
 from .stacking import Stack
 from .warm_start import WarmStartRows
 
-__all__ = ["AveragedForecast", "AveragedModel", "Learned", "Parameters", "RunState"]
+__all__ = ["AveragedForecast", "AveragedModel", "Learned", "RunState"]
 
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
 penalties come from: a controller factors most of that solution in them."""
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """What does not change.
-
-    Attributes
-    ----------
-    settings : PredictorSettings
-        ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
-    static : StaticFeatures
-    command : CommandFeatures
-    """
-
-    settings: PredictorSettings
-    static: StaticFeatures
-    command: CommandFeatures
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +83,10 @@ class RunState:
     memory: Memory
 
     @classmethod
-    def init(cls, fixed: Parameters, memory: Memory) -> RunState:
+    def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
         """Return the beginning of a run, at rest."""
-        p, command = fixed.settings.p, fixed.command
         past, bridged = (np.zeros(p), np.zeros(command.p)), np.zeros(max(p, command.p), dtype=np.bool_)
-        return cls(fixed.static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0, memory)
+        return cls(static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0, memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,10 +117,10 @@ class Learned:
     largest: Array
 
     @classmethod
-    def init(cls, fixed: Parameters) -> Learned:
+    def init(cls, n_static: int) -> Learned:
         """Return that nothing has been learned."""
         scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * len(REGRESSIONS)
-        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(fixed.static.n))
+        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(n_static))
 
     def errors_of(self, expert: Regression) -> ExpertErrors:
         """Return what is known of the errors of an expert."""
@@ -184,7 +165,10 @@ class AveragedModel:
 
     Attributes
     ----------
-    fixed : Parameters
+    settings : PredictorSettings
+        ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
+    static : StaticFeatures
+    command : CommandFeatures
     learned : Learned
     evidence : pair of WarmStartRows
         Rows of the residuals of the physics model, and of the command.
@@ -197,9 +181,9 @@ class AveragedModel:
     run : RunState
     """
 
-    may_miss: ClassVar[bool] = True
-
-    fixed: Parameters = field(metadata=FIXED)
+    settings: PredictorSettings = field(metadata=FIXED)
+    static: StaticFeatures = field(metadata=FIXED)
+    command: CommandFeatures = field(metadata=FIXED)
     learned: Learned
     evidence: tuple[WarmStartRows, WarmStartRows]
     noise: tuple[float, ...]
@@ -221,19 +205,14 @@ class AveragedModel:
         own : tuple of Disturbance
             Of the user's own.
         """
-        static = StaticFeatures(discrete, settings.q, settings.period, own)
-        fixed = Parameters(settings, static, CommandFeatures(discrete.dead_time))
-        evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * fixed.command.p + 2)
-        noise, leader = (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
-        return cls(
-            fixed,
-            Learned.init(fixed),
-            evidence,
-            noise,
-            0.0,
-            leader,
-            RunState.init(fixed, Memory.init(settings.recall, settings.Np)),
+        static, command = (
+            StaticFeatures(discrete, settings.q, settings.period, own),
+            CommandFeatures(discrete.dead_time),
         )
+        evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * command.p + 2)
+        learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
+        run = RunState.init(settings.p, static, command, Memory.init(settings.recall, settings.Np))
+        return cls(settings, static, command, learned, evidence, noise, 0.0, leader, run)
 
     @property
     def leading(self) -> Regression:
@@ -247,12 +226,12 @@ class AveragedModel:
     @property
     def early(self) -> int:
         """Samples of a window after which the variances for the next one are taken."""
-        Np = self.fixed.settings.Np
+        Np = self.settings.Np
         return Np - min(Np // 2, _AHEAD)
 
     def with_noise(self, learned: Learned) -> AveragedModel:
         """Return the model with the variances of the noise that follow from what is learned so far."""
-        settings = self.fixed.settings
+        settings = self.settings
 
         def noise(expert: Regression) -> float:
             kind = expert.like(self).target
@@ -292,28 +271,23 @@ class AveragedModel:
     @property
     def lag_weights(self) -> Array:
         """Weights of the lags from all learned samples, ``(p,)``."""
-        return self.regressions[MODEL_RESIDUAL].weights[self.n_scaled :]
-
-    @property
-    def n_scaled(self) -> int:
-        """Static features, whose scales follow from the commands ahead."""
-        return self.fixed.static.n
+        return self.regressions[MODEL_RESIDUAL].weights[self.static.n :]
 
     def restart(self) -> AveragedModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
-        fixed, learned = self.fixed, self.learned
-        most = CONSTANTS.warm_windows_max * fixed.settings.Np
+        learned, most = self.learned, CONSTANTS.warm_windows_max * self.settings.Np
         evidence = self.evidence[0].begin_run(most), self.evidence[1].begin_run(most)
         leading, stack, errors = learned.stack.leader, learned.stack.forget(FRESH_START), ExpertErrors()
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
             stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
-        run = RunState.init(fixed, self.run.memory.restart())
-        return AveragedModel(fixed, learned, evidence, self.noise, 0.0, leading.place, run).with_noise(learned)
+        run = RunState.init(self.settings.p, self.static, self.command, self.run.memory.restart())
+        state = replace(self, learned=learned, evidence=evidence, command_square=0.0, leader=leading.place, run=run)
+        return state.with_noise(learned)
 
     def plan_ahead(self) -> AveragedModel:
         """Return the model where a compensator decides the commands."""
-        return replace(self, fixed=replace(self.fixed, static=replace(self.fixed.static, is_planned=True)))
+        return replace(self, static=replace(self.static, is_planned=True))
 
     def take_over(self, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
         """Return the model with what another one has learned."""
@@ -327,7 +301,7 @@ class AveragedModel:
 
         A compensator begins to move before its path, with a creep.
         """
-        static, learned, settings = self.fixed.static, self.learned, self.fixed.settings
+        static, learned, settings = self.static, self.learned, self.settings
         T_s = settings.T_s
         before = learned.velocity_scale
         peak = static.peak_velocity(self.run.static, window.x_d)
@@ -374,14 +348,14 @@ class AveragedModel:
             As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
         x, held = window.x_pb, {} if like is None else like.predictions
-        memory = self.run.memory.hear(window.path, self.fixed.settings.Np) if like is None else like.memory
+        memory = self.run.memory.hear(window.path, self.settings.Np) if like is None else like.memory
         recalled = memory.recalled(len(window.path))
-        rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
+        rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
             x = x + STATIC.predict(at, held.get(STATIC), None).e_h
-            rows, _ = self.fixed.static.rows(self.run.static, window, x, scales.velocity)
+            rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
             at = replace(at, rows=rows)
         predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
@@ -421,12 +395,12 @@ class AveragedModel:
         scales : FeatureScales
             Of the features in it.
         """
-        (x_d, x_pb, *_), command, static = window, self.fixed.command, self.run.static
+        (x_d, x_pb, *_), command, static = window, self.command, self.run.static
         commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
         positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
         late = commands[-1 - command.dead_time :: -1][: command.p]
         past = self.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
-        stops = np.sign(x_d[1] - x_d[0]) * self.fixed.static.distances(scales.velocity)
+        stops = np.sign(x_d[1] - x_d[0]) * self.static.distances(scales.velocity)
         static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :], stops=stops)
         return replace(self, run=replace(self.run, static=static, commands=commands, past=past))
 
@@ -449,19 +423,19 @@ class AveragedModel:
         AveragedModel, (m,) array of bool
             Which samples are accepted.
         """
-        m, fixed, run = len(x), self.fixed, self.run
+        m, run = len(x), self.run
         window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])
         fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
         learned, measured = state.learned, x - window.x_pb
-        largest, T_s = learned.scales[MODEL_RESIDUAL].largest, fixed.settings.T_s
+        largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(self.last, measured, accepted)
-        e_0 = e + window.x_pb - fixed.command.late(run.commands, window.x_d)
-        rows, static = fixed.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
+        e_0 = e + window.x_pb - self.command.late(run.commands, window.x_d)
+        rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
         if fold:
-            of_command = fixed.command.rows(run.commands, window.x_d)
+            of_command = self.command.rows(run.commands, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
             state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
@@ -499,7 +473,7 @@ def _folded(
     Variances of the noise for the next window are taken before the last rows, the size of the command's residual
     before the last one.
     """
-    settings, n, early = state.fixed.settings, len(e[MODEL_RESIDUAL]), state.early
+    settings, n, early = state.settings, len(e[MODEL_RESIDUAL]), state.early
     accepted = ~bridged[-n:]
     forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
@@ -533,7 +507,7 @@ def _judged_experts(
     state: AveragedModel, forecast: AveragedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> Learned:
     """Judge the experts, and the sizes of the residuals, by the first samples of their window."""
-    learned, given = state.learned, state.fixed.settings.noise_std**2
+    learned, given = state.learned, state.settings.noise_std**2
     if not accepted.any():
         return learned
     errors = {
@@ -555,7 +529,7 @@ def _judged(
     state: AveragedModel, forecast: AveragedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
 ) -> AveragedModel:
     """Judge the experts and their stack by the measurement of their window."""
-    learned, settings = _judged_experts(state, forecast, e, accepted), state.fixed.settings
+    learned, settings = _judged_experts(state, forecast, e, accepted), state.settings
     n, late = len(accepted), settings.n_late
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     stack = learned.stack

@@ -1,5 +1,5 @@
 /* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the averaged one (hsep_averaged_model.h); as
- * predict/window.py.
+ * predict/predictor.py.
  *
  * The block holds one of them, and each function calls its counterpart. For a window: hsep_residual_begin; _predict,
  * which may go on in parts while _take_in takes its samples; _finish. A compensator plans with what hsep_residual_paper
