@@ -150,6 +150,7 @@ def check(log: Log) -> tuple[Finding, ...]:
     if refused:
         return refused
     notes = [note for notes in _NOTES for note in notes(log)]
+    notes += _note_held(log, given.lag_of_one if given else 0)
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
@@ -428,9 +429,9 @@ def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
     return wrong, heights[wrong]
 
 
-def _note_held(log: Log) -> Iterator[Finding]:
-    """Note a measured position that is held while the axis is commanded to move: clipped, stuck, or repeated."""
-    x, x_d = log.x_meas, log.x_d
+def _note_held(log: Log, lag: int) -> Iterator[Finding]:
+    """Note a measured position that is held while its command, ``lag`` samples ago, moves: clipped, stuck, repeated."""
+    x, x_d = log.x_meas, log.x_d[np.maximum(np.arange(len(log.x_d)) - lag, 0)]
     same = np.diff(x) == 0.0
     speed = np.abs(np.diff(x_d))
     fast = speed > max(_REPEATED * float(np.quantile(speed, _USUAL)), resolution(x))
@@ -465,7 +466,6 @@ _NOTES = (
     _note_missing,
     _note_rate,
     _note_outliers,
-    _note_held,
     _note_start,
 )
 

@@ -178,6 +178,15 @@ def test_what_is_noted_has_a_statistic_and_a_picture_and_changes_nothing(name: s
     assert str(found[name]).startswith(f"note: {name}: ")
 
 
+def test_a_coarse_encoder_does_not_stand_behind_a_lag() -> None:
+    """Moves of a few steps of the encoder after rests: a step comes late, and nothing sticks."""
+    moves_of = np.repeat(np.random.default_rng(3).uniform(0.0, 20e-6, 30), 200)
+    x_d = np.convolve(moves_of - moves_of[0], np.ones(12) / 12)[: len(moves_of)]
+    lag = np.exp(-np.arange(60) / 8.0)
+    x = np.convolve(x_d, lag / lag.sum())[: len(x_d)]
+    assert not check(log_of(x_d, 1e-6 * np.round(1e6 * x)))
+
+
 def test_large_outliers_are_noted_and_do_not_hide_the_axis() -> None:
     log, numbers = moves(), np.random.default_rng(7)
     x = log.x_meas.copy()
