@@ -1,10 +1,157 @@
 #include "hsep_calls.h"
 
 #include "hsep_check.h"
-#include "hsep_saved.h"
-#include "hsep_table.h"
+#include "hsep_opening.h"
+#include "hsep_text.h"
 
 #include <math.h>
+#include <stdarg.h>
+#include <string.h>
+
+enum { CALLS_N_CATEGORIES = 5, CALLS_LOG_EVERYTHING = 31 };
+
+static const char *const calls_categories[CALLS_N_CATEGORIES] = {
+    "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"};
+static const int calls_status[CALLS_N_CATEGORIES] = {1, 2, 3, 4, 0};
+
+/* Share of a step by which rounding may end the last step before the stop time. */
+static const double calls_stop_tolerance = 1e-6;
+
+/* The place of the only bit that is set. */
+static int calls_place(unsigned bit)
+{
+    int place = 0;
+    while ((1U << place) != bit) {
+        place++;
+    }
+    return place;
+}
+
+static void calls_log(const hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
+{
+    char text[2 * HSEP_MESSAGE_SIZE];
+    const int place = calls_place((unsigned)category);
+    const hsep_component *component = (const hsep_component *)instance;
+    if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
+        return;
+    }
+    (void)hsep_text_list(text, sizeof text, format, arguments);
+    component->hand(component, calls_status[place], calls_categories[place], text);
+}
+
+HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    calls_log(instance, category, format, arguments);
+    va_end(arguments);
+}
+
+HSEP_API hsep_status hsep_refuse(hsep_instance *instance, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    calls_log(instance, HSEP_LOG_ERROR, format, arguments);
+    va_end(arguments);
+    return HSEP_REFUSED;
+}
+
+HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call)
+{
+    hsep_instance *instance = component;
+    char legal[HSEP_MESSAGE_SIZE] = "";
+    if (instance == NULL || (call->legal & (unsigned)instance->experiment.phase) != 0) {
+        return instance;
+    }
+    const char *const *phases = instance->names->phases;
+    for (int place = 0; place < HSEP_N_PHASES; place++) {
+        if ((call->legal & (1U << place)) != 0) {
+            (void)strcat(strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), phases[place]);
+        }
+    }
+    (void)hsep_refuse(
+        instance, "%s is not allowed in the state %s%s", call->name, phases[calls_place(instance->experiment.phase)],
+        legal);
+    return NULL;
+}
+
+/* Check name and token and take the table; why not is logged. */
+static hsep_status calls_open(hsep_instance *instance, const char *name, const char *token, const char *resources)
+{
+    const hsep_fmi_names *names = instance->names;
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_status status = HSEP_REFUSED;
+    if (name == NULL || name[0] == '\0') {
+        (void)hsep_message_add(message, "%s: instanceName must not be empty", names->instantiate);
+    } else {
+        status = hsep_open(instance, name, resources, message);
+    }
+    if (status != HSEP_REFUSED && (token == NULL || strcmp(token, instance->context.guid) != 0)) {
+        status = hsep_message_add(
+            message, "%s: %s must be %s as in modelDescription.xml, got %.100s", names->instantiate, names->token,
+            instance->context.guid, (token == NULL) ? "NULL" : token);
+    }
+    if (status != HSEP_OK) {
+        hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
+    }
+    return status;
+}
+
+HSEP_API hsep_component *hsep_component_new(
+    const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on)
+{
+    hsep_component *component = hsep_new(&filled->instance, sizeof *component);
+    if (component == NULL) {
+        char text[HSEP_MESSAGE_SIZE];
+        (void)hsep_text(
+            text, sizeof text, "%s: no memory for an instance of %lu bytes", filled->instance.names->instantiate,
+            (unsigned long)sizeof *component);
+        if (filled->logger != NULL) {
+            filled->hand(filled, calls_status[2], calls_categories[2], text);
+        }
+        return NULL;
+    }
+    *component = *filled;
+    component->categories = CALLS_LOG_EVERYTHING;
+    if (!logging_on) {
+        component->categories &= ~(unsigned)HSEP_LOG_ALL;
+    }
+    if (calls_open(&component->instance, name, token, resources) == HSEP_REFUSED) {
+        hsep_instance_free(&component->instance);
+        return NULL;
+    }
+    hsep_instance_reset(&component->instance);
+    return component;
+}
+
+HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[])
+{
+    hsep_component *component = handle;
+    unsigned named = 0;
+    if (hsep_begin(handle, call) == NULL) {
+        return HSEP_REFUSED;
+    }
+    if (n > 0 && names == NULL) {
+        return hsep_refuse(
+            &component->instance, "%s: categories is NULL, but nCategories is %lu", call->name, (unsigned long)n);
+    }
+    for (size_t i = 0; i < n; i++) {
+        for (unsigned place = 0; names[i] != NULL && place < CALLS_N_CATEGORIES; place++) {
+            if (strcmp(names[i], calls_categories[place]) == 0) {
+                named |= 1U << place;
+            }
+        }
+    }
+    if ((named & HSEP_LOG_ALL) != 0) {
+        named = CALLS_LOG_EVERYTHING;
+    }
+    if (n == 0) {
+        component->categories = on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
+    } else if (named != 0) {
+        component->categories = on ? named : component->categories & ~named;
+    }
+    return HSEP_OK;
+}
 
 HSEP_API hsep_status
 hsep_call_experiment(void *component, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
@@ -63,10 +210,17 @@ HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, doub
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
-    const hsep_status status = hsep_instance_step(instance, call->name, t, h, message);
+    if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - calls_stop_tolerance * h) {
+        return hsep_refuse(
+            instance, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call->name,
+            instance->experiment.stop_time, t);
+    }
+    const hsep_status status = hsep_model_step(&instance->context, instance->state, instance->values, t, h, message);
     if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
     }
+    memset(instance->values + instance->context.n_variables, 0, HSEP_N_INTERPOLATED * sizeof(double));
+    instance->experiment.time = t + h;
     if (((unsigned)status & ~warning->warned) != 0) {
         warning->warned |= (unsigned)status;
         hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
@@ -81,154 +235,5 @@ HSEP_API hsep_status hsep_call_reset(void *component, const hsep_call *call)
         return HSEP_REFUSED;
     }
     hsep_instance_reset(instance);
-    return HSEP_OK;
-}
-
-HSEP_API hsep_instance *hsep_call_access(
-    void *component, const hsep_call *call, int sets, const char *type, const unsigned references[], size_t n,
-    const void *values, size_t n_values)
-{
-    const hsep_access access = {call->name, type, references, n, values, n_values};
-    char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = hsep_begin(component, call);
-    if (instance == NULL) {
-        return NULL;
-    }
-    hsep_status status = hsep_values_check(instance, &access, message);
-    if (status == HSEP_OK) {
-        status =
-            sets ? hsep_values_check_set(instance, &access, message) : hsep_values_prepare(instance, &access, message);
-    }
-    if (status != HSEP_OK) {
-        (void)hsep_refuse(instance, "%s", message);
-        return NULL;
-    }
-    return instance;
-}
-
-HSEP_API hsep_instance *hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value)
-{
-    const hsep_context *context = &instance->context;
-    char message[HSEP_MESSAGE_SIZE] = "";
-    const hsep_found found = instance->names->find(context, reference);
-    if ((instance->experiment.phase == HSEP_STEPPING || found.kind == HSEP_COUNT) &&
-        found.row->causality == HSEP_PARAMETER && !hsep_check_parameter(context, reference, value, message)) {
-        (void)hsep_refuse(instance, "%s: %s", call->name, message);
-        return NULL;
-    }
-    return instance;
-}
-
-/* The instance if the call is legal and the handle is a saved state; otherwise NULL, with a message. */
-static hsep_instance *calls_begin_saved(void *component, const hsep_call *call, const hsep_saved *state)
-{
-    hsep_instance *instance = hsep_begin(component, call);
-    if (instance != NULL && state == NULL) {
-        (void)hsep_refuse(instance, "%s: the state is NULL", call->name);
-        return NULL;
-    }
-    if (instance != NULL && !hsep_is_saved(state)) {
-        (void)hsep_refuse(instance, "%s: the state is none of this FMU", call->name);
-        return NULL;
-    }
-    return instance;
-}
-
-/* The same where a place for a handle is given, which may hold none; its state goes to *saved. */
-static hsep_instance *calls_begin_place(void *component, const hsep_call *call, void **place, hsep_saved **saved)
-{
-    *saved = (place != NULL) ? *place : NULL;
-    return *saved != NULL ? calls_begin_saved(component, call, *saved) : hsep_begin(component, call);
-}
-
-HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void **state)
-{
-    char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_saved *saved;
-    hsep_instance *instance = calls_begin_place(component, call, state, &saved);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (state == NULL) {
-        return hsep_refuse(instance, "%s: the place of the state is NULL", call->name);
-    }
-    if (hsep_save(instance, &saved, message) != HSEP_OK) {
-        return hsep_refuse(instance, "%s: %s", call->name, message);
-    }
-    *state = saved;
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_restore(void *component, const hsep_call *call, void *state)
-{
-    char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = calls_begin_saved(component, call, state);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (hsep_restore(instance, state, message) != HSEP_OK) {
-        return hsep_refuse(instance, "%s: %s", call->name, message);
-    }
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_free_state(void *component, const hsep_call *call, void **state)
-{
-    hsep_saved *saved;
-    if (calls_begin_place(component, call, state, &saved) == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (saved != NULL) { /* the standard: freeing nothing is fine */
-        hsep_free_saved(saved);
-        *state = NULL;
-    }
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_state_size(void *component, const hsep_call *call, void *state, size_t *size)
-{
-    hsep_instance *instance = calls_begin_saved(component, call, state);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (size == NULL) {
-        return hsep_refuse(instance, "%s: size is NULL", call->name);
-    }
-    *size = hsep_saved_size(state);
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_serialise(void *component, const hsep_call *call, void *state, void *bytes, size_t size)
-{
-    hsep_instance *instance = calls_begin_saved(component, call, state);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (bytes == NULL || size < hsep_saved_size(state)) {
-        return hsep_refuse(
-            instance, "%s: serializedState must have room for %lu bytes, got %lu%s", call->name,
-            (unsigned long)hsep_saved_size(state), (unsigned long)size, bytes == NULL ? " and NULL" : "");
-    }
-    hsep_serialise(state, bytes);
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status
-hsep_call_deserialise(void *component, const hsep_call *call, const void *bytes, size_t size, void **state)
-{
-    char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_saved *saved;
-    hsep_instance *instance = calls_begin_place(component, call, state, &saved);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    if (bytes == NULL || state == NULL) {
-        return hsep_refuse(
-            instance, "%s: %s is NULL", call->name, bytes == NULL ? "serializedState" : "the place of the state");
-    }
-    if (hsep_deserialise(instance, bytes, size, &saved, message) != HSEP_OK) {
-        return hsep_refuse(instance, "%s: %s", call->name, message);
-    }
-    *state = saved;
     return HSEP_OK;
 }

@@ -1,13 +1,75 @@
-/* Calls that every version of FMI has, by other names: each checks that it is legal now, and if it fails logs why,
- * changes nothing and returns HSEP_REFUSED; otherwise HSEP_OK. */
+/* What an importer's handle points to in any version of FMI: an instance, its log, and the calls that are legal now.
+ *
+ * Steps are done when the call returns, so no version's states of a step in progress occur. A call that is refused
+ * changes nothing, not even the state of the instance: it logs why, and the importer may free, reset or restore it, as
+ * the standard asks, and may also correct what was wrong and call again.
+ * One thing more than the standard: values may be read before the initialization; they are the start values then.
+ */
 #ifndef HSEP_CALLS_H
 #define HSEP_CALLS_H
 
 #include "hsep_api.h"
-#include "hsep_component.h"
-#include "hsep_values.h"
+#include "hsep_instance.h"
 
 #include <stddef.h>
+
+/* The log categories of modelDescription.xml, one bit each. */
+typedef enum {
+    HSEP_LOG_WARNING = 1,
+    HSEP_LOG_DISCARD = 2,
+    HSEP_LOG_ERROR = 4,
+    HSEP_LOG_FATAL = 8,
+    HSEP_LOG_ALL = 16 /* what is neither of the above */
+} hsep_category;
+
+typedef struct hsep_component hsep_component;
+
+/* Hands a message to the importer's logger, which is not NULL; the numbers of statuses are the same in all versions. */
+typedef void (*hsep_hand)(const hsep_component *component, int status, const char *category, const char *text);
+
+/* A pointer to its first member is one to it. */
+struct hsep_component {
+    hsep_instance instance;
+    hsep_hand hand;
+    void (*logger)(void); /* the importer's, of the type of the version; may be NULL */
+    void *environment;
+    unsigned categories; /* bits of hsep_category that reach the logger */
+    unsigned warned;     /* bits of hsep_status: what the model has warned of in steps */
+};
+
+/* A call that belongs to an instance, and the bits of the phases in which it is legal. */
+typedef struct {
+    const char *name;
+    unsigned legal;
+} hsep_call;
+
+/* The phases, short, for the columns of a table of calls. */
+enum {
+    HSEP_I = HSEP_INSTANTIATED,
+    HSEP_C = HSEP_CONFIGURATION,
+    HSEP_M = HSEP_INITIALIZATION,
+    HSEP_S = HSEP_STEPPING,
+    HSEP_T = HSEP_TERMINATED
+};
+
+/* Make an instance. filled: its words, memory functions, hand, logger and environment; token: must equal the token of
+ * modelDescription.xml; resources: as hsep_open takes them. On refusal return NULL and log why. */
+HSEP_API hsep_component *hsep_component_new(
+    const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on);
+
+/* The instance if the call is legal now; otherwise NULL, and why not is logged. */
+HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call);
+
+/* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
+HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...);
+
+/* Log an error and return HSEP_REFUSED. */
+HSEP_API hsep_status hsep_refuse(hsep_instance *instance, const char *format, ...);
+
+/* With names, these categories alone are switched on, or these off; a name that is not ours changes nothing. Without
+ * names, on means everything and off the state after instantiation without logging: warnings and errors. */
+HSEP_API hsep_status
+hsep_call_logging(void *component, const hsep_call *call, int on, size_t n, const char *const names[]);
 
 /* Set the experiment, s. */
 HSEP_API hsep_status
@@ -26,17 +88,62 @@ HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, doub
 /* As after the instantiation. */
 HSEP_API hsep_status hsep_call_reset(void *component, const hsep_call *call);
 
-/* The instance if n variables of a type may be read, or set; otherwise NULL. */
+/* What an importer gives to read or write variables by value reference. */
+typedef struct {
+    const char *call;
+    const char *type; /* as the version's functions are called */
+    const unsigned *references;
+    size_t n_references;
+    const void *values;
+    size_t n_values;
+} hsep_access;
+
+/* Check that all references are to variables of that type, and that there is a place for each of their values: if one
+ * is refused, none is touched. */
+HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[]);
+
+/* The instance if n variables may be read, or set, of a type, as the call's name says: fmi2GetReal; otherwise NULL.
+ * Inputs may be set at any time, parameters until the initialization has ended, tunable ones later too. */
 HSEP_API hsep_instance *hsep_call_access(
-    void *component, const hsep_call *call, int sets, const char *type, const unsigned references[], size_t n,
-    const void *values, size_t n_values);
+    void *component, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values);
+
+/* The values of a variable, and their number. */
+HSEP_API const double *hsep_values_source(const hsep_instance *instance, unsigned reference, size_t *count);
 
 /* The instance if a variable may have a value: a parameter is checked when it is set in a run, one that sizes arrays
  * always; before a run the others when the initialization ends. Otherwise NULL. */
 HSEP_API hsep_instance *hsep_call_tune(
     hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
 
-/* Saved states: a handle is a pointer to one, or NULL. */
+/* A value as a whole number of 32 bits. */
+HSEP_API int hsep_values_integer(double number);
+
+/* Bodies of the functions that get and set n variables; self is NULL if they may not. get: the function's value of a
+ * double, number; set: the double of its value, number. What is set has one value for each reference, as no array is an
+ * input or a parameter. */
+#define HSEP_GET(component, call, references, n, to, n_values, get) \
+    const hsep_instance *self = hsep_call_access(component, call, references, n, to, n_values); \
+    for (size_t i = 0; self != NULL && i < n; i++) { \
+        size_t count = 0; \
+        const double *source = hsep_values_source(self, references[i], &count); \
+        while (count-- > 0) { \
+            const double number = *source++; \
+            *to++ = get; \
+        } \
+    }
+
+#define HSEP_SET(component, call, references, n, from, n_values, type, set) \
+    hsep_instance *self = hsep_call_access(component, call, references, n, from, n_values); \
+    for (size_t i = 0; self != NULL && i < n; i++) { \
+        const type number = from[i]; \
+        self = hsep_call_tune(self, call, references[i], set); \
+    } \
+    for (size_t i = 0; self != NULL && i < n; i++) { \
+        const type number = from[i]; \
+        self->values[references[i]] = set; \
+    }
+
+/* Saved states, hsep_saved.c: a handle is a pointer to one, or NULL. */
 HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void **state);
 HSEP_API hsep_status hsep_call_restore(void *component, const hsep_call *call, void *state);
 HSEP_API hsep_status hsep_call_free_state(void *component, const hsep_call *call, void **state);
@@ -56,40 +163,40 @@ hsep_call_deserialise(void *component, const hsep_call *call, const void *bytes,
     } \
     v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]) \
     { \
-        return hsep_##v##_status(hsep_call_logging(c, CALL(SET_DEBUG_LOGGING), on, n, categories)); \
+        return v##_status(hsep_call_logging(c, CALL(v##SetDebugLogging), on, n, categories)); \
     } \
     v##Status v##ExitInitializationMode(v##Handle c) \
     { \
-        return hsep_##v##_status(hsep_call_initialise(c, CALL(EXIT_INITIALIZATION_MODE))); \
+        return v##_status(hsep_call_initialise(c, CALL(v##ExitInitializationMode))); \
     } \
     v##Status v##Terminate(v##Handle c) \
     { \
-        return hsep_##v##_status(hsep_call_phase(c, CALL(TERMINATE), HSEP_TERMINATED)); \
+        return v##_status(hsep_call_phase(c, CALL(v##Terminate), HSEP_TERMINATED)); \
     } \
-    v##Status v##Reset(v##Handle c) { return hsep_##v##_status(hsep_call_reset(c, CALL(RESET))); } \
+    v##Status v##Reset(v##Handle c) { return v##_status(hsep_call_reset(c, CALL(v##Reset))); } \
     v##Status v##Get##State(v##Handle c, v##State *state) \
     { \
-        return hsep_##v##_status(hsep_call_save(c, CALL(GET_FMU_STATE), state)); \
+        return v##_status(hsep_call_save(c, CALL(v##Get##State), state)); \
     } \
     v##Status v##Set##State(v##Handle c, v##State state) \
     { \
-        return hsep_##v##_status(hsep_call_restore(c, CALL(SET_FMU_STATE), state)); \
+        return v##_status(hsep_call_restore(c, CALL(v##Set##State), state)); \
     } \
     v##Status v##Free##State(v##Handle c, v##State *state) \
     { \
-        return hsep_##v##_status(hsep_call_free_state(c, CALL(FREE_FMU_STATE), state)); \
+        return v##_status(hsep_call_free_state(c, CALL(v##Free##State), state)); \
     } \
     v##Status v##Serialized##State##Size(v##Handle c, v##State state, size_t *size) \
     { \
-        return hsep_##v##_status(hsep_call_state_size(c, CALL(SERIALIZED_FMU_STATE_SIZE), state, size)); \
+        return v##_status(hsep_call_state_size(c, CALL(v##Serialized##State##Size), state, size)); \
     } \
     v##Status v##Serialize##State(v##Handle c, v##State state, v##Byte bytes[], size_t size) \
     { \
-        return hsep_##v##_status(hsep_call_serialise(c, CALL(SERIALIZE_FMU_STATE), state, bytes, size)); \
+        return v##_status(hsep_call_serialise(c, CALL(v##Serialize##State), state, bytes, size)); \
     } \
     v##Status v##De##State(v##Handle c, const v##Byte bytes[], size_t size, v##State *state) \
     { \
-        return hsep_##v##_status(hsep_call_deserialise(c, CALL(DESERIALIZE_FMU_STATE), bytes, size, state)); \
+        return v##_status(hsep_call_deserialise(c, CALL(v##De##State), bytes, size, state)); \
     }
 
 #endif

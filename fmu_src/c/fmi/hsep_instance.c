@@ -5,9 +5,6 @@
 
 #include <string.h>
 
-/* Share of a step by which rounding may end the last step before the stop time. */
-static const double instance_stop_tolerance = 1e-6;
-
 HSEP_API void *hsep_new(const hsep_instance *instance, size_t size)
 {
     void *block = instance->allocate(1, size);
@@ -89,21 +86,6 @@ HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const cha
     }
     instance->experiment.phase = HSEP_STEPPING;
     return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[])
-{
-    if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - instance_stop_tolerance * h) {
-        return hsep_message_add(
-            message, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call,
-            instance->experiment.stop_time, t);
-    }
-    const hsep_status status = hsep_model_step(&instance->context, instance->state, instance->values, t, h, message);
-    if (status != HSEP_REFUSED) {
-        memset(instance->values + instance->context.n_variables, 0, HSEP_N_INTERPOLATED * sizeof(double));
-        instance->experiment.time = t + h;
-    }
-    return status;
 }
 
 HSEP_API void hsep_instance_free(hsep_instance *instance)

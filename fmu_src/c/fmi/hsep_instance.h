@@ -10,10 +10,41 @@
 #include "hsep_api.h"
 #include "hsep_fmu.h"
 #include "hsep_layout.h"
-#include "hsep_fmi_names.h"
+#include "hsep_table.h"
 
 #include <stddef.h>
 #include <stdint.h>
+
+#define HSEP_N_PHASES 5
+
+/* The variable of a value reference: its row, its kind in this version, and the place and number of its values. */
+typedef struct {
+    const hsep_variable *row;
+    hsep_kind kind;
+    size_t place;
+    size_t count;
+} hsep_found;
+
+/* What a version of FMI calls things, and how it counts variables: all that messages and value references need. */
+typedef struct {
+    const char *instantiate; /* functions */
+    const char *reset;
+    const char *token; /* arguments */
+    const char *location;
+    const char *location_form;
+    const char *references;
+    const char *n_references;
+    const char *values;
+    const char *n_values;
+    const char *phases[HSEP_N_PHASES];
+    const char *types[HSEP_N_KINDS]; /* whose functions read and write a kind */
+    /* Number of value references, which count from 0; */
+    size_t (*n_variables)(const hsep_context *context);
+    /* the variable of one of them, */
+    hsep_found (*find)(const hsep_context *context, size_t reference);
+    /* and its name, in text. */
+    const char *(*name)(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE]);
+} hsep_fmi_names;
 
 /* The states of a co-simulation whose steps are done when the call returns. */
 typedef enum {
@@ -90,10 +121,6 @@ HSEP_API void hsep_instance_reset(hsep_instance *instance);
 /* Take all memory of the simulation and fill it. If the parameters do not fit, they may be corrected and it called
  * again. */
 HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[]);
-
-/* Do a communication step from t by h, s; time derivatives of inputs count for it alone. Warnings as
- * hsep_model_step's. */
-HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[]);
 
 /* Give all memory back, the instance's too. */
 HSEP_API void hsep_instance_free(hsep_instance *instance);

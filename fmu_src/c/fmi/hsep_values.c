@@ -1,9 +1,10 @@
-#include "hsep_values.h"
+#include "hsep_calls.h"
 
 #include "hsep_check.h"
 #include "hsep_windows.h"
 
 #include <limits.h>
+#include <string.h>
 
 static const char *const values_causalities[] = {
     "an input", "an output", "a parameter", "a calculated variable", "the independent variable"};
@@ -29,7 +30,7 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
         }
         const hsep_found found = names->find(context, reference);
         const char *type = names->types[found.kind];
-        if (type != access->type) {
+        if (strcmp(type, access->type) != 0) {
             return hsep_message_add(
                 message, "%s: %s (value reference %u) is of type %s, not %s", access->call,
                 names->name(context, reference, name), reference, type, access->type);
@@ -44,7 +45,9 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const hsep_access *access, char message[])
+/* Check beside it that they may be set now: inputs at any time, parameters until the initialization has ended, tunable
+ * ones later too. */
+static hsep_status values_check_set(const hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_context *context = &instance->context;
     const hsep_fmi_names *names = instance->names;
@@ -84,7 +87,9 @@ static void values_show(hsep_instance *instance, const hsep_access *access)
 #endif
 }
 
-HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[])
+/* Calculate what is read: windows, and what follows from the start values before the initialization has ended. Refused
+ * if one of the variables is calculated from a start value that is no position. */
+static hsep_status values_prepare(hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_fmi_names *names = instance->names;
     char reason[HSEP_MESSAGE_SIZE] = "", name[HSEP_NAME_SIZE];
@@ -106,6 +111,48 @@ HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_acc
         }
     }
     return HSEP_OK;
+}
+
+HSEP_API hsep_instance *hsep_call_access(
+    void *component, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values)
+{
+    const char *verb = call->name + strlen("fmi2");
+    const hsep_access access = {call->name, verb + strlen("Get"), references, n, values, n_values};
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_instance *instance = hsep_begin(component, call);
+    if (instance == NULL) {
+        return NULL;
+    }
+    hsep_status status = hsep_values_check(instance, &access, message);
+    if (status == HSEP_OK) {
+        status =
+            verb[0] == 'S' ? values_check_set(instance, &access, message) : values_prepare(instance, &access, message);
+    }
+    if (status != HSEP_OK) {
+        (void)hsep_refuse(instance, "%s", message);
+        return NULL;
+    }
+    return instance;
+}
+
+HSEP_API hsep_instance *hsep_call_tune(hsep_instance *instance, const hsep_call *call, unsigned reference, double value)
+{
+    const hsep_context *context = &instance->context;
+    char message[HSEP_MESSAGE_SIZE] = "";
+    const hsep_found found = instance->names->find(context, reference);
+    if ((instance->experiment.phase == HSEP_STEPPING || found.kind == HSEP_COUNT) &&
+        found.row->causality == HSEP_PARAMETER && !hsep_check_parameter(context, reference, value, message)) {
+        (void)hsep_refuse(instance, "%s: %s", call->name, message);
+        return NULL;
+    }
+    return instance;
+}
+
+HSEP_API const double *hsep_values_source(const hsep_instance *instance, unsigned reference, size_t *count)
+{
+    const hsep_found found = instance->names->find(&instance->context, reference);
+    *count = found.count;
+    return found.row->causality == HSEP_INDEPENDENT ? &instance->experiment.time : &instance->values[found.place];
 }
 
 HSEP_API int hsep_values_integer(double number)

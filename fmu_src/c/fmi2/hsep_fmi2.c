@@ -1,5 +1,35 @@
-/* FMI 2.0 for co-simulation: instances, experiments, steps and saved states. Every number comes from the model. */
+/* FMI 2.0 for co-simulation. A value reference is the place of one value; every number comes from the model. */
 #include "hsep_fmi2_calls.h"
+
+#include <math.h>
+
+static size_t fmi2_n_variables(const hsep_context *context) { return context->n_variables; }
+
+static hsep_found fmi2_find(const hsep_context *context, size_t reference)
+{
+    const hsep_variable *row = hsep_table_row(context, reference);
+    return (hsep_found){.row = row, .kind = row->kind, .place = reference, .count = 1};
+}
+
+static const hsep_fmi_names fmi2_names = {
+    .instantiate = "fmi2Instantiate",
+    .reset = "fmi2Reset",
+    .token = "fmuGUID",
+    .location = "fmuResourceLocation",
+    .location_form = "a file: URI",
+    .references = "vr",
+    .n_references = "nvr",
+    .values = "value",
+    .n_values = "nvr",
+    .phases = {"instantiated", "Initialization Mode", "stepping (after fmi2ExitInitializationMode)", "terminated"},
+    .types =
+        {[HSEP_REAL] = "Real",
+         [HSEP_INTEGER] = "Integer",
+         [HSEP_ENUMERATION] = "Integer", /* which the standard reads and writes enumerations by */
+         [HSEP_BOOLEAN] = "Boolean"},
+    .n_variables = fmi2_n_variables,
+    .find = fmi2_find,
+    .name = hsep_table_name};
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
@@ -29,7 +59,7 @@ fmi2Component fmi2Instantiate(
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
     hsep_component filled = {.hand = fmi2_hand, .categories = HSEP_LOG_ERROR};
     (void)visible;
-    filled.instance.names = hsep_fmi2_names();
+    filled.instance.names = &fmi2_names;
     filled.instance.allocate = own_memory ? HSEP_CALLOC : functions->allocateMemory;
     filled.instance.release = own_memory ? HSEP_FREE : functions->freeMemory;
     if (functions != NULL) {
@@ -51,12 +81,12 @@ fmi2Status fmi2SetupExperiment(
 {
     (void)toleranceDefined;
     (void)tolerance;
-    return hsep_fmi2_status(hsep_call_experiment(c, HSEP_FMI2(SETUP_EXPERIMENT), startTime, stopTimeDefined, stopTime));
+    return fmi2_status(hsep_call_experiment(c, HSEP_FMI2(fmi2SetupExperiment), startTime, stopTimeDefined, stopTime));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return hsep_fmi2_status(hsep_call_phase(c, HSEP_FMI2(ENTER_INITIALIZATION_MODE), HSEP_INITIALIZATION));
+    return fmi2_status(hsep_call_phase(c, HSEP_FMI2(fmi2EnterInitializationMode), HSEP_INITIALIZATION));
 }
 
 fmi2Status fmi2DoStep(
@@ -64,5 +94,149 @@ fmi2Status fmi2DoStep(
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     (void)noSetFMUStatePriorToCurrentPoint;
-    return hsep_fmi2_status(hsep_call_step(c, HSEP_FMI2(DO_STEP), currentCommunicationPoint, communicationStepSize));
+    return fmi2_status(hsep_call_step(c, HSEP_FMI2(fmi2DoStep), currentCommunicationPoint, communicationStepSize));
 }
+
+/* Variables. A call is checked as a whole first: if one is refused, none is touched. */
+#define FMI2_ACCESS(getter, setter, c_type, get, set) \
+    fmi2Status getter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, c_type value[]) \
+    { \
+        HSEP_GET(c, &hsep_fmi2_calls[HSEP_FMI2_##getter], vr, nvr, value, nvr, get) \
+        return (self == NULL) ? fmi2Error : fmi2OK; \
+    } \
+    fmi2Status setter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const c_type value[]) \
+    { \
+        HSEP_SET(c, &hsep_fmi2_calls[HSEP_FMI2_##setter], vr, nvr, value, nvr, c_type, set) \
+        return (self == NULL) ? fmi2Error : fmi2OK; \
+    }
+
+FMI2_ACCESS(fmi2GetReal, fmi2SetReal, fmi2Real, number, number)
+FMI2_ACCESS(fmi2GetInteger, fmi2SetInteger, fmi2Integer, hsep_values_integer(number), (double)number)
+FMI2_ACCESS(fmi2GetBoolean, fmi2SetBoolean, fmi2Boolean, number != 0.0, number ? 1.0 : 0.0)
+
+/* There are no variables of type String: with references, the access is refused by name. */
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
+{
+    return hsep_call_access(c, HSEP_FMI2(fmi2GetString), vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
+{
+    return hsep_call_access(c, HSEP_FMI2(fmi2SetString), vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
+}
+
+/* Why one of the derivatives cannot be taken; HSEP_OK if all can. */
+static hsep_status fmi2_check_derivatives(
+    hsep_instance *instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
+    const fmi2Real value[])
+{
+    static const char name[] = "fmi2SetRealInputDerivatives";
+    char input[HSEP_NAME_SIZE];
+    if (HSEP_N_INTERPOLATED == 0) {
+        return hsep_refuse(
+            instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", name);
+    }
+    if (nvr > 0 && order == NULL) {
+        return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", name, (unsigned long)nvr);
+    }
+    for (size_t i = 0; i < nvr; i++) {
+        if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
+            return hsep_refuse(
+                instance, "%s: %s takes no derivative, only inputs do", name,
+                hsep_table_name(&instance->context, vr[i], input));
+        }
+        if (order[i] != 1) {
+            return hsep_refuse(
+                instance, "%s: the order of %s must be 1, got %d", name,
+                hsep_table_name(&instance->context, vr[i], input), (int)order[i]);
+        }
+        if (!isfinite(value[i])) {
+            return hsep_refuse(
+                instance, "%s: the derivative of %s must be finite, got %g", name,
+                hsep_table_name(&instance->context, vr[i], input), value[i]);
+        }
+    }
+    return HSEP_OK;
+}
+
+/* The derivatives count for the next step alone. Like the values, none is taken if one is refused. */
+fmi2Status fmi2SetRealInputDerivatives(
+    fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
+{
+    const hsep_call *call = HSEP_FMI2(fmi2SetRealInputDerivatives);
+    const hsep_access access = {call->name, "Real", vr, nvr, value, nvr};
+    hsep_instance *instance = hsep_begin(c, call);
+    char message[HSEP_MESSAGE_SIZE] = "";
+    if (instance == NULL) {
+        return fmi2Error;
+    }
+    if (hsep_values_check(instance, &access, message) != HSEP_OK) {
+        (void)hsep_refuse(instance, "%s", message);
+        return fmi2Error;
+    }
+    if (fmi2_check_derivatives(instance, vr, nvr, order, value) != HSEP_OK) {
+        return fmi2Error;
+    }
+    for (size_t i = 0; i < nvr; i++) {
+        instance->values[instance->context.n_variables + vr[i]] = value[i];
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    (void)hsep_begin(c, HSEP_FMI2(fmi2CancelStep));
+    return fmi2Error;
+}
+
+static fmi2Status fmi2_unsupported(fmi2Component c, const hsep_call *call, const char *capability)
+{
+    hsep_instance *instance = hsep_begin(c, call);
+    if (instance != NULL) {
+        (void)hsep_refuse(instance, "%s is not supported: %s in modelDescription.xml", call->name, capability);
+    }
+    return fmi2Error;
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(
+    fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], fmi2Real value[])
+{
+    (void)vr, (void)nvr, (void)order, (void)value;
+    return fmi2_unsupported(c, HSEP_FMI2(fmi2GetRealOutputDerivatives), "maxOutputDerivativeOrder is 0");
+}
+
+fmi2Status fmi2GetDirectionalDerivative(
+    fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[],
+    size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
+{
+    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
+    return fmi2_unsupported(c, HSEP_FMI2(fmi2GetDirectionalDerivative), "providesDirectionalDerivative is false");
+}
+
+/* The functions that get a status: whether that one, s, is known, and its value. */
+#define FMI2_STATUS(function, type, known, answer) \
+    fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) \
+    { \
+        hsep_instance *instance = hsep_begin(c, &hsep_fmi2_calls[HSEP_FMI2_##function]); \
+        (void)s; \
+        if (instance == NULL) { \
+            return fmi2Error; \
+        } \
+        if (value == NULL) { \
+            return fmi2_status(hsep_refuse(instance, #function ": value is NULL")); \
+        } \
+        if (!(known)) { \
+            hsep_log( \
+                instance, HSEP_LOG_DISCARD, \
+                #function ": this status does not exist, because no step is ever pending"); \
+            return fmi2Discard; \
+        } \
+        *value = answer; \
+        return fmi2OK; \
+    }
+
+FMI2_STATUS(fmi2GetStatus, fmi2Status, 0, fmi2OK)
+FMI2_STATUS(fmi2GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
+FMI2_STATUS(fmi2GetIntegerStatus, fmi2Integer, 0, 0)
+FMI2_STATUS(fmi2GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
+FMI2_STATUS(fmi2GetStringStatus, fmi2String, 0, NULL)

@@ -84,8 +84,8 @@ fmi3Status fmi3GetDirectionalDerivative(
     fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    const hsep_call *call = HSEP_FMI3(GET_DIRECTIONAL_DERIVATIVE);
-    const char *type = hsep_fmi3_names()->types[HSEP_REAL];
+    const hsep_call *call = HSEP_FMI3(fmi3GetDirectionalDerivative);
+    const char *type = "Float64";
     const hsep_access of = {
         "fmi3GetDirectionalDerivative: unknowns", type, unknowns, nUnknowns, sensitivity, nSensitivity};
     const hsep_access by = {"fmi3GetDirectionalDerivative: knowns", type, knowns, nKnowns, seed, nSeed};
@@ -96,11 +96,11 @@ fmi3Status fmi3GetDirectionalDerivative(
         return fmi3Error;
     }
     if (self->context.window == 0) {
-        return hsep_fmi3_status(hsep_refuse(self, "%s", derivative_absent));
+        return fmi3_status(hsep_refuse(self, "%s", derivative_absent));
     }
     double *memory = hsep_new(self, 3 * self->context.window * sizeof(double));
     if (memory == NULL) {
-        return hsep_fmi3_status(hsep_refuse(self, "%s: no memory for a window", call->name));
+        return fmi3_status(hsep_refuse(self, "%s: no memory for a window", call->name));
     }
     if (hsep_values_check(self, &of, message) != HSEP_OK || hsep_values_check(self, &by, message) != HSEP_OK ||
         derivative_check(self, &of, &by, &window, message) != HSEP_OK) {
@@ -122,7 +122,7 @@ fmi3Status fmi3GetDirectionalDerivative(
 {
     (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed;
     (void)sensitivity, (void)nSensitivity;
-    return instance == NULL ? fmi3Error : hsep_fmi3_status(hsep_refuse(instance, "%s", derivative_absent));
+    return instance == NULL ? fmi3Error : fmi3_status(hsep_refuse(instance, "%s", derivative_absent));
 }
 
 #endif
