@@ -94,7 +94,7 @@ VARIANTS: Mapping[str, Changes] = {
     "no doubting expert D": NO_DOUBTING,
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(warm_windows_max=3.0)),
     "earlier runs never forgotten": constants(discard_above=2.0),
-    "A's bound does not grow": {FORECAST: [("return before > 0.0 ?", "return before < 0.0 ?")]},
+    "A's bound does not grow": {FORECAST: [("growth = before > 0.0 ?", "growth = before < 0.0 ?")]},
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no recall": {
@@ -110,8 +110,8 @@ VARIANTS: Mapping[str, Changes] = {
     "no shrinking": {
         AVERAGING + "hsep_experts.c": [
             (
-                "    return self->largest_square / (self->largest_square + variance);",
-                "    (void)self, (void)variance;\n    return 1.0;",
+                "shrinkage[j] = self->largest_square / (self->largest_square + variance);",
+                "(void)variance;\n        shrinkage[j] = 1.0;",
             )
         ]
     },

@@ -349,7 +349,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     online_state *self = state;
     const double *slopes = values + context->n_variables;
     hsep_predictor *predictor = online_predictor(&self->online);
-    const int may_miss = hsep_residual_may_miss(hsep_predictor_model(predictor));
+    const int may_miss = hsep_residual_averaged(hsep_predictor_model(predictor)) != NULL;
     const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]};
     const hsep_input x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]};
     hsep_inputs_step step;

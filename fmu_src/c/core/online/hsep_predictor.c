@@ -115,6 +115,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
     const hsep_int n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
     const hsep_real *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
+    const hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
     hsep_real *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     predictor_keep(self);
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(hsep_real));
@@ -125,7 +126,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     hsep_residual_begin(hsep_predictor_model(self), self->k >= self->preview); /* the first fill is not learned */
     self->n_published = 0;
     self->held = self->residual;
-    hsep_predictor_uncertainty(self)->least = hsep_residual_farthest(hsep_predictor_model(self));
+    hsep_predictor_uncertainty(self)->least = averaged != NULL ? averaged->reach.farthest : 0.0;
 }
 
 /* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */

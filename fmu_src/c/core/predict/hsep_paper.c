@@ -15,7 +15,6 @@ static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *
     hsep_real end = HSEP_WORDS(hsep_paper);
     self->p = settings->p;
     self->q = settings->q;
-    self->n = settings->Np + hsep_late(settings);
     self->features = 2 + settings->q + settings->p;
     self->weights = hsep_take(&end, (hsep_real)self->features);
     self->regression = hsep_take_block(&end, hsep_regression_size(self->features));
@@ -29,7 +28,6 @@ HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings)
 
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings)
 {
-    memset(self, 0, (size_t)hsep_paper_size(settings));
     (void)paper_lay_out(self, settings);
     hsep_regression_init(hsep_paper_regression(self), self->features, settings->lambda);
 }
@@ -49,18 +47,6 @@ HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sam
     memcpy(lags, sample->e + 1, (size_t)self->p * sizeof(hsep_real));
     row[self->features] = sample->e[0]; /* its target e_pb(k) */
     hsep_regression_fold(hsep_paper_regression(self));
-}
-
-HSEP_API void hsep_paper_begin(hsep_paper *self)
-{
-    hsep_regression_solve(hsep_paper_regression(self), hsep_at(self, self->weights));
-}
-
-HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, hsep_int first, hsep_int last)
-{
-    const hsep_recursion recursion = hsep_paper_recursion(self, 1);
-    hsep_recursion_run(&recursion, window->x_pb, window->e_h, self->n, first, last); /* Eq. (4) */
 }
 
 HSEP_API void hsep_recursion_run(

@@ -21,29 +21,22 @@ typedef struct {
 
 typedef struct {
     hsep_int p, q;     /* lags of e_pb and of x_pb */
-    hsep_int n;        /* samples of a prediction, with the late ones */
     hsep_int features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
     /* Offsets in words from the beginning of the struct */
     hsep_int weights; /* (features,) w */
     hsep_int regression;
 } hsep_paper;
 
-HSEP_ASSERT_WORDS(hsep_paper, 6);
+HSEP_ASSERT_WORDS(hsep_paper, 5);
 
 HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
+/* Fill the block, which is 0. */
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
 
 HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);
 
 /* Fold the row of a sample into the regression; eqs. (5) and (6). Costs a hsep_regression_fold. */
 HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample);
-
-/* Begin a window: the weights, eq. (6). Cost: n^2 / 2 multiply-adds. */
-HSEP_API void hsep_paper_begin(hsep_paper *self);
-
-/* Predict the residuals of samples first ... last - 1; eq. (4). */
-HSEP_API void hsep_paper_predict(
-    const hsep_paper *self, const hsep_residual_window *window, hsep_int first, hsep_int last);
 
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias);

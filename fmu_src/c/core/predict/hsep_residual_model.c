@@ -82,7 +82,7 @@ HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hse
 
 HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
 {
-    return self->averaged ? hsep_averaged_n_learned(hsep_residual_averaged(self)) : 0;
+    return self->averaged ? HSEP_LEARNED_WORDS + hsep_residual_averaged(self)->n_static : 0;
 }
 
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
@@ -97,8 +97,6 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self)
     }
 }
 
-HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->averaged != 0; }
-
 HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command)
 {
     if (self->averaged) {
@@ -109,8 +107,9 @@ HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command)
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 {
     self->learning = learning != 0;
-    if (!self->averaged) {
-        hsep_paper_begin(hsep_residual_paper(self));
+    if (!self->averaged) { /* the weights, eq. (6) */
+        hsep_paper *paper = hsep_residual_paper(self);
+        hsep_regression_solve(hsep_paper_regression(paper), hsep_at(paper, paper->weights));
     }
 }
 
@@ -128,7 +127,8 @@ HSEP_API void hsep_residual_predict(
     hsep_residual_model *self, const hsep_residual_window *window, hsep_int first, hsep_int last)
 {
     if (!self->averaged) {
-        hsep_paper_predict(hsep_residual_paper(self), window, first, last);
+        const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(self), 1);
+        hsep_recursion_run(&recursion, window->x_pb, window->e_h, self->n, first, last); /* Eq. (4) */
     } else if (first == 0) {
         hsep_averaged_forecast(hsep_residual_averaged(self), window->command, window->x_pb, NULL, 0, window->e_h, last);
     } else {
@@ -147,7 +147,7 @@ HSEP_API void hsep_residual_take_in(
 {
     if (self->averaged) {
         hsep_averaged *averaged = hsep_residual_averaged(self);
-        hsep_averaged_measure(averaged, sample->i, sample->relative);
+        hsep_at(averaged, averaged->measured)[self->Np - 1 - sample->i] = sample->relative;
         if (self->learning && sample->settled) {
             hsep_averaged_follow(
                 averaged, window->command + self->late, window->x_pb + self->late, window->e + self->late,
@@ -173,11 +173,6 @@ HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
 {
     hsep_averaged *averaged = hsep_residual_averaged(self);
     return averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL;
-}
-
-HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self)
-{
-    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->reach.farthest : 0.0;
 }
 
 HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)

@@ -22,7 +22,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
 HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters);
-/* Fill the block, at rest at start, m, with nothing learned. */
+/* Fill the block, which is 0, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_residual_init(
     hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
 
@@ -46,9 +46,6 @@ HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
-
-/* Whether a measurement may be missing, NaN. */
-HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 
 /* Take in the command that comes next, as it came, m, relative to the start. */
 HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command);
@@ -76,9 +73,6 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
 
 /* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
 HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self);
-
-/* m, largest residual among the last samples, where these were rejected; else 0. */
-HSEP_API hsep_real hsep_residual_farthest(const hsep_residual_model *self);
 
 /* Measurements of this run that were missing or not plausible. */
 HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self);

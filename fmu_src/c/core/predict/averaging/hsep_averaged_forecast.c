@@ -62,33 +62,25 @@ HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_re
     const hsep_real square = is_early ? self->early_square : self->learned.scales[kind].largest_square;
     const hsep_real step = is_early ? self->early_step : self->forecast_step;
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
-    for (hsep_int i = 0; i < hsep_averaged_expert(self, expert)->n_static; i++) {
-        const hsep_real of_motion = hsep_at(self, self->forecast_largest)[i];
-        const hsep_real largest = !of_command ? of_motion : i > 0 ? step : 1.0;
-        const hsep_real share = of_command ? hsep_command_share(hsep_averaged_command(self), i)
-                                           : hsep_disturbances_share(hsep_averaged_disturbances(self), i);
+    const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    hsep_expert *solved = hsep_averaged_expert(self, expert);
+    for (hsep_int i = 0; i < solved->n_static; i++) {
+        hsep_real largest = of_command ? step : hsep_at(self, self->forecast_largest)[i], share = 1.0;
+        if (of_command && i == 0) {
+            largest = 1.0;
+        } else if (of_command) { /* an old increment explains less than a recent one, as an old residual does */
+            share = i <= solved->p ? hsep_at(solved, solved->lag_scales)[i - 1] : hsep_sqrt(HSEP_AVERAGING_LAST_LAG);
+        } else if (i + disturbances->count >= disturbances->n) {
+            share = HSEP_AVERAGING_DIFFERENCE_SHARE;
+        }
         scales[i] = effect * share / hsep_fmax(largest, HSEP_EXPERTS_LEAST);
     }
 }
 
-/* Solve for the weights of an expert from the rows of this run and of earlier ones, these weighed by weight. */
-static void averaged_solve(hsep_averaged *self, hsep_int place, hsep_real weight)
+/* Solve for the weights of the experts that know something, from the rows of this run and of earlier ones. */
+static void averaged_solve(hsep_averaged *self, int outgrown)
 {
-    hsep_warm_start *evidence = hsep_averaged_evidence(self, hsep_averaged_kind_of(self, place));
-    const hsep_real n_rows =
-        hsep_warm_start_of_run(evidence)->n_rows + weight * hsep_warm_start_earlier(evidence)->n_rows;
-    hsep_real scales[HSEP_AVERAGED_MOST];
-    hsep_averaged_priors(self, place, scales);
-    hsep_solution *solution = hsep_averaged_begun(self, place);
-    solution->completed = solution->completed && averaged_is_early(self);
-    /* apart in a predictor: a compensator has more variances to compute */
-    hsep_expert_solve(hsep_averaged_expert(self, place), n_rows, scales, self->settled != 0);
-}
-
-/* Solve for the weights of the experts that know something. */
-static void averaged_solved(hsep_averaged *self, int outgrown)
-{
-    hsep_int known[HSEP_N_RESIDUALS];
+    int known[HSEP_N_RESIDUALS];
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         known[i] = hsep_warm_start_n_rows(hsep_averaged_evidence(self, i)) > 0.0 &&
                    self->learned.scales[i].largest_square > 0.0 && !(i == HSEP_MODEL_RESIDUAL && outgrown);
@@ -97,25 +89,17 @@ static void averaged_solved(hsep_averaged *self, int outgrown)
         self->predicted[i] = known[hsep_averaged_kind_of(self, i)] && hsep_averaged_solution(self, i) != NULL &&
                              hsep_averaged_expert(self, i)->variance > 0.0;
         if (self->predicted[i]) {
-            averaged_solve(self, i, hsep_expert_weight(i));
+            hsep_warm_start *evidence = hsep_averaged_evidence(self, hsep_averaged_kind_of(self, i));
+            const hsep_real earlier = hsep_expert_weight(i) * hsep_warm_start_earlier(evidence)->n_rows;
+            const hsep_real n_rows = hsep_warm_start_of_run(evidence)->n_rows + earlier;
+            hsep_real scales[HSEP_AVERAGED_MOST];
+            hsep_averaged_priors(self, i, scales);
+            hsep_solution *solution = hsep_averaged_begun(self, i);
+            solution->completed = solution->completed && averaged_is_early(self);
+            /* apart in a predictor: a compensator has more variances to compute */
+            hsep_expert_solve(hsep_averaged_expert(self, i), n_rows, scales, self->settled != 0);
         }
     }
-}
-
-/* Largest step of the command relative to that before the window, >= 1: its expert is linear in the command, and may
- * predict as much more than anything so far. */
-static hsep_real averaged_growth(const hsep_averaged *self)
-{
-    const hsep_real before = self->learned.largest_step;
-    return before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_GROWTH) : 1.0;
-}
-
-/* Features without lags of an expert, sample after sample. */
-static const hsep_real *averaged_rows(hsep_averaged *self, hsep_int expert)
-{
-    hsep_command *command = hsep_averaged_command(self);
-    return hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL ? hsep_at(command, command->rows)
-                                                                        : hsep_at(self, self->rows);
 }
 
 /* Begin the prediction of commands x_d by the experts that know something. past: (p,) m, the last residuals of the
@@ -199,6 +183,7 @@ HSEP_API void hsep_averaged_go_on(
 {
     const hsep_int begin = self->n - last, end = self->n - first;
     hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    hsep_command *command = hsep_averaged_command(self);
     if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
         hsep_expert *at_first = hsep_averaged_expert(self, HSEP_STATIC);
         hsep_expert_predict(at_first, rows, first, last, apart > 0);
@@ -208,11 +193,13 @@ HSEP_API void hsep_averaged_go_on(
         hsep_disturbances_motion(hsep_averaged_disturbances(self), x_pb, x, self->n, first, last, rows);
     }
     if (self->predicted[HSEP_ARX_COMMAND]) {
-        hsep_command_fill(hsep_averaged_command(self), self->n, first, last);
+        hsep_command_fill(command, self->n, first, last);
     }
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (self->predicted[i]) {
-            hsep_expert_predict(hsep_averaged_expert(self, i), averaged_rows(self, i), first, last, apart);
+            const int of_command = hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL;
+            const hsep_real *of_kind = of_command ? hsep_at(command, command->rows) : rows;
+            hsep_expert_predict(hsep_averaged_expert(self, i), of_kind, first, last, apart);
             averaged_take(self, i, x_pb, begin, end);
         }
     }
@@ -224,10 +211,11 @@ HSEP_API void hsep_averaged_forecast(
     hsep_real e[], hsep_int last)
 {
     const int outgrown = averaged_scale(self, x_d, x_pb, path, n_path);
+    const hsep_real before = self->learned.largest_step;
     self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
-    self->growth = averaged_growth(self);
+    self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_GROWTH) : 1.0;
     const hsep_real hold = hsep_clip(e[self->n], self->bound);
-    averaged_solved(self, outgrown);
+    averaged_solve(self, outgrown);
     self->settled = 0;
     hsep_real *stacked = hsep_at(self, self->stacked); /* hold, and what knows nothing */
     memset(stacked, 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));

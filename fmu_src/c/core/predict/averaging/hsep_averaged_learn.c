@@ -15,14 +15,9 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
     hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np, self->forecast_scale);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
     hsep_command_begin_in_motion(hsep_averaged_command(self), x_d[Np - 1], x_d[Np - 2]);
-    for (hsep_int i = 0; i < hsep_averaged_command(self)->p; i++) {
+    for (hsep_int i = 0; i < HSEP_AVERAGING_LAGS_OF_COMMAND; i++) {
         past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
-}
-
-HSEP_API void hsep_averaged_measure(hsep_averaged *self, hsep_int k, hsep_real x)
-{
-    hsep_at(self, self->measured)[self->Np - 1 - k] = x;
 }
 
 /* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. The
@@ -84,7 +79,8 @@ static void averaged_take_rows(hsep_averaged *self, const hsep_real x_pb[], cons
 static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const hsep_real rows[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
-    const hsep_int p = kind == HSEP_COMMAND_RESIDUAL ? hsep_averaged_command(self)->p : self->p, n_static = gram->n - p;
+    const hsep_int p = kind == HSEP_COMMAND_RESIDUAL ? HSEP_AVERAGING_LAGS_OF_COMMAND : self->p;
+    const hsep_int n_static = gram->n - p;
     const hsep_real *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
     hsep_real n_bridged = 0.0, *to = hsep_gram_row(gram);
     for (hsep_int i = 0; i < p; i++) {
@@ -150,17 +146,6 @@ static void averaged_size(hsep_averaged *self)
     self->early_square = scale.largest_square;
 }
 
-/* Multiply-adds as which four rows count that are added to the Gram matrices. */
-static hsep_real averaged_of_rows(hsep_averaged *self)
-{
-    hsep_real sum = 0.0;
-    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
-        const hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, i));
-        sum += HSEP_AVERAGED_OF_GRAM * hsep_triangle(gram->n + 1);
-    }
-    return sum;
-}
-
 /* Multiply-adds as which the beginning of a solution counts. */
 static hsep_real averaged_of_beginning(const hsep_solution *solution)
 {
@@ -190,7 +175,12 @@ static void averaged_advance(hsep_averaged *self, hsep_int last)
     const hsep_int left = self->Np - last, to_come = left - 1;
     const hsep_int waiting = hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL))->waiting;
     const hsep_int adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
-    const hsep_real of_rows = averaged_of_rows(self), added = waiting == 1 ? of_rows : 0.0; /* in this sample */
+    hsep_real of_rows = 0.0; /* where four are added to the Gram matrices */
+    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
+        of_rows +=
+            HSEP_AVERAGED_OF_GRAM * hsep_triangle(hsep_warm_start_of_run(hsep_averaged_evidence(self, i))->n + 1);
+    }
+    const hsep_real added = waiting == 1 ? of_rows : 0.0; /* in this sample */
     const hsep_real all = added + of_rows * (hsep_real)adds + averaged_left(self, to_come);
     hsep_real amount = all / (hsep_real)left - added;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
@@ -334,7 +324,7 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
 HSEP_API void hsep_averaged_learn(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const hsep_int p = self->p, of_command = hsep_averaged_command(self)->p;
+    const hsep_int p = self->p, of_command = HSEP_AVERAGING_LAGS_OF_COMMAND;
     hsep_real *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     if (self->followed == 0) {
         averaged_begin_window(self, x_d, x_pb, fold);

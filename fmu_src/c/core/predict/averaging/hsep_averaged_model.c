@@ -4,12 +4,12 @@
 #include "hsep_math.h"
 
 #include <stddef.h>
-#include <string.h>
 
 /* Features of the rows of some evidence. */
 static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
 {
-    return kind == HSEP_COMMAND_RESIDUAL ? 2 * HSEP_AVERAGING_LAGS_OF_COMMAND + 2 : self->n_static + self->p;
+    return kind == HSEP_COMMAND_RESIDUAL ? HSEP_COMMAND_FEATURES + HSEP_AVERAGING_LAGS_OF_COMMAND
+                                         : self->n_static + self->p;
 }
 
 HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert)
@@ -21,8 +21,7 @@ static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expe
 {
     const hsep_int room = self->Np - self->early + HSEP_GRAM_TOGETHER;
     if (hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL) {
-        return (hsep_expert_shape){
-            self->Np, self->n, HSEP_AVERAGING_LAGS_OF_COMMAND + 2, HSEP_AVERAGING_LAGS_OF_COMMAND, room};
+        return (hsep_expert_shape){self->Np, self->n, HSEP_COMMAND_FEATURES, HSEP_AVERAGING_LAGS_OF_COMMAND, room};
     }
     return (hsep_expert_shape){self->Np, self->n, self->n_static, hsep_expert_of(expert).has_lags ? self->p : 0, room};
 }
@@ -85,7 +84,6 @@ HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters
 
 HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
-    memset(self, 0, (size_t)hsep_averaged_size(parameters));
     (void)averaged_lay_out(self, parameters);
     self->leading = HSEP_ARX_RESIDUAL;
     hsep_stack_init(&self->learned.stack);
@@ -119,7 +117,10 @@ HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert
     hsep_solution *solution = hsep_averaged_solution(self, expert);
     if (solution != NULL && !solution->begun) {
         hsep_warm_start *evidence = hsep_averaged_evidence(self, hsep_averaged_kind_of(self, expert));
-        hsep_expert_begin_solution(hsep_averaged_expert(self, expert), evidence, hsep_expert_weight(expert));
+        const hsep_gram *earlier = hsep_warm_start_earlier(evidence);
+        hsep_solution_begin(
+            solution, hsep_warm_start_of_run(evidence), earlier->n_rows > 0.0 ? earlier : NULL,
+            hsep_expert_weight(expert));
     }
     return solution;
 }
@@ -138,11 +139,6 @@ HSEP_API void hsep_averaged_prepare_solutions(
                 &errors[i - HSEP_REGRESSIONS], first, least);
         }
     }
-}
-
-HSEP_API hsep_int hsep_averaged_n_learned(const hsep_averaged *self)
-{
-    return sizeof self->learned / sizeof(hsep_real) + self->n_static;
 }
 
 HSEP_API void hsep_averaged_restart(hsep_averaged *self)

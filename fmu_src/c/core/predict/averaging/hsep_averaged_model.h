@@ -28,9 +28,8 @@
 #define HSEP_AVERAGED_OF_BEGINNING 4.0
 
 /* Features without lags of an expert, at most. */
-#define HSEP_AVERAGED_OF_COMMAND (HSEP_AVERAGING_LAGS_OF_COMMAND + 2)
 #define HSEP_AVERAGED_MOST \
-    (HSEP_AVERAGED_OF_COMMAND > HSEP_DISTURBANCES_MOST ? HSEP_AVERAGED_OF_COMMAND : HSEP_DISTURBANCES_MOST)
+    (HSEP_COMMAND_FEATURES > HSEP_DISTURBANCES_MOST ? HSEP_COMMAND_FEATURES : HSEP_DISTURBANCES_MOST)
 
 /* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
  * them are the largest magnitudes of the features without lags. */
@@ -74,7 +73,7 @@ typedef struct {
     /* Offsets in words from the beginning of the struct */
     hsep_int forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
     hsep_int x;                /* (n,) m, position */
-    hsep_int measured;         /* (Np,) m, measured position, NaN where missing */
+    hsep_int measured;         /* (Np,) m, measured position, relative to the start, NaN where missing */
     hsep_int accepted;         /* (Np,) whether it is believed */
     hsep_int bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
@@ -89,13 +88,14 @@ typedef struct {
     hsep_learned learned;
 } hsep_averaged;
 
-HSEP_ASSERT_WORDS(hsep_learned, 3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_STACK_WORDS);
+#define HSEP_LEARNED_WORDS (3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_STACK_WORDS)
+HSEP_ASSERT_WORDS(hsep_learned, HSEP_LEARNED_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    38 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + (sizeof(hsep_gate) + sizeof(hsep_learned)) / sizeof(hsep_real));
+    38 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters);
-/* Fill the block, at rest at start, m, with nothing learned. */
+/* Fill the block, which is 0, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* Parts of the block; of the experts not hold. */
@@ -140,9 +140,6 @@ HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_re
 HSEP_API void hsep_averaged_prepare_solutions(
     hsep_averaged *self, const hsep_residual_scale scales[], const hsep_expert_errors errors[]);
 
-/* How many numbers are learned besides the factors, from self->learned on. */
-HSEP_API hsep_int hsep_averaged_n_learned(const hsep_averaged *self);
-
 /* Begin a run with what an earlier one has learned, loaded into a fresh block: it is discounted and doubted, as a
  * machine may have changed meanwhile. */
 HSEP_API void hsep_averaged_restart(hsep_averaged *self);
@@ -167,9 +164,6 @@ HSEP_API void hsep_averaged_go_on(
  * more. e: (n + p,), m. */
 HSEP_API void hsep_averaged_predict(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart);
-
-/* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
-HSEP_API void hsep_averaged_measure(hsep_averaged *self, hsep_int k, hsep_real x);
 
 /* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, Np > 1, with the motion before it. */
 HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[]);

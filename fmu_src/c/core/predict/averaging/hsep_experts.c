@@ -77,13 +77,6 @@ HSEP_API void hsep_expert_prepare(
     hsep_solution_reset(solution);
 }
 
-HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_warm_start *evidence, hsep_real weight)
-{
-    const hsep_gram *earlier = hsep_warm_start_earlier(evidence);
-    hsep_solution_begin(
-        hsep_expert_solution(self), hsep_warm_start_of_run(evidence), earlier->n_rows > 0.0 ? earlier : NULL, weight);
-}
-
 static void expert_penalise(hsep_expert *self, const hsep_real scales[])
 {
     hsep_solution *solution = hsep_expert_solution(self);
@@ -137,9 +130,6 @@ static void expert_respond(hsep_expert *self, hsep_int first, hsep_int last)
     }
 }
 
-/* Largest variance that counts, m2. */
-static hsep_real expert_most(const hsep_expert *self) { return HSEP_EXPERTS_DIVERGED * self->bound * self->bound; }
-
 /* Variances of rows of samples k ... last - 1, of the first of every apart, at most HSEP_SOLUTION_ABREAST of them. */
 static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int k, hsep_int last, hsep_int apart)
 {
@@ -161,35 +151,12 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int
     }
 }
 
-/* Variance of sample k of a prediction: the rows' variances, carried through the impulse response. */
-static hsep_real expert_variance(const hsep_expert *self, hsep_int k)
-{
-    const hsep_int j = self->n - 1 - k;
-    const hsep_real *variances = hsep_at_const(self, self->variances) + j, most = expert_most(self);
-    const hsep_real carried =
-        self->p > 0 ? hsep_dot(hsep_at_const(self, self->squares), variances, k + 1) : variances[0];
-    return isfinite(hsep_at_const(self, self->run)[j]) && carried < most ? carried : most;
-}
-
-/* What a variance, m2, leaves of a prediction. */
-static hsep_real expert_shrinkage(const hsep_expert *self, hsep_real variance)
-{
-    return self->largest_square / (self->largest_square + variance);
-}
-
-/* Shrink the free run at places begin ... end - 1. */
-static void expert_shrink(hsep_expert *self, hsep_int begin, hsep_int end)
-{
-    const hsep_real *unshrunk = hsep_at(self, self->unshrunk), *shrinkage = hsep_at(self, self->shrinkage);
-    hsep_real *e_h = hsep_at(self, self->e_h);
-    for (hsep_int j = begin; j < end; j++) {
-        e_h[j] = hsep_clip(unshrunk[j], self->bound) * shrinkage[j];
-    }
-}
-
-/* Variances of samples first ... last - 1, and what they leave of the prediction. */
+/* Variances of samples first ... last - 1, those of the rows carried through the impulse response, and what they leave
+ * of the prediction. */
 static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
 {
+    const hsep_real most = HSEP_EXPERTS_DIVERGED * self->bound * self->bound;
+    const hsep_real *run = hsep_at(self, self->run), *squares = hsep_at(self, self->squares);
     hsep_real *shrinkage = hsep_at(self, self->shrinkage);
     if (self->p > 0) {
         expert_respond(self, first, last);
@@ -198,7 +165,11 @@ static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int firs
         expert_vary_rows(self, rows, k, last, apart);
     }
     for (hsep_int k = first; k < last; k++) {
-        shrinkage[self->n - 1 - k] = expert_shrinkage(self, expert_variance(self, k));
+        const hsep_int j = self->n - 1 - k;
+        const hsep_real *variances = hsep_at(self, self->variances) + j;
+        const hsep_real carried = self->p > 0 ? hsep_dot(squares, variances, k + 1) : variances[0];
+        const hsep_real variance = isfinite(run[j]) && carried < most ? carried : most;
+        shrinkage[j] = self->largest_square / (self->largest_square + variance);
     }
 }
 
@@ -217,7 +188,10 @@ HSEP_API void hsep_expert_predict(
     if (apart > 0) {
         expert_vary(self, rows, first, last, apart);
     }
-    expert_shrink(self, self->n - last, self->n - first);
+    const hsep_real *unshrunk = hsep_at(self, self->unshrunk), *shrinkage = hsep_at(self, self->shrinkage);
+    for (hsep_int j = self->n - last; j < self->n - first; j++) {
+        hsep_at(self, self->e_h)[j] = hsep_clip(unshrunk[j], self->bound) * shrinkage[j];
+    }
 }
 
 HSEP_API void hsep_expert_judge(

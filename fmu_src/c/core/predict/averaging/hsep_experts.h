@@ -74,14 +74,11 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
 }
 
 /* Take the penalties that the next weights are solved for with from the rows so far, rows of earlier runs weighed by
- * weight; they begin to be solved for by hsep_expert_begin_solution. first, least: m2, variance of the noise while
- * it is not known, and the least one. */
+ * weight, which hsep_solution_begin takes, too. first, least: m2, variance of the noise while it is not known, and the
+ * least one. */
 HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least);
-
-/* Begin to solve for them from the rows so far, those of earlier runs settled. Cost: n^2 multiply-adds. */
-HSEP_API void hsep_expert_begin_solution(hsep_expert *self, hsep_warm_start *evidence, hsep_real weight);
 
 /* Complete the factor with the penalties of the features without lags, before the last row comes; scales: as below. */
 HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[]);

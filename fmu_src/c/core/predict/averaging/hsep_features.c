@@ -19,11 +19,6 @@ HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters
     return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
 }
 
-HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_int feature)
-{
-    return feature + self->count < self->n ? 1.0 : HSEP_AVERAGING_DIFFERENCE_SHARE;
-}
-
 /* Filter i before the window; behind all of these are the filters after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
 {
@@ -57,7 +52,6 @@ HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_disturbances_size(parameters));
     (void)disturbances_lay_out(self, parameters);
     self->origin = start;
     for (hsep_int i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
@@ -284,12 +278,9 @@ static hsep_real command_lay_out(hsep_command *self, const hsep_residual_paramet
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
-    self->p = HSEP_AVERAGING_LAGS_OF_COMMAND;
-    self->count = self->p + 2;
-    self->n_before = settings->dead_time + self->p + 1;
-    self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)settings->dead_time + (hsep_real)self->p + 1.0);
-    self->rows = hsep_take(&end, (hsep_real)n * (hsep_real)self->count);
-    self->shares = hsep_take(&end, (hsep_real)self->count);
+    self->n_before = settings->dead_time + HSEP_AVERAGING_LAGS_OF_COMMAND + 1;
+    self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)self->n_before);
+    self->rows = hsep_take(&end, (hsep_real)n * HSEP_COMMAND_FEATURES);
     return end * sizeof(hsep_real);
 }
 
@@ -300,17 +291,7 @@ HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters)
 
 HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters)
 {
-    memset(self, 0, (size_t)hsep_command_size(parameters));
     (void)command_lay_out(self, parameters);
-    for (hsep_int i = 0; i < self->count; i++) {
-        const hsep_real age = i > 0 ? (hsep_real)(i - 1) / (hsep_real)self->p : 0.0;
-        hsep_at(self, self->shares)[i] = hsep_sqrt(hsep_pow(HSEP_AVERAGING_LAST_LAG, age));
-    }
-}
-
-HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature)
-{
-    return hsep_at_const(self, self->shares)[feature];
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)
@@ -321,11 +302,11 @@ HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_
 HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last)
 {
     const hsep_real *commands = hsep_at(self, self->commands) + (self->n - m);
-    hsep_real *row = hsep_at(self, self->rows) + first * self->count;
-    for (hsep_int k = first; k < last; k++, row += self->count) {
+    hsep_real *row = hsep_at(self, self->rows) + first * HSEP_COMMAND_FEATURES;
+    for (hsep_int k = first; k < last; k++, row += HSEP_COMMAND_FEATURES) {
         const hsep_real *late = commands + (m - 1 - k) + self->dead_time;
         row[0] = 1.0;
-        for (hsep_int i = 1; i < self->count; i++) {
+        for (hsep_int i = 1; i < HSEP_COMMAND_FEATURES; i++) {
             row[i] = late[i - 1] - late[i];
         }
     }

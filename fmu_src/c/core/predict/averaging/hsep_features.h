@@ -54,11 +54,8 @@ HSEP_ASSERT_WORDS(hsep_disturbances, 9 + 2 * sizeof(hsep_disturbed) / sizeof(hse
 HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters);
 HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters);
 
-/* Effect that a feature may have, relative to the largest. */
-HSEP_API hsep_real hsep_disturbances_share(const hsep_disturbances *self, hsep_int feature);
-
 HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters);
-/* Fill the block, at rest at start, m. */
+/* Fill the block, which is 0, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
 
@@ -94,28 +91,25 @@ HSEP_API hsep_real hsep_disturbances_damped_velocity(
     const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j);
 HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);
 
+/* Features of the command without lags: 1, and the increments. */
+#define HSEP_COMMAND_FEATURES (HSEP_AVERAGING_LAGS_OF_COMMAND + 2)
+
 /* Increments of the command. */
 typedef struct {
     hsep_int n;         /* samples of a prediction */
     hsep_int dead_time; /* samples */
-    hsep_int p;         /* lags, and increments after the first, whatever p of the settings is */
-    hsep_int count;     /* features without lags, p + 2 */
     hsep_int n_before;  /* commands before a window that its features need */
     /* Offsets in words from the beginning of the struct */
     hsep_int commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
-    hsep_int rows;     /* (n, count) features, sample after sample */
-    hsep_int shares;   /* (count,) effects that they may have, relative to the largest */
+    hsep_int rows;     /* (n, HSEP_COMMAND_FEATURES), sample after sample */
 } hsep_command;
 
-HSEP_ASSERT_WORDS(hsep_command, 8);
+HSEP_ASSERT_WORDS(hsep_command, 5);
 
 HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters);
-/* Fill the block, at rest. */
+/* Fill the block, which is 0, at rest. */
 HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters);
-
-/* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
-HSEP_API hsep_real hsep_command_share(const hsep_command *self, hsep_int feature);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m);

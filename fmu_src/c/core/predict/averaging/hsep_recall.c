@@ -29,7 +29,6 @@ HSEP_API hsep_real hsep_recall_size(const hsep_residual_parameters *parameters)
 
 HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters *parameters)
 {
-    memset(self, 0, (size_t)hsep_recall_size(parameters));
     (void)recall_lay_out(self, parameters);
     self->lag = self->n;
 }

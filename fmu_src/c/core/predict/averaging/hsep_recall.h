@@ -34,7 +34,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
 HSEP_API hsep_real hsep_recall_size(const hsep_residual_parameters *parameters);
-/* Fill the block, at rest. */
+/* Fill the block, which is 0, at rest. */
 HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */

@@ -36,7 +36,6 @@ HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters)
 HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_start_size(parameters));
     (void)start_lay_out(self, parameters);
     hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
     const hsep_real late = (hsep_real)(settings->dead_time + (self->n - self->Np)); /* samples */
