@@ -20,8 +20,6 @@
 #define PERIOD 1000000L /* ns */
 #define PRIORITY 80
 #define BINS 24 /* bin i: 2^i ns and more */
-#define NP 100
-#define PREVIEW 200
 
 static const double pi = 3.14159265358979323846;
 
@@ -84,8 +82,6 @@ int main(int argc, char *argv[])
     const hsep_mode mode = {.f_n = 25.0, .zeta = 0.3, .alpha = omega * omega};
     hsep_parameters parameters;
     hsep_defaults(&parameters);
-    parameters.predictor.Np = NP;
-    parameters.compensator.preview = PREVIEW;
     parameters.n_modes = 1;
     parameters.modes = &mode;
     const size_t size = hsep_compensator_size(&parameters);

@@ -31,15 +31,14 @@ static void calls_log(const hsep_instance *instance, hsep_category category, con
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     const int place = calls_place((unsigned)category);
-    const hsep_component *component = (const hsep_component *)instance;
-    if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
+    if (instance->logger == NULL || (instance->categories & (unsigned)category) == 0) {
         return;
     }
     (void)hsep_text_list(text, sizeof text, format, arguments);
-    component->hand(component, calls_status[place], calls_categories[place], text);
+    instance->hand(instance, calls_status[place], calls_categories[place], text);
 }
 
-HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...)
+HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -47,7 +46,7 @@ HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const ch
     va_end(arguments);
 }
 
-HSEP_API hsep_status hsep_refuse(hsep_instance *instance, const char *format, ...)
+HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -56,9 +55,9 @@ HSEP_API hsep_status hsep_refuse(hsep_instance *instance, const char *format, ..
     return HSEP_REFUSED;
 }
 
-HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call)
+HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)
 {
-    hsep_instance *instance = component;
+    hsep_instance *instance = handle;
     char legal[HSEP_MESSAGE_SIZE] = "";
     if (instance == NULL || (call->legal & (unsigned)instance->experiment.phase) != 0) {
         return instance;
@@ -97,43 +96,35 @@ static hsep_status calls_open(hsep_instance *instance, const char *name, const c
     return status;
 }
 
-HSEP_API hsep_component *hsep_component_new(
-    const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on)
+HSEP_API hsep_instance *hsep_call_instantiate(
+    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on)
 {
-    hsep_component *component = hsep_new(&filled->instance, sizeof *component);
-    if (component == NULL) {
-        char text[HSEP_MESSAGE_SIZE];
-        (void)hsep_text(
-            text, sizeof text, "%s: no memory for an instance of %lu bytes", filled->instance.names->instantiate,
-            (unsigned long)sizeof *component);
-        if (filled->logger != NULL) {
-            filled->hand(filled, calls_status[2], calls_categories[2], text);
-        }
+    hsep_instance *instance = hsep_new(filled, sizeof *instance);
+    if (instance == NULL) {
+        (void)hsep_refuse(
+            filled, "%s: no memory for an instance of %lu bytes", filled->names->instantiate,
+            (unsigned long)sizeof *instance);
         return NULL;
     }
-    *component = *filled;
-    component->categories = CALLS_LOG_EVERYTHING;
-    if (!logging_on) {
-        component->categories &= ~(unsigned)HSEP_LOG_ALL;
-    }
-    if (calls_open(&component->instance, name, token, resources) == HSEP_REFUSED) {
-        hsep_instance_free(&component->instance);
+    *instance = *filled;
+    instance->categories = logging_on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
+    if (calls_open(instance, name, token, resources) == HSEP_REFUSED) {
+        hsep_instance_free(instance);
         return NULL;
     }
-    hsep_instance_reset(&component->instance);
-    return component;
+    hsep_instance_reset(instance);
+    return instance;
 }
 
 HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[])
 {
-    hsep_component *component = handle;
+    hsep_instance *instance = hsep_begin(handle, call);
     unsigned named = 0;
-    if (hsep_begin(handle, call) == NULL) {
+    if (instance == NULL) {
         return HSEP_REFUSED;
     }
     if (n > 0 && names == NULL) {
-        return hsep_refuse(
-            &component->instance, "%s: categories is NULL, but nCategories is %lu", call->name, (unsigned long)n);
+        return hsep_refuse(instance, "%s: categories is NULL, but nCategories is %lu", call->name, (unsigned long)n);
     }
     for (size_t i = 0; i < n; i++) {
         for (unsigned place = 0; names[i] != NULL && place < CALLS_N_CATEGORIES; place++) {
@@ -146,17 +137,17 @@ HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int 
         named = CALLS_LOG_EVERYTHING;
     }
     if (n == 0) {
-        component->categories = on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
+        instance->categories = on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
     } else if (named != 0) {
-        component->categories = on ? named : component->categories & ~named;
+        instance->categories = on ? named : instance->categories & ~named;
     }
     return HSEP_OK;
 }
 
 HSEP_API hsep_status
-hsep_call_experiment(void *component, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
+hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
 {
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -176,9 +167,9 @@ hsep_call_experiment(void *component, const hsep_call *call, double start_time, 
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_phase(void *component, const hsep_call *call, hsep_phase phase)
+HSEP_API hsep_status hsep_call_phase(void *handle, const hsep_call *call, hsep_phase phase)
 {
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -186,9 +177,9 @@ HSEP_API hsep_status hsep_call_phase(void *component, const hsep_call *call, hse
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_initialise(void *component, const hsep_call *call)
+HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
 {
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
     if (instance == NULL) {
         return HSEP_REFUSED;
@@ -202,10 +193,9 @@ HSEP_API hsep_status hsep_call_initialise(void *component, const hsep_call *call
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, double t, double h)
+HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double t, double h)
 {
-    hsep_instance *instance = hsep_begin(component, call);
-    hsep_component *warning = component;
+    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
     if (instance == NULL) {
         return HSEP_REFUSED;
@@ -221,16 +211,16 @@ HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, doub
     }
     memset(instance->values + instance->context.n_variables, 0, HSEP_N_INTERPOLATED * sizeof(double));
     instance->experiment.time = t + h;
-    if (((unsigned)status & ~warning->warned) != 0) {
-        warning->warned |= (unsigned)status;
+    if (((unsigned)status & ~instance->warned) != 0) {
+        instance->warned |= (unsigned)status;
         hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
     }
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_reset(void *component, const hsep_call *call)
+HSEP_API hsep_status hsep_call_reset(void *handle, const hsep_call *call)
 {
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }

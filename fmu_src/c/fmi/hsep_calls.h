@@ -1,4 +1,4 @@
-/* What an importer's handle points to in any version of FMI: an instance, its log, and the calls that are legal now.
+/* The calls of any version of FMI: which are legal now, what they do, and the log.
  *
  * Steps are done when the call returns, so no version's states of a step in progress occur. A call that is refused
  * changes nothing, not even the state of the instance: it logs why, and the importer may free, reset or restore it, as
@@ -22,21 +22,6 @@ typedef enum {
     HSEP_LOG_ALL = 16 /* what is neither of the above */
 } hsep_category;
 
-typedef struct hsep_component hsep_component;
-
-/* Hands a message to the importer's logger, which is not NULL; the numbers of statuses are the same in all versions. */
-typedef void (*hsep_hand)(const hsep_component *component, int status, const char *category, const char *text);
-
-/* A pointer to its first member is one to it. */
-struct hsep_component {
-    hsep_instance instance;
-    hsep_hand hand;
-    void (*logger)(void); /* the importer's, of the type of the version; may be NULL */
-    void *environment;
-    unsigned categories; /* bits of hsep_category that reach the logger */
-    unsigned warned;     /* bits of hsep_status: what the model has warned of in steps */
-};
-
 /* A call that belongs to an instance, and the bits of the phases in which it is legal. */
 typedef struct {
     const char *name;
@@ -52,41 +37,41 @@ enum {
     HSEP_T = HSEP_TERMINATED
 };
 
-/* Make an instance. filled: its words, memory functions, hand, logger and environment; token: must equal the token of
+/* Make an instance. filled: its names, memory functions, hand, logger and environment; token: must equal the token of
  * modelDescription.xml; resources: as hsep_open takes them. On refusal return NULL and log why. */
-HSEP_API hsep_component *hsep_component_new(
-    const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on);
+HSEP_API hsep_instance *hsep_call_instantiate(
+    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on);
 
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
-HSEP_API hsep_instance *hsep_begin(void *component, const hsep_call *call);
+HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
-HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...);
+HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...);
 
 /* Log an error and return HSEP_REFUSED. */
-HSEP_API hsep_status hsep_refuse(hsep_instance *instance, const char *format, ...);
+HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...);
 
 /* With names, these categories alone are switched on, or these off; a name that is not ours changes nothing. Without
  * names, on means everything and off the state after instantiation without logging: warnings and errors. */
 HSEP_API hsep_status
-hsep_call_logging(void *component, const hsep_call *call, int on, size_t n, const char *const names[]);
+hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[]);
 
 /* Set the experiment, s. */
 HSEP_API hsep_status
-hsep_call_experiment(void *component, const hsep_call *call, double start_time, int has_stop_time, double stop_time);
+hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int has_stop_time, double stop_time);
 
 /* Move on to a phase that needs nothing else. */
-HSEP_API hsep_status hsep_call_phase(void *component, const hsep_call *call, hsep_phase phase);
+HSEP_API hsep_status hsep_call_phase(void *handle, const hsep_call *call, hsep_phase phase);
 
 /* End the initialization. */
-HSEP_API hsep_status hsep_call_initialise(void *component, const hsep_call *call);
+HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call);
 
 /* Do a communication step from t by h, s; the model's warnings are logged once an instance, each kind, not at every
  * step. */
-HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, double t, double h);
+HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double t, double h);
 
 /* As after the instantiation. */
-HSEP_API hsep_status hsep_call_reset(void *component, const hsep_call *call);
+HSEP_API hsep_status hsep_call_reset(void *handle, const hsep_call *call);
 
 /* What an importer gives to read or write variables by value reference. */
 typedef struct {
@@ -105,7 +90,7 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
 /* The instance if n variables may be read, or set, of a type, as the call's name says: fmi2GetReal; otherwise NULL.
  * Inputs may be set at any time, parameters until the initialization has ended, tunable ones later too. */
 HSEP_API hsep_instance *hsep_call_access(
-    void *component, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values);
+    void *handle, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values);
 
 /* The values of a variable, and their number. */
 HSEP_API const double *hsep_values_source(const hsep_instance *instance, unsigned reference, size_t *count);
@@ -121,8 +106,8 @@ HSEP_API int hsep_values_integer(double number);
 /* Bodies of the functions that get and set n variables; self is NULL if they may not. get: the function's value of a
  * double, number; set: the double of its value, number. What is set has one value for each reference, as no array is an
  * input or a parameter. */
-#define HSEP_GET(component, call, references, n, to, n_values, get) \
-    const hsep_instance *self = hsep_call_access(component, call, references, n, to, n_values); \
+#define HSEP_GET(handle, call, references, n, to, n_values, get) \
+    const hsep_instance *self = hsep_call_access(handle, call, references, n, to, n_values); \
     for (size_t i = 0; self != NULL && i < n; i++) { \
         size_t count = 0; \
         const double *source = hsep_values_source(self, references[i], &count); \
@@ -132,8 +117,8 @@ HSEP_API int hsep_values_integer(double number);
         } \
     }
 
-#define HSEP_SET(component, call, references, n, from, n_values, type, set) \
-    hsep_instance *self = hsep_call_access(component, call, references, n, from, n_values); \
+#define HSEP_SET(handle, call, references, n, from, n_values, type, set) \
+    hsep_instance *self = hsep_call_access(handle, call, references, n, from, n_values); \
     for (size_t i = 0; self != NULL && i < n; i++) { \
         const type number = from[i]; \
         self = hsep_call_tune(self, call, references[i], set); \
@@ -144,13 +129,13 @@ HSEP_API int hsep_values_integer(double number);
     }
 
 /* Saved states, hsep_saved.c: a handle is a pointer to one, or NULL. */
-HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void **state);
-HSEP_API hsep_status hsep_call_restore(void *component, const hsep_call *call, void *state);
-HSEP_API hsep_status hsep_call_free_state(void *component, const hsep_call *call, void **state);
-HSEP_API hsep_status hsep_call_state_size(void *component, const hsep_call *call, void *state, size_t *size);
-HSEP_API hsep_status hsep_call_serialise(void *component, const hsep_call *call, void *state, void *bytes, size_t size);
+HSEP_API hsep_status hsep_call_save(void *handle, const hsep_call *call, void **state);
+HSEP_API hsep_status hsep_call_restore(void *handle, const hsep_call *call, void *state);
+HSEP_API hsep_status hsep_call_free_state(void *handle, const hsep_call *call, void **state);
+HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, void *state, size_t *size);
+HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size);
 HSEP_API hsep_status
-hsep_call_deserialise(void *component, const hsep_call *call, const void *bytes, size_t size, void **state);
+hsep_call_deserialise(void *handle, const hsep_call *call, const void *bytes, size_t size, void **state);
 
 /* The functions of a version, v (fmi2), that others have by other names: of a handle's type, v##Handle, of a state's,
  * v##State, whose reading is spelt De (DeSerialize). CALL: what the version's table has of a call. */

@@ -33,7 +33,7 @@ HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance)
 HSEP_API hsep_status hsep_instance_resize(hsep_instance *instance, const char *call, size_t window, char message[])
 {
     hsep_context *context = &instance->context;
-    const size_t before = context->n_variables - HSEP_N_WINDOWS * context->window;
+    const size_t before = hsep_table_n_starts(context);
     const size_t after = HSEP_N_WINDOWS * window + HSEP_N_INTERPOLATED;
     if (window > instance->room) {
         double *values = hsep_new(instance, (before + after) * sizeof(double));

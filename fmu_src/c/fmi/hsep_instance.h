@@ -84,8 +84,18 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_experiment, 4);
 
-typedef struct {
+/* Hands a message to the importer's logger, which is not NULL; the numbers of statuses are the same in all versions. */
+typedef struct hsep_instance hsep_instance;
+typedef void (*hsep_hand)(const hsep_instance *instance, int status, const char *category, const char *text);
+
+/* What an importer's handle points to. */
+struct hsep_instance {
     const hsep_fmi_names *names;
+    hsep_hand hand;
+    void (*logger)(void); /* the importer's, of the type of the version; may be NULL */
+    void *environment;
+    unsigned categories; /* bits of hsep_category that reach the logger */
+    unsigned warned;     /* bits of hsep_status: what the model has warned of in steps */
     hsep_allocate allocate;
     hsep_release release;
     char *name;      /* NULL until it is known */
@@ -98,7 +108,7 @@ typedef struct {
     size_t state_size;
     double *values; /* by place, then the time derivatives of inputs */
     size_t room;    /* samples of each window that values has room for, at least as many as the table has */
-} hsep_instance;
+};
 
 /* A zeroed block from the importer's memory; NULL if there is none left. */
 HSEP_API void *hsep_new(const hsep_instance *instance, size_t size);

@@ -156,7 +156,7 @@ static hsep_status opening_fill(hsep_context *context, const opening_table *tabl
         return hsep_message_add(reason, "it is damaged or truncated");
     }
     memcpy(&sum, (const char *)table + size - sizeof sum, sizeof sum);
-    if (sum != hsep_crc(0, table, size - sizeof sum)) {
+    if (sum != hsep_crc(table, size - sizeof sum)) {
         return hsep_message_add(reason, "it is damaged: the checksum differs");
     }
     *context = (hsep_context){

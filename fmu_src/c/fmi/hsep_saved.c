@@ -40,9 +40,9 @@ typedef struct {
 } hsep_saved;
 
 /* The instance if the call is legal and the handle is a saved state; otherwise NULL, with a message. */
-static hsep_instance *saved_begin(void *component, const hsep_call *call, const hsep_saved *saved)
+static hsep_instance *saved_begin(void *handle, const hsep_call *call, const hsep_saved *saved)
 {
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     if (instance != NULL && saved == NULL) {
         (void)hsep_refuse(instance, "%s: the state is NULL", call->name);
         return NULL;
@@ -55,9 +55,9 @@ static hsep_instance *saved_begin(void *component, const hsep_call *call, const 
 }
 
 /* The same where a place for a handle is given, which may hold none. */
-static hsep_instance *saved_begin_place(void *component, const hsep_call *call, void **place)
+static hsep_instance *saved_begin_place(void *handle, const hsep_call *call, void **place)
 {
-    return place != NULL && *place != NULL ? saved_begin(component, call, *place) : hsep_begin(component, call);
+    return place != NULL && *place != NULL ? saved_begin(handle, call, *place) : hsep_begin(handle, call);
 }
 
 static void saved_free(hsep_saved *saved)
@@ -95,9 +95,9 @@ static size_t saved_fixed_size(const hsep_instance *instance)
     return sizeof(saved_header) + hsep_instance_n_values(instance) * sizeof(double);
 }
 
-HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void **state)
+HSEP_API hsep_status hsep_call_save(void *handle, const hsep_call *call, void **state)
 {
-    hsep_instance *instance = saved_begin_place(component, call, state);
+    hsep_instance *instance = saved_begin_place(handle, call, state);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -128,10 +128,10 @@ HSEP_API hsep_status hsep_call_save(void *component, const hsep_call *call, void
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_restore(void *component, const hsep_call *call, void *state)
+HSEP_API hsep_status hsep_call_restore(void *handle, const hsep_call *call, void *state)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(component, call, saved);
+    hsep_instance *instance = saved_begin(handle, call, saved);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -163,9 +163,9 @@ HSEP_API hsep_status hsep_call_restore(void *component, const hsep_call *call, v
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_free_state(void *component, const hsep_call *call, void **state)
+HSEP_API hsep_status hsep_call_free_state(void *handle, const hsep_call *call, void **state)
 {
-    if (saved_begin_place(component, call, state) == NULL) {
+    if (saved_begin_place(handle, call, state) == NULL) {
         return HSEP_REFUSED;
     }
     if (state != NULL) { /* the standard: freeing nothing is fine */
@@ -174,10 +174,10 @@ HSEP_API hsep_status hsep_call_free_state(void *component, const hsep_call *call
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_state_size(void *component, const hsep_call *call, void *state, size_t *size)
+HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, void *state, size_t *size)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(component, call, saved);
+    hsep_instance *instance = saved_begin(handle, call, saved);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -197,10 +197,10 @@ static uint64_t saved_checksum(const hsep_saved *saved)
            hsep_fnv(HSEP_FNV_BEGIN, saved->values, (size_t)header.size - sizeof header);
 }
 
-HSEP_API hsep_status hsep_call_serialise(void *component, const hsep_call *call, void *state, void *bytes, size_t size)
+HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(component, call, saved);
+    hsep_instance *instance = saved_begin(handle, call, saved);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
@@ -248,10 +248,10 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
 }
 
 HSEP_API hsep_status
-hsep_call_deserialise(void *component, const hsep_call *call, const void *bytes, size_t size, void **state)
+hsep_call_deserialise(void *handle, const hsep_call *call, const void *bytes, size_t size, void **state)
 {
     char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = saved_begin_place(component, call, state);
+    hsep_instance *instance = saved_begin_place(handle, call, state);
     if (instance == NULL) {
         return HSEP_REFUSED;
     }

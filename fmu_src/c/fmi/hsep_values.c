@@ -114,12 +114,12 @@ static hsep_status values_prepare(hsep_instance *instance, const hsep_access *ac
 }
 
 HSEP_API hsep_instance *hsep_call_access(
-    void *component, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values)
+    void *handle, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values)
 {
     const char *verb = call->name + strlen("fmi2");
     const hsep_access access = {call->name, verb + strlen("Get"), references, n, values, n_values};
     char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = hsep_begin(component, call);
+    hsep_instance *instance = hsep_begin(handle, call);
     if (instance == NULL) {
         return NULL;
     }

@@ -36,9 +36,9 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 
 /* The logger reads its message as printf does: a percent sign in ours stands for itself. */
-static void fmi2_hand(const hsep_component *component, int status, const char *category, const char *text)
+static void fmi2_hand(const hsep_instance *instance, int status, const char *category, const char *text)
 {
-    const fmi2CallbackLogger logger = (fmi2CallbackLogger)component->logger;
+    const fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->logger;
     char escaped[4 * HSEP_MESSAGE_SIZE]; /* a text is half as long */
     size_t n = 0;
     for (const char *c = text; *c != '\0'; c++) {
@@ -48,8 +48,8 @@ static void fmi2_hand(const hsep_component *component, int status, const char *c
         escaped[n++] = *c;
     }
     escaped[n] = '\0';
-    const char *name = component->instance.name;
-    logger(component->environment, (name == NULL) ? HSEP_MODEL_NAME : name, (fmi2Status)status, category, escaped);
+    const char *name = instance->name;
+    logger(instance->environment, (name == NULL) ? HSEP_MODEL_NAME : name, (fmi2Status)status, category, escaped);
 }
 
 fmi2Component fmi2Instantiate(
@@ -57,20 +57,22 @@ fmi2Component fmi2Instantiate(
     const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
 {
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
-    hsep_component filled = {.hand = fmi2_hand, .categories = HSEP_LOG_ERROR};
+    hsep_instance filled = {
+        .names = &fmi2_names,
+        .hand = fmi2_hand,
+        .categories = HSEP_LOG_ERROR,
+        .allocate = own_memory ? HSEP_CALLOC : functions->allocateMemory,
+        .release = own_memory ? HSEP_FREE : functions->freeMemory};
     (void)visible;
-    filled.instance.names = &fmi2_names;
-    filled.instance.allocate = own_memory ? HSEP_CALLOC : functions->allocateMemory;
-    filled.instance.release = own_memory ? HSEP_FREE : functions->freeMemory;
     if (functions != NULL) {
         filled.logger = (void (*)(void))functions->logger;
         filled.environment = functions->componentEnvironment;
     }
     if (fmuType != fmi2CoSimulation) {
-        (void)hsep_refuse(&filled.instance, "fmi2Instantiate: fmuType must be fmi2CoSimulation, got %d", (int)fmuType);
+        (void)hsep_refuse(&filled, "fmi2Instantiate: fmuType must be fmi2CoSimulation, got %d", (int)fmuType);
         return NULL;
     }
-    return hsep_component_new(&filled, instanceName, fmuGUID, fmuResourceLocation, loggingOn);
+    return hsep_call_instantiate(&filled, instanceName, fmuGUID, fmuResourceLocation, loggingOn);
 }
 
 HSEP_COMMON_FUNCTIONS(fmi2, Component, FMUstate, DeSerialize, HSEP_FMI2)

@@ -6,17 +6,11 @@
 #include "hsep_fmi3_calls.h"
 #include "hsep_text.h"
 
-/* Value references before the windows, which are the places of the values. */
-static size_t fmi3_before_windows(const hsep_context *context)
-{
-    return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
-}
-
 static size_t fmi3_n_windows(const hsep_context *context) { return context->window > 0 ? HSEP_N_WINDOWS : 0; }
 
 static size_t fmi3_n_variables(const hsep_context *context)
 {
-    return fmi3_before_windows(context) + fmi3_n_windows(context) + 1;
+    return hsep_table_n_starts(context) + fmi3_n_windows(context) + 1;
 }
 
 /* The time has no place: its value is the experiment's. */
@@ -25,7 +19,7 @@ static const hsep_variable fmi3_time = {
 
 static hsep_found fmi3_find(const hsep_context *context, size_t reference)
 {
-    const size_t before = fmi3_before_windows(context);
+    const size_t before = hsep_table_n_starts(context);
     if (reference < before) {
         const hsep_variable *row = hsep_table_row(context, reference);
         const hsep_kind kind = context->window > 0 && reference == HSEP_VR_LENGTH ? HSEP_COUNT : row->kind;
@@ -41,7 +35,7 @@ static hsep_found fmi3_find(const hsep_context *context, size_t reference)
 
 static const char *fmi3_name(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE])
 {
-    if (reference < fmi3_before_windows(context)) {
+    if (reference < hsep_table_n_starts(context)) {
         return hsep_table_name(context, reference, text);
     }
     hsep_text(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
@@ -71,10 +65,10 @@ static const hsep_fmi_names fmi3_names = {
 
 const char *fmi3GetVersion(void) { return "3.0"; }
 
-static void fmi3_hand(const hsep_component *component, int status, const char *category, const char *text)
+static void fmi3_hand(const hsep_instance *instance, int status, const char *category, const char *text)
 {
-    const fmi3LogMessageCallback logger = (fmi3LogMessageCallback)component->logger;
-    logger(component->environment, (fmi3Status)status, category, text);
+    const fmi3LogMessageCallback logger = (fmi3LogMessageCallback)instance->logger;
+    logger(instance->environment, (fmi3Status)status, category, text);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(
@@ -84,29 +78,31 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
     fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    hsep_component filled = {.hand = fmi3_hand, .categories = HSEP_LOG_ERROR};
+    const hsep_instance filled = {
+        .names = &fmi3_names,
+        .hand = fmi3_hand,
+        .logger = (void (*)(void))logMessage,
+        .environment = instanceEnvironment,
+        .categories = HSEP_LOG_ERROR,
+        .allocate = HSEP_CALLOC,
+        .release = HSEP_FREE};
     /* An early return is allowed, never needed; without intermediate updates there is nothing to ask for in them. */
     (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
-    filled.instance.names = &fmi3_names;
-    filled.instance.allocate = HSEP_CALLOC;
-    filled.instance.release = HSEP_FREE;
-    filled.logger = (void (*)(void))logMessage;
-    filled.environment = instanceEnvironment;
     if (eventModeUsed) {
         (void)hsep_refuse(
-            &filled.instance, "fmi3InstantiateCoSimulation: eventModeUsed must be false, as hasEventMode is in "
-                              "modelDescription.xml");
+            &filled, "fmi3InstantiateCoSimulation: eventModeUsed must be false, as hasEventMode is in "
+                     "modelDescription.xml");
         return NULL;
     }
     if (nRequiredIntermediateVariables > 0) {
         (void)hsep_refuse(
-            &filled.instance,
+            &filled,
             "fmi3InstantiateCoSimulation: nRequiredIntermediateVariables must be 0, as providesIntermediateUpdate is "
             "false in modelDescription.xml, got %lu",
             (unsigned long)nRequiredIntermediateVariables);
         return NULL;
     }
-    return hsep_component_new(&filled, instanceName, instantiationToken, resourcePath, loggingOn);
+    return hsep_call_instantiate(&filled, instanceName, instantiationToken, resourcePath, loggingOn);
 }
 
 HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize, HSEP_FMI3)

@@ -60,10 +60,14 @@ FMI3_ABSENT(fmi3GetVariableDependencies, "providesPerElementDependencies is fals
      size_t others[], fmi3DependencyKind kinds[], size_t n),
     dependent, elements, independents, others, kinds, n)
 
-FMI3_ABSENT(fmi3GetAdjointDerivative, "providesAdjointDerivatives is false",
-    (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
-     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity),
+#define FMI3_ABSENT_DERIVATIVE(name, why) FMI3_ABSENT(name, why, \
+    (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], \
+     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity), \
     unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity)
+FMI3_ABSENT_DERIVATIVE(fmi3GetAdjointDerivative, "providesAdjointDerivatives is false")
+#if HSEP_N_WINDOWS == 0
+FMI3_ABSENT_DERIVATIVE(fmi3GetDirectionalDerivative, "providesDirectionalDerivatives is false")
+#endif
 FMI3_ABSENT(fmi3GetOutputDerivatives, "maxOutputDerivativeOrder is 0",
     (fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t n, const fmi3Int32 orders[],
      fmi3Float64 values[], size_t nValues),

@@ -78,19 +78,16 @@ HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double 
     char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
     const hsep_variable *v = hsep_table_row(context, i);
     const int whole = v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION;
-    if (isfinite(value) && !(whole && value != floor(value)) && check_allows(v, value)) {
+    const char *must = !isfinite(value)                 ? "finite"
+                       : whole && value != floor(value) ? "a whole number"
+                       : !check_allows(v, value)        ? range
+                                                        : NULL;
+    if (must == NULL) {
         return 1;
     }
-    hsep_table_name(context, i, name);
-    hsep_number(number, value, v->kind);
-    if (!isfinite(value)) {
-        hsep_message_add(message, "%s must be finite, got %s", name, number);
-    } else if (whole && value != floor(value)) {
-        hsep_message_add(message, "%s must be a whole number, got %s", name, number);
-    } else {
-        check_range_text(range, sizeof range, v, context->angular ? v->angular_unit : v->unit);
-        hsep_message_add(message, "%s must be %s, got %s", name, range, number);
-    }
+    check_range_text(range, sizeof range, v, context->angular ? v->angular_unit : v->unit);
+    hsep_message_add(
+        message, "%s must be %s, got %s", hsep_table_name(context, i, name), must, hsep_number(number, value, v->kind));
     return 0;
 }
 

@@ -8,15 +8,14 @@
 /* The numbers of the modes are read in place. */
 HSEP_ASSERT(numbers_of_a_mode, sizeof(hsep_mode) == HSEP_MODE_NUMBERS * sizeof(double));
 
-/* Number of variables before the windows: the variables with a start value. */
-static size_t table_before_windows(const hsep_context *context)
+HSEP_API size_t hsep_table_n_starts(const hsep_context *context)
 {
     return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
 }
 
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place)
 {
-    const size_t before = table_before_windows(context);
+    const size_t before = hsep_table_n_starts(context);
     size_t row = place;
     if (place >= before) {
         const size_t modes = context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0;
@@ -29,7 +28,7 @@ HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t
 
 HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE])
 {
-    const size_t before = table_before_windows(context);
+    const size_t before = hsep_table_n_starts(context);
     const char *name = hsep_table_row(context, place)->name;
     if (place >= before) {
         const size_t sample = (place - before) % context->window + 1;
@@ -45,7 +44,7 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
 
 HSEP_API double hsep_table_start(const hsep_context *context, size_t place)
 {
-    return place < table_before_windows(context) ? context->starts[place] : 0.0;
+    return place < hsep_table_n_starts(context) ? context->starts[place] : 0.0;
 }
 
 HSEP_API size_t hsep_table_place(const hsep_context *context, const char *name)

@@ -8,6 +8,9 @@
 
 #define HSEP_NAME_SIZE 64 /* bytes of a name, the final 0 included */
 
+/* Variables before the windows: those with a start value. */
+HSEP_API size_t hsep_table_n_starts(const hsep_context *context);
+
 /* The row of a variable: the numbers of all modes share one each, as the samples of a window do. */
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place);
 

@@ -25,7 +25,6 @@ typedef hsep_feed_drive drive_plant;
 typedef hsep_stage drive_plant;
 #endif
 
-static const double drive_seed_max = 2147483647.0;
 static const double drive_time_tolerance = 0.5; /* of a step: rounding of the importer's times */
 
 typedef struct {
@@ -211,18 +210,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     return HSEP_OK;
 }
 
-/* The first measurement of a drive at rest at x, m; x itself if noise_std or seed is out of range. */
-static double drive_first_measurement(double noise_std, double seed, double x)
-{
-    if (!(noise_std >= 0.0 && isfinite(noise_std) && seed >= 0.0 && seed <= drive_seed_max)) {
-        return x;
-    }
-    hsep_encoder encoder;
-    hsep_encoder_init(&encoder, noise_std, (uint64_t)seed);
-    const double measured = hsep_encoder_measure(&encoder, x);
-    return isfinite(measured) ? measured : x;
-}
-
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
     message[0] = '\0';
@@ -231,11 +218,17 @@ HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const d
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
-    (void)context;
     const double x = values[HSEP_VR_x_d]; /* the drive rests there */
-    values[HSEP_VR_x] = x;
+    const double noise_std = values[HSEP_VR_noise_std], seed = values[HSEP_VR_seed];
+    char message[HSEP_MESSAGE_SIZE] = "";
+    values[HSEP_VR_x] = values[HSEP_VR_x_meas] = x;
     values[HSEP_VR_v] = 0.0;
-    values[HSEP_VR_x_meas] = drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
+    if (hsep_check_parameter(context, HSEP_VR_noise_std, noise_std, message) &&
+        hsep_check_parameter(context, HSEP_VR_seed, seed, message)) {
+        hsep_encoder encoder;
+        hsep_encoder_init(&encoder, noise_std, (uint64_t)seed);
+        values[HSEP_VR_x_meas] = hsep_encoder_measure(&encoder, x);
+    }
 }
 
 #else

@@ -277,9 +277,7 @@ static hsep_status online_load(
     const hsep_context *context, const double values[], const hsep_parameters *parameters, hsep_predictor *predictor,
     char message[])
 {
-    const hsep_began began = context->weights == NULL
-                                 ? HSEP_BEGAN
-                                 : hsep_learned_load(predictor, parameters, context->weights, context->weights_size);
+    const hsep_began began = hsep_learned_load(predictor, parameters, context->weights, context->weights_size);
     if (began == HSEP_BEGAN) {
         return HSEP_OK;
     }

@@ -134,7 +134,7 @@ static int learned_is_whole(const unsigned char *bytes, size_t size)
         return 0;
     }
     memcpy(&sum, bytes + size - sizeof sum, sizeof sum);
-    return sum == hsep_crc(0, bytes, size - sizeof sum);
+    return sum == hsep_crc(bytes, size - sizeof sum);
 }
 
 HSEP_API hsep_began
@@ -142,6 +142,9 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
 {
     hsep_learned_bytes from = {bytes, size};
     hsep_learned_head head;
+    if (bytes == NULL) {
+        return HSEP_BEGAN;
+    }
     if (!learned_is_whole(bytes, size) || !hsep_learned_read(&from, &head, sizeof head) ||
         memcmp(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic) != 0) {
         return HSEP_WEIGHTS_DAMAGED;

@@ -43,7 +43,7 @@ HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size);
 /* Read the next setting; 0 if there is none, or its name does not end. */
 HSEP_API int hsep_learned_next(hsep_learned_bytes *from, hsep_learned_setting *setting);
 
-/* Take all of the bytes of a file. HSEP_BEGAN: taken; otherwise the predictor may have changed. */
+/* Take all of the bytes of a file, or NULL. HSEP_BEGAN: taken; otherwise the predictor may have changed. */
 HSEP_API hsep_began
 hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, const void *bytes, size_t size);
 

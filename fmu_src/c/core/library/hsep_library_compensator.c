@@ -18,9 +18,8 @@ HSEP_API hsep_began hsep_compensator_init(
 {
     const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
     hsep_compensator_block_init(self, &derived, start);
-    const hsep_began began =
-        weights == NULL ? HSEP_BEGAN
-                        : hsep_learned_load(hsep_compensator_predictor(self), parameters, weights, weights_size);
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    const hsep_began began = hsep_learned_load(predictor, parameters, weights, weights_size);
     if (began != HSEP_BEGAN) {
         hsep_compensator_block_init(self, &derived, start);
     }

@@ -17,7 +17,7 @@ HSEP_API hsep_began hsep_predictor_init(
 {
     const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
     hsep_predictor_block_init(self, &derived, start);
-    const hsep_began began = weights == NULL ? HSEP_BEGAN : hsep_learned_load(self, parameters, weights, weights_size);
+    const hsep_began began = hsep_learned_load(self, parameters, weights, weights_size);
     if (began != HSEP_BEGAN) {
         hsep_predictor_block_init(self, &derived, start);
     }
