@@ -99,15 +99,9 @@ class PaperModel:
         p, q = len(self.e_pb), len(self.x_pb)
         for k in range(0, m, Np) if fold else ():
             n = min(Np, m - k)
-            rows = np.column_stack(  # [φ(k) | e_pb(k)], eq. (5)
-                (
-                    np.ones(n),
-                    lags(x_pb[k : k + q + n], q + 1),
-                    lags(e_pb[k : k + p + n - 1], p),
-                    e_pb[k + p : k + p + n],
-                )
-            )
-            regression = regression.update_stacked(rows)
+            of_x, of_e = lags(x_pb[k : k + q + n], q + 1), lags(e_pb[k : k + p + n - 1], p)
+            rows = np.column_stack((np.ones(n), of_x, of_e))  # φ(k), eq. (5)
+            regression = regression.update(rows, e_pb[k + p : k + p + n])
         return replace(self, x_pb=x_pb[m:], e_pb=e_pb[m:], regression=regression), np.ones(m, dtype=np.bool_)
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> Forecast:

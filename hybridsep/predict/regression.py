@@ -16,12 +16,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import ParameterError
 from ..base.settings import check
-from ..base.signals import Array, as_samples
+from ..base.signals import Array
 
 __all__ = ["PenalisedSolution", "RidgeRegression", "lags"]
 
@@ -136,32 +135,9 @@ class RidgeRegression:
         column = self.factor[:, -1]
         return float(column @ column)
 
-    def update(self, rows: ArrayLike, target: ArrayLike) -> RidgeRegression:
-        """Return the regression with a block of rows more.
-
-        Parameters
-        ----------
-        rows : (m, n) array_like
-            Features φ, one row per sample.
-        target : (m,) array_like
-            Regressand, approximated by ``wᵀφ``.
-
-        Raises
-        ------
-        SignalError
-            If the shapes do not fit or a value is not finite.
-        """
-        phi = np.asarray(rows, dtype=np.float64)
-        if phi.ndim != 2 or phi.shape[1] != self.n_features:
-            raise SignalError(f"rows must have shape (m, {self.n_features}), got {phi.shape}")
-        values = as_samples(target, "target", len(phi))
-        if not np.isfinite(phi).all():
-            raise SignalError("rows must be finite")
-        return self.update_stacked(np.column_stack((phi, values)))
-
-    def update_stacked(self, stacked: Array) -> RidgeRegression:
-        """Return the regression with rows ``[Φ | target]`` more, ``(m, n + 1)``, which are known to be finite."""
-        return RidgeRegression(_folded(self.factor, stacked), self.n_rows + len(stacked))
+    def update(self, rows: Array, target: Array) -> RidgeRegression:
+        """Return the regression with a block of rows φ, ``(m, n)``, and their targets, ``(m,)``, more."""
+        return RidgeRegression(_folded(self.factor, np.column_stack((rows, target))), self.n_rows + len(target))
 
     def add(self, other: RidgeRegression) -> RidgeRegression:
         """Return the regression with all rows of another one of the same features, its penalty with them."""

@@ -264,7 +264,7 @@ def test_the_last_row_may_tell_more_than_all_others(
     penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
     last = 10.0**size * np.random.default_rng(seed).normal(size=n + 1) * np.abs(np.append(rows[-1], 1.0))
     solution = CSolution(gram, penalties, later=last[None], completed=completed, apart=apart)
-    library = library.update_stacked(np.array(last[None], order="F"))
+    library = library.update(last[None, :-1], last[-1:])
     for factor in (1.0, 1e-3, 1e3):
         changed = np.where(np.arange(n) < n // 2, factor, 1.0) * penalties
         in_factor = rows if apart else np.vstack((last[:-1], rows))
@@ -285,7 +285,7 @@ def test_a_last_row_without_features_counts_with_its_target(apart: bool) -> None
     gram, library, rows, _ = both(9, 40, 5)
     penalties, last = np.abs(rows).max(axis=0) ** 2, np.append(np.zeros(9), 50.0)
     solution = CSolution(gram, penalties, later=last[None], apart=apart)
-    assert_same(solution, library.update_stacked(np.array(last[None], order="F")), penalties, rows)
+    assert_same(solution, library.update(last[None, :-1], last[-1:]), penalties, rows)
 
 
 def test_no_more_rows_wait_than_there_is_room_for() -> None:

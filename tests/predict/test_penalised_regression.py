@@ -113,7 +113,7 @@ def test_discounted_rows_are_weighted_least_squares(weights: list[float], lam: f
 def test_what_is_never_excited_stays_regular_however_long_it_is_discounted() -> None:
     regression = RidgeRegression.init(3, LAM)
     for _ in range(400):
-        regression = regression.discount(0.01).update([[1.0, 0.0, 0.0]], [2.0])
+        regression = regression.discount(0.01).update(np.array([[1.0, 0.0, 0.0]]), np.array([2.0]))
     assert np.abs(np.diag(regression.factor)[:3]).min() == 1e-150
     np.testing.assert_allclose(regression.penalised(np.full(3, 1e-9)).weights, [2.0, 0.0, 0.0], atol=1e-8)
     assert np.isfinite(regression.factor).all()

@@ -74,10 +74,6 @@ class ResidualScale:
     largest_square: float = 0.0
     largest: float = 0.0
 
-    def grown(self, growth: float) -> ResidualScale:
-        """Return the scale of residuals that are larger by a factor."""
-        return ResidualScale(growth**2 * self.largest_square, growth * self.largest)
-
     def follow(self, residuals: Array) -> ResidualScale:
         """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1."""
         mean_square, largest = float(np.mean(residuals**2)), float(np.abs(residuals).max())
@@ -385,7 +381,7 @@ class Regression(Expert):
     def solve(self, model: Any, scales: FeatureScales) -> SolvedExpert | None:
         """Return the expert with the weights that follow from all rows; None if it knows nothing."""
         like, settings = self.like(model), model.settings
-        kind, variance = like.target, model.noise_of(self)
+        kind, variance = like.target, model.noise[REGRESSIONS.index(self)]
         square = model.learned.scales[kind].largest_square
         outgrown = kind == MODEL_RESIDUAL and scales.velocity != model.learned.velocity_scale
         if square == 0.0 or variance == 0.0 or outgrown or (self.is_fresh and not model.doubts):
@@ -408,11 +404,12 @@ class Regression(Expert):
         """Return the prediction of its residual, once it knows something; parameters as for SolvedExpert.predict."""
         model, kind, most = at.model, self.like(at.model).target, at.bound
         scale, rows = model.learned.scales[kind], at.rows
+        square = scale.largest_square
         if kind == COMMAND_RESIDUAL:
-            scale = scale.grown(at.growth)
-            most = CONSTANTS.bound_of_command * scale.largest
+            square *= at.growth**2
+            most = CONSTANTS.bound_of_command * (at.growth * scale.largest)
             rows = model.command.rows(model.run.commands, at.window.x_d)
-        return at.solved[self].predict(rows, model.run.past[kind], scale.largest_square, most, held, counts)
+        return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return what it adds to the physics model, within bounds."""

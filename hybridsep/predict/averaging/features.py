@@ -188,7 +188,7 @@ class StaticFeatures:
 
     def peak_velocity(self, state: StaticState, x_d: Array) -> float:
         """Return the largest magnitude of the commanded velocity over a window, m/s."""
-        return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
+        return float(np.abs(self.velocity(state, x_d)).max())
 
     def spread(self, velocity_scale: float) -> Array:
         """Return the velocities of the friction's change of sign, ``(N_FRICTION,)``, m/s."""

@@ -219,10 +219,6 @@ class AveragedModel:
         """Expert that led when earlier runs ended: FRESH_START is its counterpart."""
         return ARX_COMMAND if self.leader == ARX_COMMAND.place else ARX_RESIDUAL
 
-    def noise_of(self, expert: Regression) -> float:
-        """Return the variance of the noise that an expert's penalties come from, m²; 0: none yet."""
-        return self.noise[REGRESSIONS.index(expert)]
-
     @property
     def early(self) -> int:
         """Samples of a window after which the variances for the next one are taken."""

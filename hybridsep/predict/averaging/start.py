@@ -48,15 +48,6 @@ class MotionBefore(NamedTuple):
     x_pb: Array
 
 
-def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float, late: int) -> Array:
-    """Return the state, ``late`` samples before command 0, of a motion that has lasted, ``step`` m a sample."""
-    register = step * np.arange(-discrete.dead_time - late, -late)
-    # z̈ + 2ζω ż + ω² z = v t has the solution ω² z = v t − 2ζ v/ω, in the state (ω² z, ω ż).
-    here, v = -(discrete.dead_time + late) * step, step / discrete.T_s
-    states = [(here - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
-    return np.concatenate((np.ravel(states), register))
-
-
 def motion_before(
     model: ModalModel, discrete: DiscreteModel, x_d: Array, residuals: Array, late: int
 ) -> MotionBefore | None:
@@ -83,7 +74,10 @@ def motion_before(
     step = float(x_d[late + 1] - x_d[late])
     commands = np.zeros(len(x_d))
     commands[:late] = step * np.arange(-late, 0)
-    moving = _state_in_motion(model, discrete, step, late)
+    # z̈ + 2ζω ż + ω² z = v t has the solution ω² z = v t − 2ζ v/ω, in the state (ω² z, ω ż).
+    here, v = -(discrete.dead_time + late) * step, step / discrete.T_s
+    states = [(here - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
+    moving = np.concatenate((np.ravel(states), step * np.arange(-discrete.dead_time - late, -late)))
     of_motion, _ = discrete.forced_response(moving, commands)
     modes = np.eye(discrete.n_state, n)
     of_modes, _ = discrete.forced_response(modes, np.zeros((len(x_d), n)))

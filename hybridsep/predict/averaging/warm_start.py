@@ -76,4 +76,4 @@ class WarmStartRows:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
         if not len(target):
             return self
-        return replace(self, this=self.this.update_stacked(np.column_stack((rows, lagged, target))))
+        return replace(self, this=self.this.update(np.column_stack((rows, lagged)), target))
