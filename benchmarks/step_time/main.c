@@ -138,9 +138,9 @@ int main(int n_arguments, char *arguments[])
             context.weights = content_of(arguments[a] + strlen("weights="), &context.weights_size);
         }
     }
+    memcpy(values, hsep_starts, sizeof hsep_starts);
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
         const size_t length = strlen(hsep_table_name(&hsep_table, i, variable));
-        values[i] = hsep_table_start(&hsep_table, i);
         for (int a = 4; a < n_arguments; a++) {
             if (strncmp(arguments[a], variable, length) == 0 && arguments[a][length] == '=') {
                 values[i] = strtod(arguments[a] + length + 1, NULL);
@@ -216,7 +216,7 @@ int main(int n_arguments, char *arguments[])
     print_summary("empty", empty, steps);
     printf("}\n");
     if (strcmp(arguments[3], "-") != 0) {
-        file = fopen(arguments[3], "wb");
+        FILE *file = fopen(arguments[3], "wb");
         if (file == NULL || fwrite(times, sizeof *times, 2 * steps, file) != 2 * steps || fclose(file) != 0) {
             fail("the times cannot be written");
         }

@@ -45,8 +45,8 @@ int main(int n_arguments, char *arguments[])
     char variable[HSEP_NAME_SIZE];
     hsep_context context = hsep_table;
     context.resources = n_arguments > 1 && arguments[1][0] != '-' ? arguments[1] : NULL;
+    memcpy(values, hsep_starts, sizeof hsep_starts);
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        values[i] = hsep_table_start(&hsep_table, i);
         for (int a = 2; a < n_arguments; a++) {
             const size_t length = strlen(hsep_table_name(&hsep_table, i, variable));
             if (strncmp(arguments[a], variable, length) == 0 && arguments[a][length] == '=') {

@@ -1,7 +1,6 @@
 #include "hsep_calls.h"
 
 #include "hsep_check.h"
-#include "hsep_opening.h"
 #include "hsep_text.h"
 
 #include <math.h>

@@ -140,12 +140,7 @@ hsep_call_deserialise(void *handle, const hsep_call *call, const void *bytes, si
 /* The functions of a version, v (fmi2), that others have by other names: of a handle's type, v##Handle, of a state's,
  * v##State, whose reading is spelt De (DeSerialize). CALL: what the version's table has of a call. */
 #define HSEP_COMMON_FUNCTIONS(v, Handle, State, De, CALL) \
-    void v##FreeInstance(v##Handle c) \
-    { \
-        if (c != NULL) { \
-            hsep_instance_free(c); \
-        } \
-    } \
+    void v##FreeInstance(v##Handle c) { hsep_instance_free(c); } \
     v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]) \
     { \
         return v##_status(hsep_call_logging(c, CALL(v##SetDebugLogging), on, n, categories)); \

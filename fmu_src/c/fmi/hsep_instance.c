@@ -60,9 +60,7 @@ HSEP_API void hsep_instance_reset(hsep_instance *instance)
         (void)hsep_instance_resize(instance, "", (size_t)context->starts[HSEP_VR_LENGTH], NULL);
     }
     memset(instance->values, 0, hsep_instance_n_values(instance) * sizeof(double));
-    for (size_t i = 0; i < context->n_variables; i++) {
-        instance->values[i] = hsep_table_start(context, i);
-    }
+    memcpy(instance->values, context->starts, hsep_table_n_starts(context) * sizeof(double));
     hsep_model_start_values(context, instance->values);
     instance->experiment = (hsep_experiment){.phase = HSEP_INSTANTIATED};
 }
@@ -90,6 +88,9 @@ HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const cha
 
 HSEP_API void hsep_instance_free(hsep_instance *instance)
 {
+    if (instance == NULL) {
+        return;
+    }
     hsep_instance_drop_state(instance);
     hsep_delete(instance, instance->values);
     hsep_delete(instance, instance->table);

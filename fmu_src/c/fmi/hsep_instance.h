@@ -116,6 +116,12 @@ HSEP_API void *hsep_new(const hsep_instance *instance, size_t size);
 /* Give a block back; NULL is fine. */
 HSEP_API void hsep_delete(const hsep_instance *instance, void *block);
 
+/* Keep name and resources, a URI, a path or NULL, and take the table of the FMU's variables and what was learned: from
+ * the header, or from variables.bin and weights.bin of the resources, which are the resources beside the library where
+ * the location leads to none. Fails if there is no memory, or no table, or it is not one of this binary, damaged or out
+ * of a range; HSEP_WARNED: the location is not used. */
+HSEP_API hsep_status hsep_open(hsep_instance *instance, const char *name, const char *resources, char message[]);
+
 /* Forget the model's state. */
 HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
 
@@ -132,7 +138,7 @@ HSEP_API void hsep_instance_reset(hsep_instance *instance);
  * again. */
 HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[]);
 
-/* Give all memory back, the instance's too. */
+/* Give all memory back, the instance's too; NULL is fine. */
 HSEP_API void hsep_instance_free(hsep_instance *instance);
 
 #endif

@@ -1,4 +1,5 @@
-#include "hsep_opening.h"
+/* Opening of an instance: its name, its resources, the table of its variables and what was learned. */
+#include "hsep_instance.h"
 
 #include "hsep_check.h"
 #include "hsep_crc.h"

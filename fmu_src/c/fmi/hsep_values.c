@@ -74,13 +74,11 @@ static hsep_status values_check_set(const hsep_instance *instance, const hsep_ac
 static void values_show(hsep_instance *instance, const hsep_access *access)
 {
 #if HSEP_N_WINDOWS > 0
-    size_t i = 0;
-    while (i < access->n_references &&
-           instance->names->find(&instance->context, access->references[i]).row->causality != HSEP_LOCAL) {
-        i++;
-    }
-    if (i < access->n_references) {
-        hsep_model_show_windows(&instance->context, instance->state, instance->values);
+    for (size_t i = 0; i < access->n_references; i++) {
+        if (instance->names->find(&instance->context, access->references[i]).row->causality == HSEP_LOCAL) {
+            hsep_model_show_windows(&instance->context, instance->state, instance->values);
+            return;
+        }
     }
 #else
     (void)instance, (void)access;

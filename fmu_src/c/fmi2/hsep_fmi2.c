@@ -1,4 +1,5 @@
 /* FMI 2.0 for co-simulation. A value reference is the place of one value; every number comes from the model. */
+#include "hsep_check.h"
 #include "hsep_fmi2_calls.h"
 
 #include <math.h>
@@ -127,35 +128,32 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return hsep_call_access(c, HSEP_FMI2(fmi2SetString), vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
 }
 
-/* Why one of the derivatives cannot be taken; HSEP_OK if all can. */
+/* Check that inputs may have these derivatives. */
 static hsep_status fmi2_check_derivatives(
-    hsep_instance *instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
-    const fmi2Real value[])
+    const hsep_instance *instance, const hsep_access *access, const fmi2Integer order[], const fmi2Real value[],
+    char message[])
 {
-    static const char name[] = "fmi2SetRealInputDerivatives";
     char input[HSEP_NAME_SIZE];
     if (HSEP_N_INTERPOLATED == 0) {
-        return hsep_refuse(
-            instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", name);
+        return hsep_message_add(
+            message, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", access->call);
     }
-    if (nvr > 0 && order == NULL) {
-        return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", name, (unsigned long)nvr);
+    if (access->n_references > 0 && order == NULL) {
+        return hsep_message_add(
+            message, "%s: order is NULL, but nvr is %lu", access->call, (unsigned long)access->n_references);
     }
-    for (size_t i = 0; i < nvr; i++) {
-        if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
-            return hsep_refuse(
-                instance, "%s: %s takes no derivative, only inputs do", name,
-                hsep_table_name(&instance->context, vr[i], input));
+    for (size_t i = 0; i < access->n_references; i++) {
+        const char *name = hsep_table_name(&instance->context, access->references[i], input);
+        if (access->references[i] + 1 > HSEP_N_INTERPOLATED) {
+            return hsep_message_add(message, "%s: %s takes no derivative, only inputs do", access->call, name);
         }
         if (order[i] != 1) {
-            return hsep_refuse(
-                instance, "%s: the order of %s must be 1, got %d", name,
-                hsep_table_name(&instance->context, vr[i], input), (int)order[i]);
+            return hsep_message_add(
+                message, "%s: the order of %s must be 1, got %d", access->call, name, (int)order[i]);
         }
         if (!isfinite(value[i])) {
-            return hsep_refuse(
-                instance, "%s: the derivative of %s must be finite, got %g", name,
-                hsep_table_name(&instance->context, vr[i], input), value[i]);
+            return hsep_message_add(
+                message, "%s: the derivative of %s must be finite, got %g", access->call, name, value[i]);
         }
     }
     return HSEP_OK;
@@ -172,12 +170,9 @@ fmi2Status fmi2SetRealInputDerivatives(
     if (instance == NULL) {
         return fmi2Error;
     }
-    if (hsep_values_check(instance, &access, message) != HSEP_OK) {
-        (void)hsep_refuse(instance, "%s", message);
-        return fmi2Error;
-    }
-    if (fmi2_check_derivatives(instance, vr, nvr, order, value) != HSEP_OK) {
-        return fmi2Error;
+    if (hsep_values_check(instance, &access, message) != HSEP_OK ||
+        fmi2_check_derivatives(instance, &access, order, value, message) != HSEP_OK) {
+        return fmi2_status(hsep_refuse(instance, "%s", message));
     }
     for (size_t i = 0; i < nvr; i++) {
         instance->values[instance->context.n_variables + vr[i]] = value[i];

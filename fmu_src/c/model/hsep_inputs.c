@@ -4,15 +4,6 @@
 
 #include <math.h>
 
-HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
-{
-    if (hsep_check_clock(&self->clock, t_start, T_s, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
-    self->x_d_ahead = self->x_meas = start;
-    return HSEP_OK;
-}
-
 /* The input at an instant, s after the step's start. */
 static double inputs_at(hsep_input input, double after)
 {

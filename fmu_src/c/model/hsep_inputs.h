@@ -12,6 +12,7 @@
 #include "hsep_layout.h"
 #include "hsep_model.h"
 
+/* The clock is begun by hsep_check_clock, the inputs where the drive rests. */
 typedef struct {
     hsep_clock clock;
     double x_d_ahead, x_meas; /* m, of the sample in progress */
@@ -32,10 +33,6 @@ typedef struct {
     int64_t n_latched, n_executed; /* of the instants that the step has */
     int pending;                   /* whether the inputs of the next sample are latched */
 } hsep_inputs_step;
-
-/* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, the time is too large to
- * count samples from, or the start is further out than any machine is. */
-HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
 
 /* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
  * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant

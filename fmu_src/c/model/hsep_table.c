@@ -42,11 +42,6 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
     return text;
 }
 
-HSEP_API double hsep_table_start(const hsep_context *context, size_t place)
-{
-    return place < hsep_table_n_starts(context) ? context->starts[place] : 0.0;
-}
-
 HSEP_API size_t hsep_table_place(const hsep_context *context, const char *name)
 {
     char text[HSEP_NAME_SIZE];

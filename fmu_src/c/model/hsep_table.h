@@ -17,9 +17,6 @@ HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t
 /* The name of a variable, mode[1].f_n and x_h_window[1] too; return text. */
 HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE]);
 
-/* The start value of a variable. */
-HSEP_API double hsep_table_start(const hsep_context *context, size_t place);
-
 /* Place of the variable of a name; n_variables if there is none. */
 HSEP_API size_t hsep_table_place(const hsep_context *context, const char *name);
 

@@ -319,9 +319,10 @@ HSEP_API hsep_status hsep_model_initialise(
         online_size(&derived, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
-        hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
+        hsep_check_clock(&self->inputs.clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
+    self->inputs.x_d_ahead = self->inputs.x_meas = start;
     ONLINE(block_init)(&self->online, &derived, start);
     hsep_predictor *predictor = online_predictor(&self->online);
     if (online_load(context, values, &parameters, predictor, message) != HSEP_OK) {
