@@ -119,7 +119,7 @@ VARIANTS: Mapping[str, Changes] = {
         FORECAST: [("x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];", "x[j] = x_pb[j];")]
     },
     "A: 20 lags": constants(lags_of_command=20),
-    "runs begin at rest": {START: [("return known >= HSEP_START_SAMPLES", "return known < 0 * HSEP_START_SAMPLES")]},
+    "runs begin at rest": {START: [("known < HSEP_START_SAMPLES", "known >= 0 * HSEP_START_SAMPLES")]},
     "L from the first": first_weights(1.0, 0.0),
     "S from the first": first_weights(0.0, 1.0),
     "kappa 0.3": constants(kappa=0.3),

@@ -239,10 +239,10 @@ static void linearised_slopes(
     hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = (hsep_int *)hsep_at(self, self->at_stop);
     for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
         stops[i] = disturbances->before.stops[i];
-        distances[i] = hsep_disturbances_distance(scale, i);
+        distances[i] = hsep_disturbances_spread(scale, HSEP_FEATURES_N_FRICTION + i);
     }
     for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
-        spread[i] = hsep_disturbances_sign_velocity(scale, i);
+        spread[i] = hsep_disturbances_spread(scale, i);
     }
     for (hsep_int j = self->n; j-- > 0; slopes += self->count) {
         const hsep_real step = x_d[j] - last, v_d = step / disturbances->T_s;

@@ -121,8 +121,9 @@ static void averaged_judge_experts(
     }
 }
 
-/* Prepare the solutions for the next window with what is known of this one, whose residuals are e, so far. */
-static void averaged_prepare_next(hsep_averaged *self, const hsep_real e[])
+/* What is known of this window, whose residuals are e, so far: with early samples the next solutions are prepared, and
+ * before the last one the size of the command's residual is taken. */
+static void averaged_judge_early(hsep_averaged *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_REGRESSIONS];
@@ -131,19 +132,12 @@ static void averaged_prepare_next(hsep_averaged *self, const hsep_real e[])
     if (self->n_accepted > 0.0) {
         averaged_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
     }
-    hsep_averaged_prepare_solutions(self, scales, errors);
-}
-
-/* Take the size of the command's residual before the last sample. */
-static void averaged_size(hsep_averaged *self)
-{
-    hsep_residual_scale scale = self->learned.scales[HSEP_COMMAND_RESIDUAL];
-    const hsep_int first = self->Np - self->known; /* those behind are not bridged yet */
-    if (self->n_accepted > 0.0) {
-        const hsep_real *accepted = hsep_at(self, self->accepted) + first, *e_0 = hsep_at(self, self->e_0) + first;
-        hsep_residual_scale_follow(&scale, e_0, accepted, self->known, self->n_accepted);
+    if (self->followed == self->early) {
+        hsep_averaged_prepare_solutions(self, scales, errors);
     }
-    self->early_square = scale.largest_square;
+    if (self->followed + 1 == self->Np) {
+        self->early_square = scales[HSEP_COMMAND_RESIDUAL].largest_square;
+    }
 }
 
 /* Multiply-adds as which the beginning of a solution counts. */
@@ -172,17 +166,8 @@ static hsep_real averaged_left(hsep_averaged *self, hsep_int to_come)
 /* Go on with them after sample last - 1, in equal shares: before the last row comes all others are in their heads. */
 static void averaged_advance(hsep_averaged *self, hsep_int last)
 {
-    const hsep_int left = self->Np - last, to_come = left - 1;
-    const hsep_int waiting = hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL))->waiting;
-    const hsep_int adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
-    hsep_real of_rows = 0.0; /* where four are added to the Gram matrices */
-    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
-        of_rows +=
-            HSEP_AVERAGED_OF_GRAM * hsep_triangle(hsep_warm_start_of_run(hsep_averaged_evidence(self, i))->n + 1);
-    }
-    const hsep_real added = waiting == 1 ? of_rows : 0.0; /* in this sample */
-    const hsep_real all = added + of_rows * (hsep_real)adds + averaged_left(self, to_come);
-    hsep_real amount = all / (hsep_real)left - added;
+    const hsep_int left = self->Np - last;
+    hsep_real amount = averaged_left(self, left - 1) / (hsep_real)left;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL && (amount > 0.0 || left == 1)) {
@@ -226,11 +211,8 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
     if (accepted) {
         averaged_believe(self, k, x_pb, e, measured, fold);
     }
-    if (fold && self->followed == self->early) {
-        averaged_prepare_next(self, e);
-    }
-    if (fold && self->followed + 1 == self->Np) {
-        averaged_size(self);
+    if (fold && (self->followed == self->early || self->followed + 1 == self->Np)) {
+        averaged_judge_early(self, e);
     }
 }
 

@@ -2,11 +2,10 @@
  * which says what they are.
  *
  * A window is predicted by hsep_averaged_forecast, and learned by hsep_averaged_learn once it is measured. A
- * compensator,
- * which decides the commands of a window, begins with the rest of its last plan, and calls hsep_averaged_predict for
- * other commands that it tries over its preview; the last ones count. Signals are kept newest first: of n samples,
- * sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative to the start. A
- * block as hsep_layout.h has them; a window predicted and not measured yet is part of it.
+ * compensator, which decides the commands of a window, begins with the rest of its last plan, and calls
+ * hsep_averaged_predict for other commands that it tries over its preview; the last ones count. Signals are kept newest
+ * first: of n samples, sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative
+ * to the start. A block as hsep_layout.h has them; a window predicted and not measured yet is part of it.
  */
 #ifndef HSEP_AVERAGED_MODEL_H
 #define HSEP_AVERAGED_MODEL_H
@@ -22,9 +21,7 @@
  * was predicted. */
 #define HSEP_AVERAGED_PACE 2
 
-/* Multiply-adds as which an entry of a Gram matrix counts where four rows are added to it, and where a solution begins
- * with it. */
-#define HSEP_AVERAGED_OF_GRAM 5.0
+/* Multiply-adds as which an entry of a Gram matrix counts where a solution begins with it. */
 #define HSEP_AVERAGED_OF_BEGINNING 4.0
 
 /* Features without lags of an expert, at most. */

@@ -67,7 +67,7 @@ HSEP_API void hsep_disturbances_begin_in_motion(
     hsep_disturbed *before = &self->before;
     const hsep_real step = x_d[n - 2] - x_d[n - 1];
     for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
-        const hsep_real distance = hsep_disturbances_distance(velocity_scale, i);
+        const hsep_real distance = hsep_disturbances_spread(velocity_scale, HSEP_FEATURES_N_FRICTION + i);
         before->stops[i] = step > 0.0 ? distance : step < 0.0 ? -distance : 0.0;
     }
     before->x_d = 2.0 * x_d[n - 1] - x_d[n - 2];
@@ -133,41 +133,32 @@ static void disturbances_differences(const hsep_disturbances *self, const hsep_r
     }
 }
 
-/* Member i of a spread from least on, relative to the velocity scale. */
-static hsep_real disturbances_spread(hsep_real velocity_scale, hsep_real least, hsep_real ratio, hsep_int i)
+HSEP_API hsep_real hsep_disturbances_spread(hsep_real velocity_scale, hsep_int i)
 {
-    for (; i > 0; i--) {
-        least *= ratio;
+    const int is_stop = i >= HSEP_FEATURES_N_FRICTION;
+    const hsep_real ratio = is_stop ? HSEP_AVERAGING_STOP_RATIO : HSEP_AVERAGING_FRICTION_RATIO;
+    hsep_real found = is_stop ? HSEP_AVERAGING_STOP_LEAST : HSEP_AVERAGING_FRICTION_LEAST;
+    for (hsep_int first = is_stop ? HSEP_FEATURES_N_FRICTION : 0; i > first; i--) {
+        found *= ratio;
     }
-    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * least;
-}
-
-HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i)
-{
-    return disturbances_spread(velocity_scale, HSEP_AVERAGING_FRICTION_LEAST, HSEP_AVERAGING_FRICTION_RATIO, i);
-}
-
-HSEP_API hsep_real hsep_disturbances_distance(hsep_real velocity_scale, hsep_int i)
-{
-    return disturbances_spread(velocity_scale, HSEP_AVERAGING_STOP_LEAST, HSEP_AVERAGING_STOP_RATIO, i);
+    return (velocity_scale > 0.0 ? velocity_scale : 1.0) * found;
 }
 
 /* Friction or stop operator i of n samples, side by side with others. */
 static void disturbances_one(
     hsep_disturbances *self, hsep_int i, const hsep_real steps[], hsep_int n, hsep_real velocity_scale, hsep_real u[])
 {
+    const hsep_real spread = hsep_disturbances_spread(velocity_scale, i);
     if (i < HSEP_FEATURES_N_FRICTION) {
-        const hsep_real velocity = hsep_disturbances_sign_velocity(velocity_scale, i);
         for (hsep_int k = 0; k < n; k++) {
-            u[HSEP_PHYSICS_ABREAST * k] = hsep_tanh(steps[k] / self->T_s / velocity);
+            u[HSEP_PHYSICS_ABREAST * k] = hsep_tanh(steps[k] / self->T_s / spread);
         }
         return;
     }
-    const hsep_real distance = hsep_disturbances_distance(velocity_scale, i - HSEP_FEATURES_N_FRICTION);
     hsep_real *stop = &self->after.stops[i - HSEP_FEATURES_N_FRICTION];
     for (hsep_int k = 0; k < n; k++) {
-        *stop = hsep_clip(*stop + steps[k], distance);
-        u[HSEP_PHYSICS_ABREAST * k] = *stop / distance;
+        *stop = hsep_clip(*stop + steps[k], spread);
+        u[HSEP_PHYSICS_ABREAST * k] = *stop / spread;
     }
 }
 

@@ -82,11 +82,9 @@ HSEP_API void hsep_disturbances_motion(
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
-/* Velocity of the change of sign of friction i, m/s; distance of stop operator i, m;
- * velocity of the damping at place j of n samples, m/s; angle within
- * the period at a position, rad, 0 without a period. */
-HSEP_API hsep_real hsep_disturbances_sign_velocity(hsep_real velocity_scale, hsep_int i);
-HSEP_API hsep_real hsep_disturbances_distance(hsep_real velocity_scale, hsep_int i);
+/* Velocity of the change of sign of friction i, m/s, or distance of a stop operator, m, which are behind friction;
+ * velocity of the damping at place j of n samples, m/s; angle within the period at a position, rad, 0 without one. */
+HSEP_API hsep_real hsep_disturbances_spread(hsep_real velocity_scale, hsep_int i);
 HSEP_API hsep_real hsep_disturbances_damped_velocity(
     const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j);
 HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);

@@ -1,7 +1,6 @@
 /* Stack of experts: the convex sum of their predictions that would have erred least so far; as
- * predict/averaging/stacking.py,
- * which has the formula. The remainder of the weights is the prediction 0, the physics model's. Plain data; reentrant.
- */
+ * predict/averaging/stacking.py, which has the formula. The remainder of the weights is the prediction 0, the physics
+ * model's. Plain data; reentrant. */
 #ifndef HSEP_STACKING_H
 #define HSEP_STACKING_H
 

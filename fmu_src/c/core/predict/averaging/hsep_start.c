@@ -86,16 +86,6 @@ HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[])
     return hsep_fabs(start_step(self, x_d)) > 0.0;
 }
 
-/* Whether enough residuals are measured. */
-static int start_knows(const hsep_start *self, const hsep_real e[])
-{
-    hsep_int known = 0;
-    for (hsep_int k = self->n - self->Np; k < self->Np; k++) {
-        known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
-    }
-    return known >= HSEP_START_SAMPLES * self->n_states;
-}
-
 /* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
 static void start_fold(hsep_start *self, const hsep_real e[])
 {
@@ -122,7 +112,11 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const 
     const hsep_real step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
     hsep_real *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
     hsep_real seen = 0.0, left = 0.0;
-    if (!hsep_start_moves(self, x_d) || !start_knows(self, e)) {
+    hsep_int known = 0;
+    for (hsep_int k = self->n - self->Np; k < self->Np; k++) {
+        known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
+    }
+    if (!hsep_start_moves(self, x_d) || known < HSEP_START_SAMPLES * self->n_states) {
         return 0;
     }
     for (hsep_int i = 0; i < self->n_states; i++) {
