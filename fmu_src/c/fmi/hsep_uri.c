@@ -4,8 +4,6 @@
 #include <stddef.h>
 #include <string.h>
 
-static int hsep_is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-
 /* Whether text begins with prefix, which is written in lower case. */
 static int hsep_begins(const char *text, const char *prefix)
 {
@@ -59,7 +57,7 @@ HSEP_API int hsep_uri_folder(const char *uri, int windows, char *folder)
             }
             uri = here ? host + length : uri;
         }
-        if (windows && uri[0] == '/' && hsep_is_letter(uri[1]) && (uri[2] == ':' || uri[2] == '|')) {
+        if (windows && uri[0] == '/' && uri[1] != '\0' && (uri[2] == ':' || uri[2] == '|')) {
             *end++ = uri[1];
             *end++ = ':';
             uri += 3;

@@ -174,13 +174,14 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-/* Check the command x_d, m, and the step from t by h, s; a step is at most 100 s and hsep_plant_step_max long, which
- * bounds its cost. */
-static hsep_status drive_check_step(
-    const hsep_context *context, const drive_state *self, double x_d, double t, double h, char message[])
+/* A step is at most 100 s and hsep_plant_step_max long, which bounds its cost. */
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
-    const double rate = DRIVE(rate)(&self->plant);
+    drive_state *self = state;
+    const double x_d = values[HSEP_VR_x_d], rate = DRIVE(rate)(&self->plant);
+    message[0] = '\0';
     if (hsep_check_position(context, "x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
         hsep_check_step_size(h, message) != HSEP_OK ||
         hsep_check_point(self->end, t, drive_time_tolerance * h, message) != HSEP_OK) {
@@ -191,18 +192,7 @@ static hsep_status drive_check_step(
             message, "the step size must be at most %g s for a drive as fast as %g 1/s, got %s; make several steps",
             hsep_plant_step_max(rate), rate, hsep_number(number, h, HSEP_REAL));
     }
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status
-hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
-{
-    (void)context;
-    drive_state *self = state;
-    const double x_d = values[HSEP_VR_x_d];
-    message[0] = '\0';
-    if (drive_check_step(context, self, x_d, t, h, message) != HSEP_OK ||
-        drive_step(&self->plant, x_d, h, message) != HSEP_OK) {
+    if (drive_step(&self->plant, x_d, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     self->end = t + h;

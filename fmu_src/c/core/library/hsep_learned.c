@@ -46,23 +46,11 @@ static int learned_take_factor(hsep_learned_bytes *from, hsep_residual_model *mo
     return taken;
 }
 
-/* Bytes of a file with this head. */
-static double learned_size(const hsep_learned_head *head, hsep_residual_model *model)
-{
-    double words = 4 * (double)head->n_settings + (double)head->n_learned + 1;
-    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
-        const double n = (double)hsep_residual_n_features(model, i);
-        words += 1 + (n + 1) * (n + 2) / 2;
-    }
-    return (double)sizeof *head + words * (double)sizeof(double);
-}
-
-/* Take what follows the settings, of a file of so many bytes: 0 if it is not what these settings learn. */
-static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head, size_t size, hsep_predictor *predictor)
+/* Take what follows the settings, up to the checksum: 0 if it is not what these settings learn. */
+static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head, hsep_predictor *predictor)
 {
     hsep_residual_model *model = hsep_predictor_model(predictor);
     if (head->n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) ||
-        (double)size != learned_size(head, model) ||
         !learned_numbers(from, hsep_residual_learned(model), hsep_residual_n_learned(model)) ||
         !learned_numbers(from, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY)) {
         return 0;
@@ -73,7 +61,7 @@ static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head,
         }
     }
     hsep_residual_restart(model);
-    return 1;
+    return from->left == sizeof(uint64_t);
 }
 
 /* The number of a mode by the name that the file has it under, mode[1].f_n; NULL if there is none. */
@@ -161,5 +149,5 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
             return HSEP_WEIGHTS_OTHER;
         }
     }
-    return learned_take(&from, &head, size, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
+    return learned_take(&from, &head, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
 }
