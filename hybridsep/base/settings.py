@@ -287,10 +287,11 @@ class Limits(Settings):
 class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 
-    ``preview`` is ``2·Np`` or 200, whichever is more, if left out, and ``spacing`` 2, or 1 where that does not divide
-    ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; ``no_reversal`` has no effect
-    without them, and plans of a model with ``averaging`` follow the friction and may turn. ``change_max``, None for no
-    bound, is about twice the servo error without compensation: hybrid plans that ask for far more pause
+    ``preview`` is ``2·Np`` or 200, whichever is more, if left out, and ``spacing`` 2 for each 100 samples of ``Np``, as
+    a plan costs the cube of its splines, or the next smaller divisor of ``Np``. The differences of ``x_dm`` keep the
+    drive's ``limits``, if there are any; ``no_reversal`` has no effect without them, and plans of a model with
+    ``averaging`` follow the friction and may turn. ``change_max``, None for no bound, is about twice the servo error
+    without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
     (:class:`~hybridsep.online.monitor.Monitor`).
     """
@@ -345,10 +346,12 @@ class CompensatorSettings(Settings):
         """
         usual = self.parameters()
         spacing, preview = self.spacing, self.preview
-        if spacing is None:
-            spacing = 1 if Np % usual["spacing"].default else int(usual["spacing"].default)
         if preview is None:
             preview = min(max(2 * Np, int(usual["preview"].default)), int(usual["preview"].maximum))
+        if spacing is None:
+            short = int(usual["spacing"].default)
+            most = max(short, min(Np // 100 * short, (preview - Np - PLAN_END) // 4))
+            spacing = max(one for one in range(1, most + 1) if Np % one == 0)
         problems = []
         if Np % spacing:
             problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")

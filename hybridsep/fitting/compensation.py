@@ -174,6 +174,8 @@ class Tracking:
         With the hybrid, over the first samples of each log; None where no limit binds it.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
+    n_samples : int
+        Test samples, the first ones.
     """
 
     none: ErrorSize
@@ -183,14 +185,16 @@ class Tracking:
     costs: LimitCosts | None
     change_max: float | None
     following_error_max: float
+    n_samples: int
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         lines = [
-            f"Tracking error (commanded minus measured, RMS): {_words(self.none, shown)} as recorded; with the "
-            f"compensator about {_words(self.hybrid, shown)} by the hybrid, with which the FMU starts, and about "
-            f"{_words(self.physics, shown)} by the physics model (compensate = physics).",
+            f"Tracking error (commanded minus measured, RMS) over the first {self.n_samples} test samples: "
+            f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
+            f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
+            "(compensate = physics).",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
         return [
@@ -234,7 +238,8 @@ def expected_tracking(
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
-    return Tracking(none, physics, hybrid, bound, costs, allowed.change_max, allowed.following_error_max)
+    limits = allowed.change_max, allowed.following_error_max
+    return Tracking(none, physics, hybrid, bound, costs, *limits, n_samples=len(without))
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
@@ -265,4 +270,4 @@ def binding_words(shares: Mapping[str, float]) -> str:
     each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items())
     if not each:
         return "No limit binds the compensated command."
-    return f"Limits bind the compensated command: {each} of the samples; within larger ones less error would be left."
+    return f"Limits bind the compensated command: {each} of the samples."

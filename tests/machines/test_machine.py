@@ -197,7 +197,7 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
         alone.fmi_compensator_parameters()
 
 
-@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2)])
+@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (800, 1600, 16), (1900, 2000, 20)])
 def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int, preview: int, spacing: int) -> None:
     text = COMPENSATED.replace("[compensator]\n", "").replace("Np = 50", f"Np = {Np}")
     compensator = load_machine(write(tmp_path, text)).new_compensator()
