@@ -7,7 +7,7 @@ recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -395,19 +395,14 @@ class HybridPredictor:
             if meta["planned"]:
                 predictor.plan_ahead()
             predictor.state = restored(predictor.state, arrays)
-            if meta["pending_start"] is not None:
-                predictor.pending = predictor._pending(meta["pending_start"], arrays)
+            if (start := meta["pending_start"]) is not None:
+                scales = None
+                if "pending_scales" in arrays:
+                    velocity, *others = arrays["pending_scales"].tolist()
+                    scales = FeatureScales(velocity, arrays["pending_largest"], *others)
+                window = ResidualWindow(arrays["pending_x_d"], arrays["pending_x_pb"], start, arrays["pending_path"])
+                predictor.pending = predictor._with_error(predictor.residual.forecast(window, scales))
         return predictor
-
-    def _pending(self, start: float, arrays: Mapping[str, Array]) -> PredictedWindow:
-        """Return the predicted window of a saved state."""
-        scales = None
-        if "pending_scales" in arrays:
-            velocity, *others = arrays["pending_scales"].tolist()
-            scales = FeatureScales(velocity, arrays["pending_largest"], *others)
-        window = ResidualWindow(arrays["pending_x_d"], arrays["pending_x_pb"], start, arrays["pending_path"])
-        with np.errstate(all="ignore"):
-            return self._with_error(self.residual.forecast(window, scales))
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""

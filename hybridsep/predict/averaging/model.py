@@ -219,12 +219,6 @@ class AveragedModel:
         """Expert that led when earlier runs ended: FRESH_START is its counterpart."""
         return ARX_COMMAND if self.leader == ARX_COMMAND.place else ARX_RESIDUAL
 
-    @property
-    def early(self) -> int:
-        """Samples of a window after which the variances for the next one are taken."""
-        Np = self.settings.Np
-        return Np - min(Np // 2, _AHEAD)
-
     def with_noise(self, learned: Learned) -> AveragedModel:
         """Return the model with the variances of the noise that follow from what is learned so far."""
         settings = self.settings
@@ -469,7 +463,8 @@ def _folded(
     Variances of the noise for the next window are taken before the last rows, the size of the command's residual
     before the last one.
     """
-    settings, n, early = state.settings, len(e[MODEL_RESIDUAL]), state.early
+    settings, n = state.settings, len(e[MODEL_RESIDUAL])
+    early = settings.Np - min(settings.Np // 2, _AHEAD)
     accepted = ~bridged[-n:]
     forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 

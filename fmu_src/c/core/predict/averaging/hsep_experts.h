@@ -50,7 +50,6 @@ typedef struct {
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
-HSEP_ASSERT_WORDS(hsep_expert_shape, 5);
 HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
 HSEP_ASSERT_WORDS(hsep_expert, 17);
 
