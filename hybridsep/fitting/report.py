@@ -301,7 +301,9 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
     remarks = [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks]
     report.bullets(remarks)
     if not any(findings.values()):
-        report.paragraph("Nothing: time axis, samples, signs, scales and motion are plausible.")
+        report.paragraph(
+            f"Nothing{' else' if remarks else ''}: time axis, samples, signs, scales and motion are plausible."
+        )
     for name, found in findings.items():
         rows = [[one.name, one.plain.partition(": ")[2]] for one in found]
         if rows:

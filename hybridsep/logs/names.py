@@ -27,11 +27,12 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
         "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos", "des_pos",
-        "q_d",
+        "q_d", "sollposition", "lagesollwert",
     ),
     "x": (
         "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
         "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
+        "istposition", "lageistwert",
     ),
 }  # fmt: skip
 """Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""

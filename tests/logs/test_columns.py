@@ -79,6 +79,12 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
     assert read_log(path).T_s == 1.0
 
 
+def test_a_german_log(tmp_path: Path) -> None:
+    text = "Zeit [ms];Sollposition [mm];Istposition [mm]\n0;1,5;1\n2;2;1,5\n"
+    log = read_log(write_csv(tmp_path / "log.csv", text))
+    np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
+
+
 @pytest.mark.parametrize("unit", ["cm", "0um"])
 def test_units_that_are_none(tmp_path: Path, unit: str) -> None:
     path = write(tmp_path / "log.npz", columns())
