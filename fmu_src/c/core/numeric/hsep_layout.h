@@ -5,7 +5,8 @@
  * one size alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  *
  * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, and hsep_NAME_init fills
- * it with nothing learned. All functions of a block are reentrant and allocate nothing.
+ * it with nothing learned; hsep_NAME_lay_out does both for a block that begins with 0. All functions of a block are
+ * reentrant and allocate nothing.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H

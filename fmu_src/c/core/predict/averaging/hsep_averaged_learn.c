@@ -274,11 +274,6 @@ static void averaged_judge_stack(hsep_averaged *self, const hsep_real e[])
         }
         n += 1.0;
     }
-    for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
-        for (int l = 0; l < i; l++) {
-            products[i][l] = products[l][i];
-        }
-    }
     if (n > 0.0) {
         hsep_stack_update(&self->learned.stack, products, n, self->least_variance);
     }

@@ -66,8 +66,8 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(parameters));
-    self->command = hsep_take_block(&end, hsep_command_size(parameters));
-    self->recall = hsep_take_block(&end, hsep_recall_size(parameters));
+    self->command = hsep_take_block(&end, hsep_command_lay_out(&(hsep_command){0}, parameters));
+    self->recall = hsep_take_block(&end, hsep_recall_lay_out(&(hsep_recall){0}, parameters));
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         self->evidence[i] = hsep_take_block(&end, hsep_warm_start_size(averaged_n_features(self, i)));
     }
@@ -88,8 +88,8 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
     self->leading = HSEP_ARX_RESIDUAL;
     hsep_stack_init(&self->learned.stack);
     hsep_disturbances_init(hsep_averaged_disturbances(self), parameters, start);
-    hsep_command_init(hsep_averaged_command(self), parameters);
-    hsep_recall_init(hsep_averaged_recall(self), parameters);
+    (void)hsep_command_lay_out(hsep_averaged_command(self), parameters);
+    (void)hsep_recall_lay_out(hsep_averaged_recall(self), parameters);
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_warm_start_init(hsep_averaged_evidence(self, i), averaged_n_features(self, i));
     }

@@ -261,8 +261,7 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
     self->before = self->after;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_int n = parameters->n;
@@ -273,16 +272,6 @@ static hsep_real command_lay_out(hsep_command *self, const hsep_residual_paramet
     self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)self->n_before);
     self->rows = hsep_take(&end, (hsep_real)n * HSEP_COMMAND_FEATURES);
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters)
-{
-    return command_lay_out(&(hsep_command){0}, parameters);
-}
-
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters)
-{
-    (void)command_lay_out(self, parameters);
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)

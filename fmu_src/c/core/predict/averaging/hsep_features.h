@@ -105,9 +105,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_command, 5);
 
-HSEP_API hsep_real hsep_command_size(const hsep_residual_parameters *parameters);
-/* Fill the block, which is 0, at rest. */
-HSEP_API void hsep_command_init(hsep_command *self, const hsep_residual_parameters *parameters);
+/* Set what follows from the parameters, the rest of the block being 0, at rest; return the bytes of the block. */
+HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
 HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m);

@@ -5,14 +5,13 @@
 
 #include <string.h>
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters)
 {
     const hsep_real size = (hsep_real)parameters->averaging->recall;
     hsep_real end = HSEP_WORDS(hsep_recall);
     self->size = parameters->averaging->recall;
     self->Np = parameters->settings->Np;
-    self->n = parameters->n;
+    self->n = self->lag = parameters->n;
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
     self->commands = hsep_take(&end, (hsep_real)self->stride);
@@ -20,17 +19,6 @@ static hsep_real recall_lay_out(hsep_recall *self, const hsep_residual_parameter
     self->residuals = hsep_take(&end, size);
     self->distances = hsep_take(&end, size);
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_recall_size(const hsep_residual_parameters *parameters)
-{
-    return recall_lay_out(&(hsep_recall){0}, parameters);
-}
-
-HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters *parameters)
-{
-    (void)recall_lay_out(self, parameters);
-    self->lag = self->n;
 }
 
 /* Compare the latched change with those first ... last - 1 samples before it. */

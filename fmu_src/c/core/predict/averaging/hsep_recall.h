@@ -33,9 +33,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
-HSEP_API hsep_real hsep_recall_size(const hsep_residual_parameters *parameters);
-/* Fill the block, which is 0, at rest. */
-HSEP_API void hsep_recall_init(hsep_recall *self, const hsep_residual_parameters *parameters);
+/* Set what follows from the parameters, the rest of the block being 0, at rest; return the bytes of the block. */
+HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
 HSEP_API void hsep_recall_hear(hsep_recall *self, hsep_real command);

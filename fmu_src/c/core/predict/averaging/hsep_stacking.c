@@ -97,7 +97,7 @@ HSEP_API void hsep_stack_update(
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         for (hsep_int j = 0; j < HSEP_N_EXPERTS; j++) {
             hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
-            *gram = HSEP_AVERAGING_GAMMA * *gram + products[i][j];
+            *gram = HSEP_AVERAGING_GAMMA * *gram + products[i < j ? i : j][i < j ? j : i];
             H[i][j] = *gram;
         }
         self->cross[i] = HSEP_AVERAGING_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];

@@ -42,9 +42,9 @@ HSEP_ASSERT_WORDS(hsep_stack, HSEP_STACK_WORDS);
 /* Begin without evidence. */
 HSEP_API void hsep_stack_init(hsep_stack *self);
 
-/* Update the weights with a measured window. products: (HSEP_N_EXPERTS + 1,) by as many, m2: the scalar products over
- * it of the predictions and, last, of what was measured; n: its samples, > 0; least: least mean square that errors are
- * judged by, m2. Constant cost. */
+/* Update the weights with a measured window. products: (HSEP_N_EXPERTS + 1,) by as many, upper triangle, m2: the scalar
+ * products over it of the predictions and, last, of what was measured; n: its samples, > 0; least: least mean square
+ * that errors are judged by, m2. Constant cost. */
 HSEP_API void hsep_stack_update(
     hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
 
