@@ -218,15 +218,15 @@ class Report:
 
     def table(self, head: Sequence[str], rows: Iterable[Sequence[str]], words: int | None = None) -> None:
         """Add a table; ``words`` is the column, from 0, of running text."""
-        cells = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
-        head_row = f"<thead><tr>{cells}</tr></thead>"
-        lines = []
-        for row in rows:
-            marked = (
-                f"<td{' class=words' if i == words else ''}>{html.escape(cell)}</td>" for i, cell in enumerate(row)
-            )
-            lines.append(f"<tr>{''.join(marked)}</tr>")
-        self._parts.append(f'<div class="tables"><table>{head_row}<tbody>{"".join(lines)}</tbody></table></div>')
+
+        def line(tag: str, cells: Sequence[str]) -> str:
+            marks = (f"{tag} class=words" if i == words else tag for i in range(len(cells)))
+            marked = (f"<{mark}>{html.escape(cell)}</{tag}>" for mark, cell in zip(marks, cells, strict=True))
+            return f"<tr>{''.join(marked)}</tr>"
+
+        body = "".join(line("td", row) for row in rows)
+        table = f"<table><thead>{line('th', head)}</thead><tbody>{body}</tbody></table>"
+        self._parts.append(f'<div class="tables">{table}</div>')
 
     def chart(self, chart: Chart) -> None:
         """Add a chart."""

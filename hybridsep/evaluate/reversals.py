@@ -164,7 +164,7 @@ def _reversals(x: Array, least: float) -> Indices:
 def friction_table(
     pieces: Iterable[tuple[ArrayLike, ArrayLike]], slope: float, n_steady: int, n_velocities: int = 20
 ) -> tuple[Array, Array]:
-    """Return velocities, and the mean residuals where the axis is due to move at them steadily.
+    """Return velocities, and the median residuals where the axis is due to move at them steadily.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def friction_table(
     Returns
     -------
     velocities : (m,) array, m in a sample
-        Mean of each bin that has ``n_steady`` samples or more, ascending.
+        Median of each bin that has ``n_steady`` samples or more, ascending.
     residuals : (rows, m) array, m
     """
     half = max(n_steady // 2, 1)
@@ -195,5 +195,5 @@ def friction_table(
     fastest = np.abs(rows[0]).max(initial=0.0) or 1.0
     place = np.minimum((rows[0] / fastest + 1.0) / 2.0 * n_velocities, n_velocities - 1).astype(np.intp)
     kept = [inside for i in range(n_velocities) if (inside := place == i).sum() >= n_steady]
-    means = np.array([rows[:, inside].mean(axis=1) for inside in kept]).reshape(-1, len(rows)).T
-    return means[0], means[1:]
+    medians = np.array([np.median(rows[:, inside], axis=1) for inside in kept]).reshape(-1, len(rows)).T
+    return medians[0], medians[1:]

@@ -172,6 +172,9 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
             f"{source.path}: has no line of names, its first line is numbers ({listed(plain)}); put one above, such as "
             f"{kinds}: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
         )
+    if "x_d" in names and names["x_d"] == names.get("x"):  # of a trajectory, which has no other position
+        it = f"column {brief(names['x_d'])} is missing, the file has {listed(source.names)}"
+        return LogError(f"{source.path}: {it}; call the commanded position so in the file")
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{role} NAME" for role in names)

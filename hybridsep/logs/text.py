@@ -15,6 +15,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -262,9 +263,9 @@ def decimal_points(text: str) -> str:
 def split(line: str, delimiter: str | None) -> list[str]:
     """Return the fields of a line without blanks and quotation marks around them."""
     if delimiter is not None and '"' in line:
-        return [
-            field.strip().strip("'") for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-        ]
+        with suppress(csv.Error):  # a field of more than 131 072 letters: no table
+            fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+            return [field.strip().strip("'") for field in fields]
     return [field.strip().strip("\"'") for field in line.split(delimiter)]
 
 

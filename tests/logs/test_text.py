@@ -103,6 +103,7 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
             "line 4: 3 columns were expected as in line 1, got 2; correct the line, or take it out",
         ),
         ("t,x_d,x\n0,0,0\n1,0,0,0\n", "line 3: 3 columns were expected as in line 1, got 4"),
+        (f't,x_d,x\n0,0,"{"a" * 200_000}"\n', "line 2: column 'x' must be a number, got 'aaa"),
         ("t,x_d,x\n0;0;0\n", "line 2: column 't' must be a number, got '0;0;0'"),
     ],
 )

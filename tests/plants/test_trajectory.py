@@ -94,7 +94,7 @@ def test_from_file(tmp_path: Path) -> None:
     x_d, T_s = read_trajectory(path, unit="mm")
     np.testing.assert_allclose(x_d, [0, 1.5e-3, 3e-3])
     assert T_s == pytest.approx(0.002)
-    with pytest.raises(LogError, match="speed"):
+    with pytest.raises(LogError, match=r"column .speed. is missing, .*; call the commanded position so in the file$"):
         read_trajectory(path, column="speed")
 
 
