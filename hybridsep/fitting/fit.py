@@ -328,7 +328,7 @@ def fit(
         share=1.0 - _SHARE,
         period=period,
         controller=controller_of(logs),
-        unidentified=any(one.startswith(TOO_LITTLE) for one in found.findings),
+        unidentified=not found.parameters or any(one.startswith(TOO_LITTLE) for one in found.findings),
     )
     progress("fitted", 1.0)
     return Fit(logs, findings, machine, found, choice, judged, windows, plant, tracking, predictor.to_bytes())

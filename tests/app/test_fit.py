@@ -154,9 +154,11 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
     used = [read_log(write_rows(tmp_path / "axis.csv", x_d, x))]
     for logs, name in ((used, "this log"), (2 * used, "these logs")):
-        [reason] = fit(logs, Np=NP).identification.findings
+        found = fit(logs, Np=NP)
+        [reason] = found.identification.findings
         why = "cannot determine a model, because the commanded position does not move"
         assert reason.startswith(f"the first half of {name} {why}")
+        assert found.advice.endswith("record moves in both halves.")
 
 
 @pytest.mark.slow
