@@ -323,7 +323,9 @@ def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
     if limits is not None and limits.estimated:
         names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
         known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
-        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
+        unit = found.machine.unit
+        rates = f"in {unit}/s, {unit}/s² and {unit}/s³"
+        lines.append(f"  # a compensator FMU for the drive; the limits are estimates: put in your drive's, {rates}")
         lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")
     native = files.get("native FMU")
     if native and (said := other_platforms(native, files["machine file"], files["trained predictor"])):

@@ -233,9 +233,10 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
     scale = 8 * np.pi / np.ptp(commanded()[:1500])
     rows = [np.mod(np.degrees(scale * x[:1500]), 360.0) for x in (commanded(), measured(0))]
     log = write_rows(tmp_path / "axis.csv", *rows, header="t,x_d [deg],x_meas [deg]")
-    status, _, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "jumps of a whole turn, the first at sample " in err
+    assert "put in your drive's, in rad/s, rad/s² and rad/s³" in out
     assert json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]["rms_h"] < 12e-6 * scale
 
 
