@@ -166,8 +166,17 @@ static hsep_real averaged_left(hsep_averaged *self, hsep_int to_come)
 /* Go on with them after sample last - 1, in equal shares: before the last row comes all others are in their heads. */
 static void averaged_advance(hsep_averaged *self, hsep_int last)
 {
-    const hsep_int left = self->Np - last;
-    hsep_real amount = averaged_left(self, left - 1) / (hsep_real)left;
+    const hsep_int left = self->Np - last, to_come = left - 1;
+    const hsep_int waiting = hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL))->waiting;
+    const hsep_int adds = waiting + to_come > 0 ? (waiting + to_come - 1) / HSEP_GRAM_TOGETHER : 0;
+    hsep_real of_rows = 0.0; /* where four are added to the Gram matrices */
+    for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
+        const hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, i));
+        of_rows += HSEP_AVERAGED_OF_GRAM * hsep_triangle(gram->n + 1);
+    }
+    const hsep_real added = waiting == 1 ? of_rows : 0.0; /* in this sample */
+    const hsep_real all = added + of_rows * (hsep_real)adds + averaged_left(self, to_come);
+    hsep_real amount = all / (hsep_real)left - added;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (solution != NULL && (amount > 0.0 || left == 1)) {

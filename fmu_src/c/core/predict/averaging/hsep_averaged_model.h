@@ -21,7 +21,9 @@
  * was predicted. */
 #define HSEP_AVERAGED_PACE 2
 
-/* Multiply-adds as which an entry of a Gram matrix counts where a solution begins with it. */
+/* Multiply-adds as which an entry of a Gram matrix counts where four rows are added to it, and where a solution begins
+ * with it. */
+#define HSEP_AVERAGED_OF_GRAM 5.0
 #define HSEP_AVERAGED_OF_BEGINNING 4.0
 
 /* Features without lags of an expert, at most. */
