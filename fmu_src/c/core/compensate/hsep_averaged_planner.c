@@ -169,21 +169,6 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
     self->spline = end;
 }
 
-/* Complete the programme of a Newton step, and factor it if it does not follow a bounded one; return whether it has a
- * minimum. */
-static int averaged_planner_factor(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_int first = self->n_pinned;
-    const hsep_real jerk_weight = task->planner->jerk_weight;
-    hsep_splines_difference_gram(
-        splines, 3, jerk_weight, self->n - first, hsep_planner_quadratic(task->planner, first));
-    hsep_splines_project_jerk(
-        splines, jerk_weight, hsep_planner_third(task->planner), first, hsep_planner_linear(task->planner));
-    hsep_planner_regularise(task->planner, first);
-    return self->bounded || hsep_planner_factor(task->planner, 1);
-}
-
 /* Begin to solve a programme, of the physics model's plan, 0, or of a Newton step, again where the last one's was
  * bounded; return whether it has a plan. */
 static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int programme)
@@ -427,8 +412,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             averaged_planner_copy(self, c, rest);
-            hsep_planner_let_turn(planner);
-            hsep_planner_decide_pinned(planner);
+            hsep_planner_follow_friction(planner);
         }
         self->gains = self->follows;
         for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
@@ -446,7 +430,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 averaged_planner_products(self, task);
             }
             AVERAGED_PLANNER_YIELD(10, self->bounded ? 3.0 * work.number : work.factor);
-            if (!averaged_planner_factor(self, task)) {
+            hsep_planner_complete(planner, self->n_pinned);
+            if (!self->bounded && !hsep_planner_factor(planner, 1)) { /* a bounded one is solved again without it */
                 break;
             }
             AVERAGED_PLANNER_YIELD(11, work.solve);

@@ -79,13 +79,14 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
     const hsep_int preview = predictor->preview, Np = predictor->Np;
-    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *c = hsep_at_const(planner, planner->c);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
     for (hsep_int k = 0; k < preview; k++) {
-        const hsep_real command = x_d[k] - predictor->start + hsep_planner_decided(planner, k);
+        const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
+        const hsep_real command = x_d[k] - predictor->start + decided;
         hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
@@ -295,7 +296,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     hsep_planner *planner = hsep_compensator_planner(self);
     self->compensate = compensator_lost(self) || self->over == HSEP_OVER ? HSEP_SEP_OFF : self->compensate_next;
     if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
-        hsep_planner_limit_change(planner, self->change_max_next);
+        hsep_splines_limit((hsep_splines *)hsep_at(planner, planner->splines), 0, self->change_max_next);
     }
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_predictor_begin(predictor);

@@ -293,12 +293,13 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
     a.n = splines->n - self->first;
     a.slacks.rho = self->rho;
-    a.slacks.sides = self->sides;
+    a.slacks.sides = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_int begin, end;
         hsep_splines_touched(splines, self->first, order, &begin, &end);
         a.slacks.range[order].begin = begin + order * splines->preview;
         a.slacks.range[order].end = end + order * splines->preview;
+        a.slacks.sides += 2.0 * (hsep_real)(end - begin);
     }
     return a;
 }
@@ -314,67 +315,29 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
         .high = a.slacks.side[1].b};
 }
 
-/* The rows of P, a triangle, from the first free spline. */
-static const hsep_real *interior_free_rows(const hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
-{
-    return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
-}
-
-/* The proximal term that bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding
- * in it would outgrow P. */
-static hsep_real interior_proximal(const hsep_splines *splines, const hsep_real *P, hsep_int n)
-{
-    hsep_real largest = 0.0;
-    for (hsep_int i = 0; i < n; i++) {
-        largest = hsep_fmax(largest, P[0]);
-        P += n - i;
-    }
-    return HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
-}
-
-/* Start at x, with or without the multipliers that are there. */
-static void interior_start(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance, int again)
-{
-    interior_arrays a = interior_open(self, splines);
-    self->tolerance = *tolerance;
-    self->steps = self->part = 0;
-    a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
-    hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
-    slacks_begin(&a.slacks, self->cost, again);
-}
-
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance)
 {
     self->first = first;
-    self->sides = 0.0;
-    const interior_arrays a = interior_open(self, splines);
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        self->sides += 2.0 * (hsep_real)(a.slacks.range[order].end - a.slacks.range[order].begin);
+    self->tolerance = *tolerance;
+    self->steps = self->part = 0;
+    interior_arrays a = interior_open(self, splines);
+    const int again = !(cost > 0.0);
+    if (!again) {
+        self->cost = cost / a.slacks.sides;
+        self->beyond = tolerance->margin;
     }
-    self->cost = cost / self->sides;
-    self->beyond = tolerance->margin;
-    interior_start(self, splines, P, tolerance, 0);
-}
-
-HSEP_API void hsep_interior_again(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance)
-{
-    interior_start(self, splines, P, tolerance, 1);
-}
-
-/* r_d := v - P x, P being the triangle of the splines first ... n - 1. */
-static void interior_gradient(const interior_arrays *a, const hsep_real *P)
-{
-    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
-    for (hsep_int i = 0; i < a->n; i++) {
-        const hsep_int left = a->n - i - 1;
-        a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
-        hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
-        P += a->n - i;
+    /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
+     * would outgrow P. */
+    hsep_real largest = 0.0;
+    for (hsep_int i = 0; i < a.n; i++) {
+        largest = hsep_fmax(largest, P[0]);
+        P += a.n - i;
     }
+    a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
+    hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
+    slacks_begin(&a.slacks, self->cost, again);
 }
 
 /* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its
@@ -383,7 +346,13 @@ static hsep_real interior_dual_residual(
     const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
-    interior_gradient(a, P);
+    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
+    for (hsep_int i = 0; i < a->n; i++) { /* v - P x */
+        const hsep_int left = a->n - i - 1;
+        a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
+        hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
+        P += left + 1;
+    }
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
     hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
@@ -443,7 +412,6 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
 {
     const interior_arrays a = interior_open(self, splines);
     const hsep_int part = self->part;
-    P = interior_free_rows(self, splines, P);
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
     if (part < HSEP_INTERIOR_PARTS - 1) {
         return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part == 2);

@@ -29,13 +29,12 @@ typedef struct {
     hsep_int part;    /* of the last one that comes next: 0 residuals, 1 and 2 the factor, 3 directions */
     hsep_real mu;     /* m2, of its beginning */
     hsep_real cost;   /* m2, scale of the cost per bound */
-    hsep_real sides;  /* number of bounds, low and high ones */
     hsep_real rho;    /* 1/m2, proximal regularisation of the multipliers */
     hsep_real beyond; /* shares, by how much inner exceeds the worst bound; the margin: there is none */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 12);
+HSEP_ASSERT_WORDS(hsep_interior, 11);
 
 HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */
 
@@ -49,16 +48,12 @@ typedef struct {
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
-/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
- * tolerance. */
+/* Begin with x and the bounds as they are. P: the triangle of n - first rows; cost: scale of the cost, m2, > 0, for the
+ * tolerance. 0: begin as near a minimum as one of a programme with the same bounds and nearly the same cost is, with
+ * its multipliers and its scale of the cost; the splines that are free are the same. */
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance);
-
-/* Begin as near a minimum as one of a programme with the same bounds and nearly the same cost is: with its multipliers,
- * and with its scale of the cost. The splines that are free are the same. */
-HSEP_API void hsep_interior_again(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], const hsep_tolerance *tolerance);
 
 /* Do a part of a step, its residuals, half of its factor or its directions; P as in hsep_interior_begin. Returns
  * whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and 2 n^2 after it, and about

@@ -2,6 +2,7 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -51,19 +52,9 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
         (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
 }
 
-HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max)
-{
-    hsep_splines_limit((hsep_splines *)hsep_at(self, self->splines), 0, change_max);
-}
-
 HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
 {
     return self->n_pinned * hsep_planner_splines(self)->spacing;
-}
-
-HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_int k)
-{
-    return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_N_DECIDED, k);
 }
 
 HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
@@ -159,8 +150,6 @@ static void planner_third(hsep_planner *self, hsep_int count)
 
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
 
-HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
-
 HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
 {
     return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
@@ -177,19 +166,19 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
     hsep_planner_total(self, x_d);
 }
 
-HSEP_API void hsep_planner_let_turn(hsep_planner *self)
+HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
 {
     memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
+    planner_third(self, HSEP_N_DECIDED + self->n_pinned);
 }
 
-HSEP_API void hsep_planner_decide_pinned(hsep_planner *self) { planner_third(self, HSEP_N_DECIDED + self->n_pinned); }
-
-HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_int first)
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
 {
-    const hsep_int n = hsep_planner_splines(self)->n - first;
-    hsep_real *P = hsep_planner_quadratic(self, first);
-    hsep_real largest = 0.0;
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int n = splines->n - first;
+    hsep_real *P = hsep_planner_quadratic(self, first), largest = 0.0;
     hsep_int place = 0;
+    hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), first, P, hsep_planner_linear(self));
     for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, P[place]);
         place += n - i;
@@ -204,12 +193,12 @@ HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_int first)
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real *P = hsep_at(self, self->P);
-    hsep_splines_filtered_gram(splines, filtered, P);
-    hsep_splines_difference_gram(splines, 3, self->jerk_weight, splines->n, P);
-    hsep_planner_regularise(self, 0);
-    hsep_splines_project(
-        splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), hsep_planner_linear(self));
+    hsep_real *v = hsep_planner_linear(self);
+    hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
+    for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
+        v[j] = hsep_dot(filtered, target + j * splines->spacing, splines->preview - j * splines->spacing);
+    }
+    hsep_planner_complete(self, 0);
 }
 
 HSEP_API void hsep_planner_pin(hsep_planner *self)
@@ -229,24 +218,26 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     }
 }
 
-/* Hand the bounded problem over: x begins at the splines after the pinned ones of a plan, (3 + n,), and its bounds are
- * what the pinned ones leave. */
-static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real margin)
+/* Begin the bounded problem: x begins at the splines after the pinned ones of a plan, (3 + n,), and its bounds are what
+ * the pinned ones leave. cost: as hsep_interior_begin has it. */
+static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int first = self->n_pinned, preview = splines->preview;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *total = hsep_at(self, self->total);
-    const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
+    hsep_interior *interior = planner_interior(self);
+    const hsep_problem problem = hsep_interior_problem(interior, splines);
     hsep_real *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
         hsep_planner_range(self, r, &least, &most);
-        low[r] = least - other + margin;
-        high[r] = most - other - margin;
+        low[r] = least - other + tolerance->margin;
+        high[r] = most - other - tolerance->margin;
     }
     memcpy(problem.x, start + HSEP_N_DECIDED + first, (size_t)(splines->n - first) * sizeof(hsep_real));
+    hsep_interior_begin(interior, splines, hsep_planner_quadratic(self, first), first, cost, tolerance);
 }
 
 HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
@@ -254,7 +245,7 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
     const hsep_int first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
     hsep_real *factor = hsep_at(self, self->factor);
     memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
-    return hsep_cholesky_factor(factor, n, NULL);
+    return hsep_cholesky_rows(factor, n, 0, n, NULL);
 }
 
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
@@ -295,22 +286,20 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     if (!pinned) {
         hsep_planner_pin(self);
     }
-    planner_bound(self, hsep_at(self, self->c), tolerance->margin);
-    hsep_interior_begin(planner_interior(self), splines, hsep_at(self, self->P), self->n_pinned, cost, tolerance);
+    planner_bound(self, hsep_at(self, self->c), cost, tolerance);
     return HSEP_PLAN_BOUNDED;
 }
 
 HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start[], const hsep_tolerance *tolerance)
 {
-    planner_bound(self, start, tolerance->margin);
-    hsep_interior_again(planner_interior(self), hsep_planner_splines(self), hsep_at(self, self->P), tolerance);
+    planner_bound(self, start, 0.0, tolerance);
 }
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
-    if (!hsep_interior_advance(interior, splines, hsep_at(self, self->P))) {
+    if (!hsep_interior_advance(interior, splines, hsep_planner_quadratic(self, self->n_pinned))) {
         return 0;
     }
     const hsep_problem problem = hsep_interior_problem(interior, splines);

@@ -71,24 +71,15 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 /* Splines that a bounded plan leaves as they are. */
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
-/* Set another bound on |delta| from the next plan on, m; where the remainder of the last plan is larger, it is the
- * bound. */
-HSEP_API void hsep_planner_limit_change(hsep_planner *self, hsep_real change_max);
-
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
 HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self);
-
-/* The part of delta at sample k that is decided before a plan is made, m. */
-HSEP_API hsep_real hsep_planner_decided(const hsep_planner *self, hsep_int k);
 
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 
-/* Let plans of this window turn where no_reversal forbids it: their model follows the friction. */
-HSEP_API void hsep_planner_let_turn(hsep_planner *self);
-
-/* Treat the pinned splines as decided, in hsep_planner_third. */
-HSEP_API void hsep_planner_decide_pinned(hsep_planner *self);
+/* Let plans of this window turn where no_reversal forbids it, as their model follows the friction, and count the pinned
+ * splines as decided. */
+HSEP_API void hsep_planner_follow_friction(hsep_planner *self);
 
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
  * (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
@@ -99,12 +90,10 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
 HSEP_API void hsep_planner_pin(hsep_planner *self);
 
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
- * first rows, and v, (n - first,), m; hsep_planner_regularise makes P positive definite. hsep_planner_third: the third
- * differences of the decided part of delta, (preview,), m. */
+ * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's and makes P positive definite. */
 HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first);
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
-HSEP_API void hsep_planner_regularise(hsep_planner *self, hsep_int first);
-HSEP_API const hsep_real *hsep_planner_third(const hsep_planner *self);
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first);
 
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);

@@ -38,23 +38,13 @@ HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing)
     return splines_lay_out(&(hsep_splines){0}, preview, spacing);
 }
 
-/* The uniform cubic B-spline on the knots 0, 1, 2, 3, 4. */
-static hsep_real splines_b(hsep_real u)
-{
-    if (u >= 2.0) {
-        u = 4.0 - u; /* it is symmetric */
-    }
-    return u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
-}
-
 HSEP_API void hsep_splines_init(
     hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
 {
     (void)splines_lay_out(self, preview, spacing);
-    const hsep_int width = 4 * spacing;
-    hsep_real *b = hsep_at(self, self->shape);
-    for (hsep_int k = 0; k < width; k++) {
-        b[k] = splines_b((hsep_real)k / (hsep_real)spacing);
+    for (hsep_int k = 0; k < 4 * spacing; k++) { /* the uniform cubic B-spline on the knots 0, 1, 2, 3, 4 */
+        const hsep_real at = (hsep_real)k / (hsep_real)spacing, u = at >= 2.0 ? 4.0 - at : at; /* it is symmetric */
+        hsep_at(self, self->shape)[k] = u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_splines_limit(self, order, limit[order]);
@@ -260,52 +250,23 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
     }
 }
 
-/* Sum over k of the differences of an order, m, of a spline and of the one d splines later. */
-static hsep_real splines_overlap(const hsep_splines *self, unsigned order, hsep_int d)
+HSEP_API void hsep_splines_add_jerk(
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
+    hsep_real v[])
 {
-    const hsep_real *e = splines_differences(self, order);
-    const hsep_real unit = 1.0 / self->share[order];
-    hsep_real sum = 0.0;
-    for (hsep_int k = d * self->spacing + 1; k < splines_length(self, order); k++) {
-        sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
-    }
-    return sum;
-}
-
-/* Splines behind one of n that overlap it in the differences of an order, and it itself. */
-static hsep_int splines_neighbours(const hsep_splines *self, unsigned order, hsep_int n)
-{
-    const hsep_int count = (splines_length(self, order) - 2) / self->spacing + 1;
-    return count < n ? count : n;
-}
-
-HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_int n, hsep_real triangle[])
-{
-    for (hsep_int d = 0; d < splines_neighbours(self, order, n); d++) {
-        const hsep_real sum = splines_overlap(self, order, d);
+    const hsep_real *e = splines_differences(self, 3);
+    const hsep_int n = self->n - first, length = splines_length(self, 3);
+    const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
+    for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
+        hsep_real sum = 0.0;
+        for (hsep_int k = d * self->spacing + 1; k < length; k++) {
+            sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
+        }
         for (hsep_int i = 0; i + d < n; i++) {
             *splines_entry(triangle, n, i, i + d) += weight * sum;
         }
     }
-}
-
-HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real v[])
-{
-    const hsep_real *e = splines_differences(self, 3);
-    const hsep_real unit = weight / self->share[3];
     for (hsep_int j = first; j < self->n; j++) {
-        v[j - first] -= unit * hsep_dot(e + 1, third + j * self->spacing + 1, splines_length(self, 3) - 1);
+        v[j - first] -= of_third * hsep_dot(e + 1, third + j * self->spacing + 1, length - 1);
     }
-}
-
-HSEP_API void hsep_splines_project(
-    const hsep_splines *self, const hsep_real filtered[], const hsep_real target[], hsep_real weight,
-    const hsep_real third[], hsep_real v[])
-{
-    for (hsep_int j = 0; j < self->n; j++) {
-        v[j] = hsep_dot(filtered, target + j * self->spacing, self->preview - j * self->spacing);
-    }
-    hsep_splines_project_jerk(self, weight, third, 0, v);
 }

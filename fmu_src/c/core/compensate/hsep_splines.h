@@ -67,18 +67,11 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
  * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
-/* The triangle of n rows += weight D' D with the differences D of an order of n splines behind each other, m. */
-HSEP_API void hsep_splines_difference_gram(
-    const hsep_splines *self, unsigned order, hsep_real weight, hsep_int n, hsep_real triangle[]);
-
-/* v, (n,), := W' target - weight D' third with the third differences D, target and third (preview,). */
-HSEP_API void hsep_splines_project(
-    const hsep_splines *self, const hsep_real filtered[], const hsep_real target[], hsep_real weight,
-    const hsep_real third[], hsep_real v[]);
-
-/* v, (n - first,), -= weight D' third, of the splines first ... n - 1. */
-HSEP_API void hsep_splines_project_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real v[]);
+/* The triangle of n - first rows += weight D' D, and v, (n - first,), -= weight D' third, with the third differences D
+ * of the splines first ... n - 1, m; third: (preview,) m. */
+HSEP_API void hsep_splines_add_jerk(
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
+    hsep_real v[]);
 
 /* The spline itself, b, (4 spacing,). */
 HSEP_API const hsep_real *hsep_splines_shape(const hsep_splines *self);

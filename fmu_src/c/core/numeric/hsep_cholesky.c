@@ -90,11 +90,6 @@ HSEP_API int hsep_cholesky_rows(
     return 1;
 }
 
-HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_int n, const hsep_real least[])
-{
-    return hsep_cholesky_rows(triangle, n, 0, n, least);
-}
-
 /* The reflection of a pivot and the entries below it: its length, entries relative to the first one, and factor. */
 typedef struct {
     hsep_real norm, v[4], tau;

@@ -14,13 +14,10 @@
 /* Doubles of a triangle of n rows. */
 static inline hsep_real hsep_triangle(hsep_int n) { return 0.5 * (hsep_real)n * ((hsep_real)n + 1.0); }
 
-/* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
- * is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL: nothing is.
- * Cost: n^3 / 6 multiply-adds. */
-HSEP_API int hsep_cholesky_factor(hsep_real triangle[], hsep_int n, const hsep_real least[]);
-
-/* The same for rows first ... last - 1 alone, behind others that are finished; what they leave is subtracted from the
- * rows below. */
+/* Turn the rows first ... last - 1 of the upper triangle of P into those of R, in place, behind others that are
+ * finished; what they leave is subtracted from the rows below. Returns 0 if P is not positive definite or not finite;
+ * the triangle is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL:
+ * nothing is. Cost: n^3 / 6 multiply-adds for all rows. */
 HSEP_API int hsep_cholesky_rows(
     hsep_real triangle[], hsep_int n, hsep_int first, hsep_int last, const hsep_real least[]);
 
