@@ -1,8 +1,6 @@
 #include "hsep_encoder.h"
 
-#include <math.h>
-
-static const double encoder_two_pi = 6.283185307179586;
+#include "hsep_math.h"
 
 /* The index-th number of the SplitMix64 sequence of a seed. */
 static uint64_t encoder_split_mix_64(uint64_t seed, uint64_t index)
@@ -27,5 +25,5 @@ HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x)
     /* Uniform in (0, 1] and [0, 1), 53 bits each */
     const double u1 = ldexp((double)((encoder_split_mix_64(self->seed, first) >> 11) + 1), -53);
     const double u2 = ldexp((double)(encoder_split_mix_64(self->seed, first + 1) >> 11), -53);
-    return x + self->noise_std * sqrt(-2.0 * log(u1)) * cos(encoder_two_pi * u2);
+    return x + self->noise_std * sqrt(-2.0 * log(u1)) * cos(HSEP_TWO_PI * u2);
 }

@@ -1,16 +1,17 @@
 #include "hsep_plant.h"
 
-#include "hsep_friction.h"
+#include "hsep_math.h"
 
 #include <math.h>
 #include <string.h>
 
-static const double plant_internal_step = 1e-4;  /* s */
-static const double plant_steps_per_time = 16.0; /* internal steps in the fastest time constant */
-static const double plant_steps_max = 1e6;       /* internal steps of one step */
-static const double plant_state_max = 1e100;     /* of a drive's state: outputs and their squares stay finite */
-static const double plant_tolerance = 1e-6;      /* of an internal step */
-static const double plant_two_pi = 6.283185307179586;
+static const double plant_internal_step = 1e-4;       /* s */
+static const double plant_steps_per_time = 16.0;      /* internal steps in the fastest time constant */
+static const double plant_steps_max = 1e6;            /* internal steps of one step */
+static const double plant_state_max = 1e100;          /* of a drive's state: outputs and their squares stay finite */
+static const double plant_tolerance = 1e-6;           /* of an internal step */
+static const int plant_friction_steps = 60;           /* of Newton's method for the velocity under friction, most */
+static const double plant_friction_tolerance = 1e-15; /* of such a step, relative */
 
 /* Number of internal steps for a step of h seconds: the fewest that are at most 0.1 ms and 1/(16 rate) long. */
 static double plant_internal_steps(double h, double rate)
@@ -25,7 +26,7 @@ HSEP_API double hsep_plant_step_max(double rate)
 
 HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode)
 {
-    const double omega = plant_two_pi * mode->f_n;
+    const double omega = HSEP_TWO_PI * mode->f_n;
     return fmax(sqrt(omega * omega), 2.0 * mode->zeta * omega);
 }
 
@@ -115,7 +116,7 @@ HSEP_API void hsep_stage_init(
     (void)stage_lay_out(self, n_modes, settings);
     hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
-        const double omega = plant_two_pi * modes[i].f_n;
+        const double omega = HSEP_TWO_PI * modes[i].f_n;
         stage[i].omega2 = omega * omega;
         stage[i].two_zeta_omega = 2.0 * modes[i].zeta * omega;
         stage[i].alpha = modes[i].alpha;
@@ -138,6 +139,39 @@ static double plant_position(const hsep_stage *s, const double z[])
     return x;
 }
 
+/* The solution of v = w - gain tanh(v / scale), m/s: w is the velocity without friction, gain the velocity that the
+ * whole friction takes away at once. For gain < -scale there are two stable solutions: the one in the direction of
+ * last, the velocity before, holds until it ends (hysteresis). At most 60 Newton steps, usually 4 to 8. */
+static double plant_friction_velocity(double w, double gain, double scale, double last)
+{
+    if (w == 0.0 && last == 0.0) {
+        return 0.0;
+    }
+    double sign = copysign(1.0, w);
+    if (gain < -scale) {
+        /* v + gain tanh(v / scale) falls between +-turn: a solution of the other sign than w may be there */
+        const double ratio = -gain / scale, turn = scale * log(sqrt(ratio) + sqrt(ratio - 1.0));
+        if (last * w < 0.0 && fabs(w) <= -turn - gain * tanh(turn / scale)) {
+            sign = -sign;
+        }
+    }
+    w *= sign;
+    /* Newton from the side where its steps are monotone: v + gain tanh(v / scale) is concave or convex for v > 0. */
+    double v = gain > 0.0 ? fmax(w - gain, w / (1.0 + gain / scale)) : w - gain;
+    for (int i = 0; i < plant_friction_steps; i++) {
+        const double t = tanh(v / scale), slope = 1.0 + gain / scale * (1.0 - t * t);
+        if (!(slope > 0.0)) {
+            break;
+        }
+        const double step = (v + gain * t - w) / slope;
+        v -= step;
+        if (fabs(step) <= plant_friction_tolerance * fabs(v)) {
+            break;
+        }
+    }
+    return sign * v;
+}
+
 /* The slope of z, (2 n_modes,), under a command disturbed by friction of the commanded velocity; v, m/s, is a velocity
  * shortly before. */
 static void plant_stage_slope(const hsep_stage *s, const double z[], double disturbed, double v, double slope[])
@@ -151,7 +185,7 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double dist
         slope[2 * i + 1] = u - mode[i].two_zeta_omega * z[2 * i + 1] - mode[i].omega2 * z[2 * i];
     }
     if (s->settings.friction_on == HSEP_FRICTION_MOTION) {
-        v = hsep_friction_velocity(plant_position(s, slope), s->friction_gain, s->settings.v_friction, v);
+        v = plant_friction_velocity(plant_position(s, slope), s->friction_gain, s->settings.v_friction, v);
         const double friction = s->settings.f * tanh(v / s->settings.v_friction);
         for (uint64_t i = 0; i < s->n_modes; i++) {
             slope[2 * i + 1] -= friction;
@@ -201,41 +235,19 @@ static void plant_stage_internal_step(
     }
 }
 
-HSEP_API double hsep_stage_rate(const hsep_stage *self)
-{
-    const hsep_stage_mode *mode = stage_modes(self);
-    double rate = 0.0;
-    for (uint64_t i = 0; i < self->n_modes; i++) {
-        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
-    }
-    return rate;
-}
-
 /* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v,
  * m/s, is a velocity of the last internal step. */
 static void plant_stage_integrate(const hsep_stage *s, double z[], double acting, double v_d, double time, double *v)
 {
-    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, acting, v_d);
+    const hsep_stage_mode *mode = stage_modes(s);
+    double fastest = 0.0; /* 1/s */
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        fastest = fmax(fastest, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    const double n = plant_internal_steps(time, fastest), disturbed = plant_disturbed(s, acting, v_d);
     const double dt = time / n, rate = plant_going_on(s, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
         plant_stage_internal_step(s, z, disturbed + rate * (i * dt), rate, dt, v);
-    }
-}
-
-/* The command that leaves the dead time at instant i of a step with the command r, m from the start. */
-static double plant_leaving(const hsep_stage *s, int64_t i, double r)
-{
-    const double *line = hsep_at_const(s, s->line);
-    return (uint64_t)i < s->n_line ? line[(s->oldest + (uint64_t)i) % s->n_line] : r;
-}
-
-/* Take the command r, m from the start, into the dead time at n instants. */
-static void plant_enter(hsep_stage *s, int64_t n, double r)
-{
-    double *line = hsep_at(s, s->line);
-    for (uint64_t i = 0; i < (uint64_t)n && i < s->n_line; i++) {
-        line[s->oldest] = r;
-        s->oldest = (s->oldest + 1) % s->n_line;
     }
 }
 
@@ -246,7 +258,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
-    double *z = work, *slope = work + 2 * self->n_modes;
+    double *z = work, *slope = work + 2 * self->n_modes, *line = hsep_at(self, self->line);
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);
@@ -259,7 +271,8 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             done = next;
         }
         if (i < step.n_latched) {
-            const double left = plant_leaving(self, i, r);
+            const uint64_t in_line = (uint64_t)i;
+            const double left = in_line < self->n_line ? line[(self->oldest + in_line) % self->n_line] : r;
             v_d = (left - last_x_d) / self->clock.T_s;
             acting = foh && late ? last_x_d : left;
             last_x_d = left;
@@ -273,7 +286,10 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
     self->v = plant_position(self, slope);
     memcpy(hsep_at(self, self->z), z, z_size);
-    plant_enter(self, step.n_latched, r);
+    for (uint64_t i = 0; i < (uint64_t)step.n_latched && i < self->n_line; i++) {
+        line[self->oldest] = r;
+        self->oldest = (self->oldest + 1) % self->n_line;
+    }
     self->acting = acting;
     self->last_x_d = last_x_d;
     self->v_d = v_d;

@@ -6,6 +6,86 @@
 #include <stddef.h>
 #include <string.h>
 
+HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters)
+{
+    return (hsep_residual_parameters){
+        .settings = &parameters->settings,
+        .averaging = &parameters->averaging,
+        .modes = parameters->modes,
+        .n_modes = parameters->n_modes,
+        .n = parameters->preview + hsep_late(&parameters->settings),
+        .planned = parameters->planned};
+}
+
+/* Take a signal of the window, this long, and what is before it; return the offset of the window. */
+static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
+{
+    return hsep_take(end, late + count) + (hsep_int)late;
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+{
+    const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
+    const hsep_real late = (hsep_real)hsep_late(&parameters->settings), n = Np + late;
+    const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
+    hsep_real end = HSEP_WORDS(hsep_predictor);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
+    self->Np = parameters->settings.Np;
+    self->late = hsep_late(&parameters->settings);
+    self->early = parameters->settings.measurement_delay < 0;
+    self->n = self->Np + self->late;
+    self->preview = parameters->preview;
+    self->p = parameters->settings.p;
+    self->q = parameters->settings.q;
+    self->n_init = parameters->n_init;
+    self->ahead = hsep_take(&end, preview);
+    self->x_d = predictor_take(&end, late, preview);
+    self->x_pb = predictor_take(&end, late, Np);
+    self->x_h = predictor_take(&end, late, Np);
+    self->x_hold = predictor_take(&end, late, Np);
+    self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
+    self->command = hsep_take(&end, n);
+    self->past_x = hsep_take(&end, n + q);
+    self->past_e = hsep_take(&end, n + p);
+    self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
+    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
+    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
+    self->model = hsep_take_block(&end, hsep_residual_size(&model));
+    if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
+        self->motion = hsep_take_block(&end, hsep_start_size(&model));
+    }
+    return end * sizeof(hsep_real);
+}
+
+HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters)
+{
+    return predictor_lay_out(&(hsep_predictor){0}, parameters);
+}
+
+HSEP_API void hsep_predictor_block_init(
+    hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start)
+{
+    memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
+    (void)predictor_lay_out(self, parameters);
+    self->start = self->next = start;
+    self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
+    for (hsep_int i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
+        hsep_at(self, 0)[i] = start;
+    }
+    hsep_physics_init(
+        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
+        parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
+    hsep_uncertainty_init(
+        hsep_predictor_uncertainty(self), self->Np, self->n,
+        hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->averaging.noise_std));
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
+    hsep_residual_init(hsep_predictor_model(self), &model, start);
+    if (self->motion) {
+        hsep_start_init((hsep_start *)hsep_at(self, self->motion), &model);
+    }
+}
+
 HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
 {
     return (hsep_residual_window){
@@ -98,26 +178,23 @@ HSEP_API void hsep_predictor_finish(hsep_predictor *self)
     memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(hsep_real));
 }
 
-/* Keep the samples of the window that are not measured yet, before the next one. */
-static void predictor_keep(hsep_predictor *self)
-{
-    const hsep_int late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
-    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    memmove(command + self->Np, command, (size_t)late * sizeof(hsep_real));
-    memmove(past_x + self->Np, past_x, (size_t)late * sizeof(hsep_real));
-    for (int i = 0; i < 4; i++) {
-        hsep_real *kept = hsep_at(self, signals[i] - late);
-        memmove(kept, kept + self->Np, (size_t)late * sizeof(hsep_real));
-    }
-}
-
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
     const hsep_int n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
     const hsep_real *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
     const hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
     hsep_real *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
-    predictor_keep(self);
+    /* The samples of the last window that are not measured yet go before this one. */
+    const hsep_int newest_first[2] = {self->command, self->past_x};
+    const hsep_int oldest_first[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
+    const size_t late = (size_t)self->late * sizeof(hsep_real);
+    for (int i = 0; i < 2; i++) {
+        memmove(hsep_at(self, newest_first[i] + self->Np), hsep_at(self, newest_first[i]), late);
+    }
+    for (int i = 0; i < 4; i++) {
+        memmove(
+            hsep_at(self, oldest_first[i] - self->late), hsep_at(self, oldest_first[i] - self->late + self->Np), late);
+    }
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(hsep_real));
     memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(hsep_real));
     if (e_h != past_e) {
@@ -127,17 +204,6 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     self->n_published = 0;
     self->held = self->residual;
     hsep_predictor_uncertainty(self)->least = averaged != NULL ? averaged->reach.farthest : 0.0;
-}
-
-/* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
-static void predictor_bound(hsep_predictor *self, hsep_int first, hsep_int last)
-{
-    const hsep_real *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
-    if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb, last - first, HSEP_PREDICTION_MAX)) {
-        self->divergence = HSEP_DIVERGES_X_PB;
-    } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h, last - first, HSEP_PREDICTION_MAX)) {
-        self->divergence = HSEP_DIVERGES_X_H;
-    }
 }
 
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last)
@@ -151,7 +217,11 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last)
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
         x_hold[i] = x_pb[i] + self->held;
     }
-    predictor_bound(self, first, last);
+    if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb + first, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h + first, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_H;
+    }
     self->n_published = last;
 }
 

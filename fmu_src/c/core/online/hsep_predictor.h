@@ -83,14 +83,21 @@ HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *pa
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
-/* The residual model, and its parameters. */
-HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
+/* Parts of the block: the physics model, the residual model, and what is known of the errors of x_h. */
+static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self)
+{
+    return (hsep_physics *)hsep_at(self, self->physics);
+}
+static inline hsep_residual_model *hsep_predictor_model(hsep_predictor *self)
+{
+    return (hsep_residual_model *)hsep_at(self, self->model);
+}
+static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
+{
+    return (hsep_uncertainty *)hsep_at(self, self->uncertainty);
+}
+
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);
-
-HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
-
-/* What is known of the errors of x_h. */
-HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
 
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
