@@ -12,12 +12,6 @@
 #define LINEARISED_BEFORE 2      /* samples at rest before a change */
 #define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
 
-/* Whole parts of a recursion, in samples. */
-static hsep_int linearised_padded(hsep_int count)
-{
-    return (count + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER * LINEARISED_TOGETHER;
-}
-
 static const hsep_int linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_ARX_RESIDUAL, HSEP_STATIC, HSEP_FRESH_START};
 
 #define LINEARISED_OF_COMMAND 2
@@ -145,59 +139,45 @@ static void linearised_pass(
     }
 }
 
-/* A change after the dead time, at sample u. */
-static hsep_real linearised_acted(const hsep_linearised_change *change, hsep_int u, hsep_int dead_time)
-{
-    return u >= dead_time && u - dead_time < change->n ? change->commands[u - dead_time] : 0.0;
-}
-
 /* A change as x_d, v_d and x. */
 static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, hsep_real T_s)
 {
-    hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE, last = 0.0;
+    hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
+    hsep_real *commands = hsep_at(self, self->commands);
     for (hsep_int u = 0; u < self->preview; u++) {
-        const hsep_real now = u < change->n ? change->commands[u] : 0.0;
-        velocity[u] = (now - last) / T_s;
-        hsep_at(self, self->commands)[1 + u] = now;
-        last = now;
+        commands[1 + u] = u < change->n ? change->commands[u] : 0.0;
+        velocity[u] = (commands[1 + u] - commands[u]) / T_s;
     }
     memcpy(
         hsep_at(self, self->position) + LINEARISED_BEFORE, change->passed, (size_t)self->preview * sizeof(hsep_real));
     self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
 }
 
-/* What shrinking and bounds leave of an expert's recursion at place j. */
-static hsep_real linearised_left(const hsep_expert *expert, hsep_int j)
+/* Share of an expert in the stack, sample after sample: what shrinking and bounds leave of its recursion. */
+static void linearised_shrink(const hsep_expert *expert, hsep_real weight, hsep_int n, hsep_real shrink[])
 {
-    const hsep_real unshrunk = hsep_at_const(expert, expert->unshrunk)[j];
-    return unshrunk == 0.0 ? hsep_at_const(expert, expert->shrinkage)[j]
-                           : hsep_at_const(expert, expert->e_h)[j] / unshrunk;
-}
-
-/* Share of an expert in the stack, sample after sample, after shrinking and bounds. */
-static void linearised_shrink(
-    const hsep_linearised *self, hsep_averaged *model, hsep_int place, hsep_real weight, hsep_real shrink[])
-{
-    const hsep_expert *expert = hsep_averaged_expert(model, place);
-    for (hsep_int k = 0; weight > 0.0 && k < self->n; k++) {
-        shrink[k] = weight * linearised_left(expert, self->n - 1 - k);
+    const hsep_real *e_h = hsep_at_const(expert, expert->e_h) + n,
+                    *unshrunk = hsep_at_const(expert, expert->unshrunk) + n;
+    const hsep_real *shrinkage = hsep_at_const(expert, expert->shrinkage) + n;
+    for (hsep_int k = 0; k < n; k++) {
+        e_h--, unshrunk--, shrinkage--;
+        shrink[k] = weight * (*unshrunk == 0.0 ? *shrinkage : *e_h / *unshrunk);
     }
 }
 
-/* Response of an expert of the command to the increments of a change, from rest, (preview,). */
+/* Response of an expert of the command to the increments of a change of n samples, from rest, (preview,). */
 static void linearised_of_increments(
-    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, hsep_int dead_time,
-    hsep_real to[])
+    hsep_linearised *self, const hsep_expert *expert, hsep_int n, hsep_int dead_time, hsep_real to[])
 {
     const hsep_real *weights = hsep_expert_weights(expert), *lag_weights = weights + expert->n_static;
+    const hsep_real *commands = hsep_at(self, self->commands);
     hsep_real *run = hsep_at(self, self->run);
     for (hsep_int u = 0; u < self->preview; u++) {
-        const hsep_int end = dead_time + change->n; /* the command changes in samples dead_time ... end */
+        const hsep_int end = dead_time + n; /* the command changes in samples dead_time ... end */
         hsep_real drive = 0.0;
         for (hsep_int i = u + 1 > end ? u + 1 - end : 1; i < expert->n_static && i + dead_time <= u + 1; i++) {
-            const hsep_int at = u + 1 - i;
-            const hsep_real before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
-            drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
+            const hsep_real *before = commands + (u + 1 - i - dead_time);
+            drive += weights[i] * (before[1] - before[0]);
         }
         hsep_real *e = run + (self->preview - 1 - u);
         *e = hsep_recur(drive, lag_weights, e + 1, u < expert->p ? u : expert->p);
@@ -210,6 +190,7 @@ static void linearised_of_increments(
 static void linearised_command(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
+    const hsep_real *commands = hsep_at(self, self->commands) + 1;
     hsep_real *base = hsep_at(self, self->base);
     memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
     for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
@@ -217,10 +198,10 @@ static void linearised_command(hsep_linearised *self, hsep_averaged *model, cons
         const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
         if (weight > 0.0) {
             linearised_of_increments(
-                self, hsep_averaged_expert(model, place), change, dead_time,
+                self, hsep_averaged_expert(model, place), change->n, dead_time,
                 hsep_at(self, self->of_command) + i * self->preview);
             for (hsep_int u = 0; u < self->preview; u++) {
-                base[u] += weight * (linearised_acted(change, u, dead_time) - change->passed[u]);
+                base[u] += weight * ((u < dead_time ? 0.0 : commands[u - dead_time]) - change->passed[u]);
             }
         }
     }
@@ -279,7 +260,7 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
     linearised_signals(self, change, hsep_averaged_disturbances(model)->T_s);
     linearised_command(self, model, change);
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (hsep_averaged_kind_of(model, linearised_experts[i]) != HSEP_COMMAND_RESIDUAL) {
+        if (linearised_counts(model, linearised_experts[i])) {
             const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
             linearised_pass(
                 hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
@@ -296,13 +277,15 @@ HSEP_API void hsep_linearised_at(
     for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
         const hsep_int place = linearised_of_command[i];
         const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
-        linearised_shrink(self, model, place, weight, hsep_at(self, self->shrinkage) + i * n);
+        if (weight > 0.0) {
+            linearised_shrink(hsep_averaged_expert(model, place), weight, n, hsep_at(self, self->shrinkage) + i * n);
+        }
     }
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (hsep_averaged_kind_of(model, linearised_experts[i]) != HSEP_COMMAND_RESIDUAL) {
-            const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
-            const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_MODEL_RESIDUAL);
-            linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
+        const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
+        const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_MODEL_RESIDUAL);
+        if (weight > 0.0) {
+            linearised_shrink(expert, weight, n, hsep_at(self, self->shrink) + i * n);
             linearised_gains(
                 self, hsep_expert_weights(expert) + first, hsep_averaged_disturbances(model)->T_s,
                 hsep_at(self, self->gains) + i * LINEARISED_GAINS * n,
@@ -437,7 +420,8 @@ static void linearised_add(
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
     const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
-    const hsep_int padded = linearised_padded(self->preview - first);
+    const hsep_int parts = (self->preview - first + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER; /* of a recursion */
+    const hsep_int padded = parts * LINEARISED_TOGETHER;
     hsep_real *run = hsep_at(self, self->run);
     for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
         const hsep_int begin = c < count ? first + c * spacing : self->preview;

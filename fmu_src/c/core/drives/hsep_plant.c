@@ -235,16 +235,21 @@ static void plant_stage_internal_step(
     }
 }
 
+HSEP_API double hsep_stage_rate(const hsep_stage *self)
+{
+    const hsep_stage_mode *mode = stage_modes(self);
+    double rate = 0.0;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    return rate;
+}
+
 /* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v,
  * m/s, is a velocity of the last internal step. */
 static void plant_stage_integrate(const hsep_stage *s, double z[], double acting, double v_d, double time, double *v)
 {
-    const hsep_stage_mode *mode = stage_modes(s);
-    double fastest = 0.0; /* 1/s */
-    for (uint64_t i = 0; i < s->n_modes; i++) {
-        fastest = fmax(fastest, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
-    }
-    const double n = plant_internal_steps(time, fastest), disturbed = plant_disturbed(s, acting, v_d);
+    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, acting, v_d);
     const double dt = time / n, rate = plant_going_on(s, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
         plant_stage_internal_step(s, z, disturbed + rate * (i * dt), rate, dt, v);

@@ -100,6 +100,7 @@ HSEP_API void hsep_stage_init(
  * Fails, and returns 0 with the state unchanged, if the state overflows. */
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
-HSEP_API double hsep_stage_x(const hsep_stage *self); /* true position, m */
+HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
+HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
 
 #endif
