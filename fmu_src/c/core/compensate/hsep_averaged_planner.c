@@ -57,24 +57,16 @@ static void averaged_planner_predict(
 }
 
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
-static hsep_real averaged_planner_cost(
-    const hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
 {
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_int count = HSEP_N_DECIDED + self->n;
-    const hsep_real *x_pb = hsep_at_const(self, self->x_pb), *e_h = hsep_at_const(self, self->e_h);
-    const hsep_real *before = task->planner->delta_before;
-    hsep_real d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    hsep_real error = 0.0;
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
         const hsep_real e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
-        d[3] = hsep_splines_sum(splines, c, count, k);
-        const hsep_real third = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
         error += e * e;
-        jerk += third * third;
-        d[0] = d[1], d[1] = d[2], d[2] = d[3];
     }
-    return error + task->planner->jerk_weight * jerk;
+    return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
 /* Begin the linearisations of a window and the physics model's plan. */
@@ -180,7 +172,7 @@ static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averag
 #endif
     tolerance.steps = averaged_planner_solved[programme];
     if (self->bounded) { /* so it is again */
-        hsep_planner_solve_again(task->planner, hsep_at(self, self->best), &tolerance);
+        hsep_planner_bound(task->planner, hsep_at(self, self->best), 0.0, &tolerance);
     } else {
         status = hsep_planner_solve(task->planner, 1, &tolerance);
     }
@@ -210,27 +202,15 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
     }
 }
 
-/* Share of a window in which a plan is at the bound of the change. */
-static hsep_real averaged_planner_bounded(
-    const hsep_averaged_planner *self, const hsep_splines *splines, const hsep_real c[])
-{
-    const hsep_int count = HSEP_N_DECIDED + self->n;
-    hsep_real bounded = 0.0;
-    for (hsep_int k = 0; k < self->Np; k++) {
-        bounded += hsep_fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > HSEP_PLANNING_AT_BOUND;
-    }
-    return bounded / (hsep_real)self->Np;
-}
-
 /* Whether the best plan asks for a larger change than compensation is made for. A motor at its limit does not follow,
  * so that the next plan asks for more. A position loop that is driven so far may fall into a second state with an error
  * many times larger, and stays in it when compensation ends. */
 static int averaged_planner_runs_away(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * splines->share[0];
-    const hsep_real longer = averaged_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
-                             averaged_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
+    const hsep_real share = hsep_planner_splines(task->planner)->share[0];
+    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * share;
+    const hsep_real longer = hsep_planner_at_bound(task->planner, hsep_at_const(self, self->best)) -
+                             hsep_planner_at_bound(task->planner, hsep_at_const(self, self->of_physics));
     return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
 }
 
@@ -490,18 +470,16 @@ HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_a
 }
 
 HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
-    int warm)
+    hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best, int warm)
 {
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->place = self->bounded = self->solving = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
-    memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
-    memcpy(
-        hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(hsep_real));
+    memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, task->late_x, late);
+    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }

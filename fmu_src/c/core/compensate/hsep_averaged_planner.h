@@ -72,6 +72,10 @@ typedef struct {
     hsep_planner *planner;
     const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
     const hsep_real *x_d;    /* (preview,) m, commanded positions */
+    /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
+     * the last residuals measured, (p,) m, likewise */
+    const hsep_physics *physics;
+    const hsep_real *late_command, *late_x, *residuals;
 } hsep_averaged_task;
 
 /* Bytes of the block, counted as a number so that no size can overflow. */
@@ -83,21 +87,12 @@ HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start);
 
-/* State before a window. */
-typedef struct {
-    const hsep_physics *physics; /* G_pb at its beginning */
-    const hsep_real *late_command,
-        *late_x;                /* (late,) m, command and x_pb of the samples not measured yet, newest first */
-    const hsep_real *residuals; /* (p,) m, the last ones measured, newest first */
-} hsep_averaged_before;
-
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
  * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples
  * that the plan leaves as they are, and the late ones before them. Cost: as hsep_averaged_forecast; a late
  * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
 HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_averaged_before *before, hsep_int best,
-    int warm);
+    hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best, int warm);
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.

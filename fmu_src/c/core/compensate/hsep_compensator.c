@@ -70,7 +70,11 @@ static hsep_averaged_task compensator_task(hsep_compensator *self)
         .model = hsep_residual_averaged(hsep_predictor_model(predictor)),
         .planner = hsep_compensator_planner(self),
         .spline = hsep_at(self, self->spline_pb),
-        .x_d = hsep_at(predictor, predictor->x_d)};
+        .x_d = hsep_at(predictor, predictor->x_d),
+        .physics = hsep_predictor_physics(predictor),
+        .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
+        .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
+        .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
 }
 
 /* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
@@ -193,27 +197,24 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
-/* Parts of the solver's steps of a bounded plan; return whether it is solved. */
-static int compensator_step(hsep_compensator *self, hsep_int due)
-{
-    int done = 0;
-    for (hsep_int step = 0; !done && step < due; step++) {
-        done = hsep_planner_advance(hsep_compensator_planner(self));
-    }
-    return done;
-}
-
 /* Work on a plan that is due before the next sample. */
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
-    const hsep_averaged_task task = compensator_task(self);
-    if (self->averaged ? hsep_averaged_planner_run(hsep_compensator_averaged(self), &task, left)
-                       : compensator_step(self, due)) {
-        self->state = self->averaged ? hsep_compensator_averaged(self)->planned : self->state;
+    int done = 0;
+    if (self->averaged) {
+        const hsep_averaged_task task = compensator_task(self);
+        done = hsep_averaged_planner_run(hsep_compensator_averaged(self), &task, left);
+        self->state = done ? hsep_compensator_averaged(self)->planned : self->state;
+    } else { /* parts of the solver's steps, all that are left of them in the last sample */
+        const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
+        for (hsep_int part = 0; !done && part < due; part++) {
+            done = hsep_planner_advance(hsep_compensator_planner(self));
+        }
+    }
+    if (done) {
         compensator_publish(self, predictor->Np);
     }
 }
@@ -259,12 +260,7 @@ static void compensator_plan_averaged(hsep_compensator *self)
     const int warm = (hsep_real)predictor->k >= predictor->n_init;
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
-    const hsep_averaged_before before = {
-        .physics = hsep_predictor_physics(predictor),
-        .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
-        .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
-        .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
-    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, &before, self->compensate, warm);
+    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate, warm);
 }
 
 HSEP_API int hsep_compensator_change(

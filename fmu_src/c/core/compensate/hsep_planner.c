@@ -135,17 +135,34 @@ HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[])
     return 1;
 }
 
-/* The third differences of the first count splines of delta. */
-static void planner_third(hsep_planner *self, hsep_int count)
+/* Third differences of delta under the first count coefficients c, (preview,), m; return the sum of their squares. */
+static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
 {
-    hsep_real *third = hsep_at(self, self->third);
-    const hsep_int preview = hsep_planner_splines(self)->preview;
-    hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
-    for (hsep_int k = 0; k < preview; k++) {
-        d[3] = hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), count, k);
+    const hsep_splines *splines = hsep_planner_splines(self);
+    hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0}, squares = 0.0;
+    for (hsep_int k = 0; k < splines->preview; k++) {
+        d[3] = hsep_splines_sum(splines, c, count, k);
         third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        squares += third[k] * third[k];
         d[0] = d[1], d[1] = d[2], d[2] = d[3];
     }
+    return squares;
+}
+
+HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[])
+{
+    return self->jerk_weight * planner_third(self, c, HSEP_N_DECIDED + hsep_planner_splines(self)->n, work);
+}
+
+HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    hsep_real bounded = 0.0;
+    for (hsep_int k = 0; k < self->Np; k++) {
+        const hsep_real delta = hsep_splines_sum(splines, c, HSEP_N_DECIDED + splines->n, k);
+        bounded += hsep_fabs(delta) * splines->share[0] > HSEP_PLANNING_AT_BOUND;
+    }
+    return bounded / (hsep_real)self->Np;
 }
 
 HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
@@ -162,14 +179,14 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
-    planner_third(self, HSEP_N_DECIDED);
+    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
     hsep_planner_total(self, x_d);
 }
 
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
 {
     memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
-    planner_third(self, HSEP_N_DECIDED + self->n_pinned);
+    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED + self->n_pinned, hsep_at(self, self->third));
 }
 
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
@@ -218,9 +235,8 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     }
 }
 
-/* Begin the bounded problem: x begins at the splines after the pinned ones of a plan, (3 + n,), and its bounds are what
- * the pinned ones leave. cost: as hsep_interior_begin has it. */
-static void planner_bound(hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance)
+HSEP_API void hsep_planner_bound(
+    hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int first = self->n_pinned, preview = splines->preview;
@@ -286,13 +302,8 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     if (!pinned) {
         hsep_planner_pin(self);
     }
-    planner_bound(self, hsep_at(self, self->c), cost, tolerance);
+    hsep_planner_bound(self, hsep_at(self, self->c), cost, tolerance);
     return HSEP_PLAN_BOUNDED;
-}
-
-HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start[], const hsep_tolerance *tolerance)
-{
-    planner_bound(self, start, 0.0, tolerance);
 }
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)

@@ -106,12 +106,19 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
  * solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
-/* Plan at another cost, near that of the last plan, which was bounded, within the same bounds: from the coefficients
- * start, (3 + n,), m, where that one ended, with its multipliers. The pinned samples stay as they are. */
-HSEP_API void hsep_planner_solve_again(hsep_planner *self, const hsep_real start[], const hsep_tolerance *tolerance);
+/* Begin a bounded plan at this cost, from the coefficients start, (3 + n,), m. The pinned samples stay as they are, and
+ * its bounds are what they leave. cost: as hsep_interior_begin has it, 0 at a cost near that of the last plan, which was
+ * bounded, too, and ended at start. */
+HSEP_API void hsep_planner_bound(
+    hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance);
 
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
+
+/* Cost of the jerk of a plan with coefficients c, (3 + n,), m2, work: (preview,); and share of a window in which it is
+ * at the bound of the change. */
+HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
+HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
