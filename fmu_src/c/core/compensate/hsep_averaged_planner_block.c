@@ -47,15 +47,10 @@ HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
     memset(self, 0, (size_t)hsep_averaged_planner_size(parameters, planner));
     (void)averaged_planner_lay_out(self, parameters, planner);
     self->start = start;
-    self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * settings->T_s) + 0.5);
+    self->pause =
+        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
-    for (int i = 0; i < 2; i++) {
-        hsep_physics_init(
-            (hsep_physics *)hsep_at(self, i == 0 ? self->physics : self->trial), parameters->modes, parameters->n_modes,
-            settings->dead_time, settings->T_s, (hsep_hold)settings->input_hold);
-    }
 }

@@ -259,7 +259,7 @@ static void compensator_plan_averaged(hsep_compensator *self)
     const hsep_averaged_task task = compensator_task(self);
     const int warm = (hsep_real)predictor->k >= predictor->n_init;
     self->before = self->state;
-    predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
+    predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor, 0) : predictor->Np;
     hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate, warm);
 }
 

@@ -258,24 +258,20 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
 {
     const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview;
     hsep_real end = HSEP_WORDS(hsep_interior);
-    a->x = interior_take(block, &end, columns);
-    a->v = interior_take(block, &end, columns);
-    a->inner = interior_take(block, &end, columns);
-    a->r_d = interior_take(block, &end, columns);
-    a->dx = interior_take(block, &end, columns);
+    hsep_real **const of_columns[5] = {&a->x, &a->v, &a->inner, &a->r_d, &a->dx};
+    for (int i = 0; i < 5; i++) {
+        *of_columns[i] = interior_take(block, &end, columns);
+    }
     a->slacks.Ax = interior_take(block, &end, rows);
     a->slacks.Adx = interior_take(block, &end, rows);
     a->slacks.work = interior_take(block, &end, rows);
     for (int i = 0; i < 2; i++) {
         slacks_side *side = &a->slacks.side[i];
-        side->b = interior_take(block, &end, rows);
-        side->s = interior_take(block, &end, rows);
-        side->z = interior_take(block, &end, rows);
-        side->inverse = interior_take(block, &end, rows);
-        side->r_c = interior_take(block, &end, rows);
-        side->r_p = interior_take(block, &end, rows);
-        side->ds = interior_take(block, &end, rows);
-        side->dz = interior_take(block, &end, rows);
+        hsep_real **const of_rows[8] = {&side->b,   &side->s,   &side->z,  &side->inverse,
+                                        &side->r_c, &side->r_p, &side->ds, &side->dz};
+        for (int j = 0; j < 8; j++) {
+            *of_rows[j] = interior_take(block, &end, rows);
+        }
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
     return end * sizeof(hsep_real);

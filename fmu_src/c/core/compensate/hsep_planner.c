@@ -62,28 +62,18 @@ HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
-    hsep_real last = self->x_d_before[2];
-    hsep_real before[HSEP_ORDERS]; /* differences of orders 0 to 2 at the sample before */
-    hsep_real y[3];
+    hsep_real last = self->x_d_before[2], now[HSEP_ORDERS] = {0.0};
     for (int i = 0; i < 3; i++) {
-        y[i] = self->x_d_before[i] + self->delta_before[i];
+        hsep_differ(now, self->x_d_before[i] + self->delta_before[i]);
     }
-    before[0] = y[2];
-    before[1] = y[2] - y[1];
-    before[2] = (y[2] - y[1]) - (y[1] - y[0]);
     for (hsep_int k = 0; k < preview; k++) {
         const hsep_real delta = hsep_planner_delta(self, k), step = x_d[k] - last;
-        hsep_real now[HSEP_ORDERS];
         last = x_d[k];
         moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
-        now[0] = x_d[k] + delta;
+        hsep_differ(now, x_d[k] + delta);
         total[k] = delta * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            now[order] = now[order - 1] - before[order - 1];
             total[order * preview + k] = now[order] * splines->share[order];
-        }
-        for (unsigned order = 0; order < HSEP_ORDERS - 1; order++) {
-            before[order] = now[order];
         }
     }
 }
@@ -139,12 +129,14 @@ HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[])
 static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0}, squares = 0.0;
+    hsep_real now[HSEP_ORDERS] = {0.0}, squares = 0.0;
+    for (int i = 0; i < 3; i++) {
+        hsep_differ(now, self->delta_before[i]);
+    }
     for (hsep_int k = 0; k < splines->preview; k++) {
-        d[3] = hsep_splines_sum(splines, c, count, k);
-        third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        hsep_differ(now, hsep_splines_sum(splines, c, count, k));
+        third[k] = now[3];
         squares += third[k] * third[k];
-        d[0] = d[1], d[1] = d[2], d[2] = d[3];
     }
     return squares;
 }

@@ -107,8 +107,8 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
 /* Begin a bounded plan at this cost, from the coefficients start, (3 + n,), m. The pinned samples stay as they are, and
- * its bounds are what they leave. cost: as hsep_interior_begin has it, 0 at a cost near that of the last plan, which was
- * bounded, too, and ended at start. */
+ * its bounds are what they leave. cost: as hsep_interior_begin has it, 0 where the last plan, which was bounded at a
+ * cost near this one, ended at start. */
 HSEP_API void hsep_planner_bound(
     hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance);
 

@@ -55,16 +55,11 @@ HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real l
 {
     const hsep_int width = 4 * self->spacing;
     const hsep_real *b = hsep_splines_shape(self);
-    hsep_real *e = hsep_at(self, self->differences[order]);
+    hsep_real *e = hsep_at(self, self->differences[order]), now[HSEP_ORDERS] = {0.0};
     self->share[order] = 1.0 / limit;
     for (hsep_int k = 0; k < width + 3; k++) {
-        const hsep_real at[HSEP_ORDERS] = {
-            k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0, k >= 2 && k - 2 < width ? b[k - 2] : 0.0,
-            k >= 3 ? b[k - 3] : 0.0};
-        const hsep_real difference[HSEP_ORDERS] = {
-            at[0], at[0] - at[1], (at[0] - at[1]) - (at[1] - at[2]),
-            ((at[0] - at[1]) - (at[1] - at[2])) - ((at[1] - at[2]) - (at[2] - at[3]))};
-        e[k] = difference[order] * self->share[order];
+        hsep_differ(now, k < width ? b[k] : 0.0);
+        e[k] = now[order] * self->share[order];
     }
 }
 

@@ -28,6 +28,16 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_splines, 12);
 
+/* Differences of orders 0 to 3 at a sample with this value, from those at the sample before, in place. */
+static inline void hsep_differ(hsep_real differences[HSEP_ORDERS], hsep_real value)
+{
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const hsep_real before = differences[order];
+        differences[order] = value;
+        value -= before;
+    }
+}
+
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
 HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing);
 

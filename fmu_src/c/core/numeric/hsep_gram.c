@@ -42,8 +42,7 @@ static void gram_add_row(
     }
 }
 
-/* Add the rows that wait. */
-static void gram_add_waiting(hsep_gram *self)
+HSEP_API void hsep_gram_settle(hsep_gram *self)
 {
     const hsep_int width = self->n + 1;
     hsep_real *x = hsep_at(self, self->rows), *sums = hsep_at(self, self->sums),
@@ -66,7 +65,7 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self)
 {
     if (self->waiting ==
         HSEP_GRAM_TOGETHER) { /* only now: a window's last sample, the fourth mostly, has enough to do */
-        gram_add_waiting(self);
+        hsep_gram_settle(self);
     }
     return hsep_at(self, self->rows) + (self->n + 1) * self->waiting;
 }
@@ -85,15 +84,15 @@ HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i)
     memset(row, 0, (size_t)i * sizeof(hsep_real));
     hsep_gram_fold(self);
     if (i == n) {
-        gram_add_waiting(self);
+        hsep_gram_settle(self);
     }
 }
 
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)
 {
     const hsep_int count = (hsep_int)hsep_triangle(self->n + 1);
-    gram_add_waiting(self);
-    gram_add_waiting(other);
+    hsep_gram_settle(self);
+    hsep_gram_settle(other);
     self->n_rows += weight * other->n_rows;
     hsep_axpy(hsep_at(self, self->sums), weight, hsep_at(other, other->sums), count);
     hsep_axpy(hsep_at(self, self->carries), weight, hsep_at(other, other->carries), count);
@@ -102,14 +101,12 @@ HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
 {
     hsep_real *sums = hsep_at(self, self->sums);
-    gram_add_waiting(self);
+    hsep_gram_settle(self);
     self->n_rows *= weight;
     for (hsep_int i = 0; i < 2 * (hsep_int)hsep_triangle(self->n + 1); i++) { /* carries are behind the sums */
         sums[i] *= weight;
     }
 }
-
-HSEP_API void hsep_gram_settle(hsep_gram *self) { gram_add_waiting(self); }
 
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self)
 {

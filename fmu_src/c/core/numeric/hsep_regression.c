@@ -51,16 +51,8 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real 
 
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
-/* u := u + change; its rounding error is kept in carry and added back next time (Kahan 1965). */
-static inline void regression_add(hsep_real *restrict u, hsep_real *restrict carry, hsep_real change)
-{
-    const hsep_real wanted = change + *carry, sum = *u + wanted;
-    *carry = wanted - (sum - *u);
-    *u = sum;
-}
-
-/* Rotate 4 entries x of the row with 4 entries u of a row of U:  x := x - pivot u,  u := u + gain x.
- * Written out, as regression_add has it, for compilers to make vectors of it. */
+/* Rotate 4 entries x of the row with 4 entries u of a row of U:  x := x - pivot u,  u := u + gain x, whose rounding
+ * error is kept in carry and added back next time (Kahan 1965). Written out for compilers to make vectors of it. */
 static inline void regression_four(hsep_real *restrict u, hsep_real *restrict x, hsep_real pivot, hsep_real gain)
 {
     hsep_real *restrict carry = u + REGRESSION_TILE_ENTRIES;
@@ -124,7 +116,9 @@ static void regression_rotate(
         *u = keep * *u + gain * before;
         *carry = 0.0;
     } else {
-        regression_add(u, carry, gain * *x);
+        const hsep_real wanted = gain * *x + *carry, sum = *u + wanted;
+        *carry = wanted - (sum - *u);
+        *u = sum;
     }
 }
 

@@ -225,40 +225,22 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last)
     self->n_published = last;
 }
 
-/* Samples within the warm-up, of the window and the late ones before it. */
-static hsep_int predictor_warm_up(const hsep_predictor *self, hsep_int late)
+HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self, hsep_int late)
 {
     const hsep_real left = self->n_init - (hsep_real)(self->k - self->k % self->Np) + (hsep_real)late;
     const hsep_int n = self->Np + late;
     return left >= (hsep_real)n ? n : left > 0.0 ? (hsep_int)left : 0;
 }
 
-HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
-
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last)
 {
     const hsep_uncertainty_signals signals = {
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
-        .n_physics = predictor_warm_up(self, self->late),
+        .n_physics = hsep_predictor_warm_up(self, self->late),
         .variance = hsep_residual_variance(hsep_predictor_model(self))};
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
-    }
-}
-
-/* Take in commands and x_pb of the window that begins as they came, eq. (2), behind the late samples' values. */
-static void predictor_open(hsep_predictor *self)
-{
-    const hsep_int Np = self->Np;
-    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    for (hsep_int i = 0; i < Np; i++) {
-        command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
-        past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
-    }
-    /* of the whole window at once, though parts of it are published later */
-    if (!hsep_within(past_x, self->n, HSEP_PREDICTION_MAX) && self->divergence == HSEP_CONVERGES) {
-        self->divergence = HSEP_DIVERGES_X_PB;
     }
 }
 
@@ -311,8 +293,17 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
         memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->p) * sizeof(hsep_real));
     }
     hsep_predictor_begin(self);
-    predictor_open(self);
-    self->n_physics = hsep_predictor_warm_up(self);
+    /* Commands and x_pb as they came, eq. (2), behind the late samples' values */
+    hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    for (hsep_int i = 0; i < Np; i++) {
+        command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
+        past_x[Np - 1 - i] = ahead_pb[i];
+    }
+    /* of the whole window at once, though parts of it are published later */
+    if (!hsep_within(past_x, self->n, HSEP_PREDICTION_MAX) && self->divergence == HSEP_CONVERGES) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    }
+    self->n_physics = hsep_predictor_warm_up(self, 0);
     predictor_go_on(self);
     return 1;
 }

@@ -125,7 +125,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last);
  * being in command. */
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last);
 
-/* Leading samples of the window in the warm-up. */
-HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self);
+/* Leading samples in the warm-up, of the window and so many late ones before it. */
+HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self, hsep_int late);
 
 #endif
