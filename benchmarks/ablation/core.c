@@ -1,6 +1,6 @@
 /* Replay of two runs by a predictor, the second one with what the first one has learned. */
 #include "hsep_predictor.h"
-#include "hsep_range.h"
+#include "hsep_math.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -13,7 +13,7 @@
 #include "hsep_inputs.h"
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
-#include "hsep_range.h"
+#include "hsep_math.h"
 #include "hsep_state.h"
 #include "hsep_table.h"
 #include "hsep_windows.h"

@@ -1,7 +1,6 @@
 #include "hsep_compensator.h"
 
 #include "hsep_math.h"
-#include "hsep_range.h"
 
 #include <stddef.h>
 #include <string.h>

@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 #include "hsep_plan_constants.h"
-#include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include <string.h>

@@ -148,16 +148,6 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
     }
 }
 
-/* Sort the weights of the rows of an order, (preview,): samples that are spacing apart become neighbours. */
-static void splines_sort(const hsep_splines *self, const hsep_real weights[], hsep_real sorted[])
-{
-    for (hsep_int phase = 0; phase < self->spacing; phase++) {
-        for (hsep_int k = phase; k < self->preview; k += self->spacing) {
-            *sorted++ = weights[k];
-        }
-    }
-}
-
 #define SPLINES_TOGETHER 8 /* splines whose products with another one are summed side by side */
 
 /* sums, (count,), count <= SPLINES_TOGETHER: products of splines i ... i + count - 1, each with the spline d behind it.
@@ -192,9 +182,13 @@ HSEP_API void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[])
 {
     const hsep_int n = self->n - first;
-    hsep_real sums[SPLINES_TOGETHER];
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        splines_sort(self, weights + order * self->preview, work + order * self->preview);
+    hsep_real sums[SPLINES_TOGETHER], *sorted = work; /* rows of an order that are spacing apart become neighbours */
+    for (unsigned order = 0; order < HSEP_ORDERS; order++, weights += self->preview) {
+        for (hsep_int phase = 0; phase < self->spacing; phase++) {
+            for (hsep_int k = phase; k < self->preview; k += self->spacing) {
+                *sorted++ = weights[k];
+            }
+        }
     }
     for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
         hsep_real *entry = triangle + d;

@@ -1,7 +1,6 @@
 #include "hsep_gram.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include <stddef.h>

@@ -1,6 +1,9 @@
-/* Functions of C's library for hsep_real: with HSEP_FLOAT32 the functions for float. */
+/* Functions of C's library for hsep_real, with HSEP_FLOAT32 the functions for float; and ranges of numbers. Reentrant;
+ * allocate nothing. */
 #ifndef HSEP_MATH_H
 #define HSEP_MATH_H
+
+#include "hsep_real.h"
 
 #include <math.h>
 
@@ -24,5 +27,24 @@
 #define hsep_sin HSEP_MATH(sin)
 #define hsep_sqrt HSEP_MATH(sqrt)
 #define hsep_tanh HSEP_MATH(tanh)
+
+#define HSEP_PREDICTION_MAX HSEP_HUGE(1e100) /* m, of what is published: sums of squares of less cannot overflow */
+
+/* Whether all entries of a, (n,), are numbers within +- limit. */
+static inline int hsep_within(const hsep_real a[], hsep_int n, hsep_real limit)
+{
+    int within = 1;
+    for (hsep_int i = 0; i < n; i++) {
+        within &= hsep_fabs(a[i]) <= limit; /* NaN is not */
+    }
+    return within;
+}
+
+/* A value within +- bound; bound if it is not a number. */
+static inline hsep_real hsep_clip(hsep_real value, hsep_real bound)
+{
+    const hsep_real below = value < bound ? value : bound;
+    return below > -bound ? below : -bound;
+}
 
 #endif

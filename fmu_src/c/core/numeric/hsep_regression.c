@@ -83,29 +83,7 @@ static inline void regression_sweep(
     }
 }
 
-/* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: that loses nothing when keep is
- * small. */
-static void regression_sweep_large(
-    hsep_real *restrict tile, hsep_real *restrict x, hsep_int n, const hsep_real pivot[4], const hsep_real gain[4],
-    const hsep_real keep[4], const int large[4])
-{
-    for (hsep_int t = 0; t < n; t++, tile += REGRESSION_TILE_STRIDE, x += 4) {
-        for (int r = 0; r < 4; r++) {
-            hsep_real *restrict u = tile + 4 * r;
-            if (!large[r]) {
-                regression_four(u, x, pivot[r], gain[r]);
-                continue;
-            }
-            const hsep_real k = keep[r], g = gain[r], p = pivot[r];
-            const hsep_real u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3], x0 = x[0], x1 = x[1], x2 = x[2], x3 = x[3];
-            u[0] = k * u0 + g * x0, u[1] = k * u1 + g * x1, u[2] = k * u2 + g * x2, u[3] = k * u3 + g * x3;
-            x[0] = x0 - p * u0, x[1] = x1 - p * u1, x[2] = x2 - p * u2, x[3] = x3 - p * u3;
-            memset(u + REGRESSION_TILE_ENTRIES, 0, 4 * sizeof(hsep_real));
-        }
-    }
-}
-
-/* The same for one entry. */
+/* Rotate one entry; u becomes  keep u + gain x  of the x before if large: that loses nothing when keep is small. */
 static void regression_rotate(
     hsep_real *tile, int place, hsep_real *x, hsep_real pivot, hsep_real gain, hsep_real keep, int large)
 {
@@ -119,6 +97,24 @@ static void regression_rotate(
         const hsep_real wanted = gain * *x + *carry, sum = *u + wanted;
         *carry = wanted - (sum - *u);
         *u = sum;
+    }
+}
+
+/* As regression_sweep, where row r is large if large[r]. */
+static void regression_sweep_large(
+    hsep_real *restrict tile, hsep_real *restrict x, hsep_int n, const hsep_real pivot[4], const hsep_real gain[4],
+    const hsep_real keep[4], const int large[4])
+{
+    for (hsep_int t = 0; t < n; t++, tile += REGRESSION_TILE_STRIDE, x += 4) {
+        for (int r = 0; r < 4; r++) {
+            if (!large[r]) {
+                regression_four(tile + 4 * r, x, pivot[r], gain[r]);
+                continue;
+            }
+            for (int c = 0; c < 4; c++) {
+                regression_rotate(tile, 4 * r + c, &x[c], pivot[r], gain[r], keep[r], 1);
+            }
+        }
     }
 }
 

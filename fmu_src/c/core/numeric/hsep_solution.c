@@ -202,42 +202,27 @@ HSEP_API void hsep_solution_complete(hsep_solution *self)
     self->finished = self->completed = 1;
 }
 
-/* Complete the factor without the last row that waits, which becomes the only one. */
-static void solution_complete_but_last(hsep_solution *self)
-{
-    const hsep_int width = self->n_head + self->n_tail + 1;
-    hsep_real *rows = hsep_at(self, self->rows);
-    self->waiting--;
-    const hsep_int last = self->waiting;
-    hsep_solution_complete(self);
-    memmove(rows, rows + width * last, (size_t)width * sizeof(hsep_real));
-    self->waiting = 1;
-}
-
-/* u of the last row, if there is one, and what the weights without it leave of its target. */
-static void solution_last(hsep_solution *self)
-{
-    const hsep_int n = self->n_head + self->n_tail;
-    hsep_real *u = hsep_at(self, self->last);
-    self->last_square = 0.0;
-    if (self->waiting > 0) {
-        memcpy(u, hsep_at(self, self->rows), (size_t)(n + 1) * sizeof(hsep_real));
-        hsep_cholesky_forward(hsep_at(self, self->factor), n + 1, n, u);
-        self->last_square = hsep_dot(u, u, n);
-    }
-}
-
 HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
 {
     const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
-    const hsep_real *penalties = hsep_at(self, self->penalties), *u = hsep_at(self, self->last);
+    const size_t width = (size_t)(n + 1) * sizeof(hsep_real);
+    const hsep_real *penalties = hsep_at(self, self->penalties);
     hsep_real *w = hsep_at(self, self->weights), *x = hsep_at(self, self->work);
-    if (!self->completed && apart && !self->finished && self->waiting > 0) {
-        solution_complete_but_last(self);
+    hsep_real *rows = hsep_at(self, self->rows), *u = hsep_at(self, self->last);
+    if (!self->completed && apart && !self->finished && self->waiting > 0) { /* the last row becomes the only one */
+        const hsep_int last = --self->waiting;
+        hsep_solution_complete(self);
+        memmove(rows, rows + (n + 1) * last, width);
+        self->waiting = 1;
     } else if (!self->completed) {
         hsep_solution_complete(self);
     }
-    solution_last(self);
+    self->last_square = 0.0;
+    if (self->waiting > 0) {
+        memcpy(u, rows, width);
+        hsep_cholesky_forward(hsep_at(self, self->factor), n + 1, n, u);
+        self->last_square = hsep_dot(u, u, n);
+    }
     const int is_one = self->waiting > 0; /* R x = z + u (target - u' z) / (1 + u' u) */
     const hsep_real innovation = is_one ? u[n] : 0.0, gain = innovation / (1.0 + self->last_square);
     const hsep_real *row = hsep_at(self, self->factor);

@@ -1,7 +1,6 @@
 #include "hsep_predictor.h"
 
 #include "hsep_math.h"
-#include "hsep_range.h"
 
 #include <stddef.h>
 #include <string.h>

@@ -1,7 +1,5 @@
 #include "hsep_residual_model.h"
 
-#include "hsep_range.h"
-
 #include <stddef.h>
 
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */

@@ -1,7 +1,6 @@
 #include "hsep_uncertainty.h"
 
 #include "hsep_math.h"
-#include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include <string.h>

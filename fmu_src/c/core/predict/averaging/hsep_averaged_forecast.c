@@ -2,7 +2,6 @@
 #include "hsep_averaged_model.h"
 
 #include "hsep_math.h"
-#include "hsep_range.h"
 
 #include <string.h>
 

@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 #include "hsep_predict_constants.h"
-#include "hsep_range.h"
 
 HSEP_API void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real fastest)
 {
