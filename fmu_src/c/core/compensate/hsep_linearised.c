@@ -138,20 +138,6 @@ static void linearised_pass(
     }
 }
 
-/* A change as x_d, v_d and x. */
-static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, hsep_real T_s)
-{
-    hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
-    hsep_real *commands = hsep_at(self, self->commands);
-    for (hsep_int u = 0; u < self->preview; u++) {
-        commands[1 + u] = u < change->n ? change->commands[u] : 0.0;
-        velocity[u] = (commands[1 + u] - commands[u]) / T_s;
-    }
-    memcpy(
-        hsep_at(self, self->position) + LINEARISED_BEFORE, change->passed, (size_t)self->preview * sizeof(hsep_real));
-    self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
-}
-
 /* Share of an expert in the stack, sample after sample: what shrinking and bounds leave of its recursion. */
 static void linearised_shrink(const hsep_expert *expert, hsep_real weight, hsep_int n, hsep_real shrink[])
 {
@@ -256,7 +242,16 @@ static void linearised_slopes(
 HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
     const hsep_int first = linearised_first(self, model);
-    linearised_signals(self, change, hsep_averaged_disturbances(model)->T_s);
+    const hsep_real T_s = hsep_averaged_disturbances(model)->T_s;
+    hsep_real *commands = hsep_at(self, self->commands); /* the change as x_d, v_d and x */
+    hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
+    hsep_real *position = hsep_at(self, self->position) + LINEARISED_BEFORE;
+    for (hsep_int u = 0; u < self->preview; u++) {
+        commands[1 + u] = u < change->n ? change->commands[u] : 0.0;
+        velocity[u] = (commands[1 + u] - commands[u]) / T_s;
+        position[u] = change->passed[u];
+    }
+    self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
     linearised_command(self, model, change);
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         if (linearised_counts(model, linearised_experts[i])) {
@@ -397,22 +392,6 @@ static void linearised_run(
     }
 }
 
-/* Part of a change that does not pass through the disturbances; the change begins at sample first. */
-static void linearised_begin_column(
-    const hsep_linearised *self, const hsep_averaged *model, hsep_int first, hsep_real column[])
-{
-    const hsep_int count = self->preview - first;
-    const hsep_real *of_command = hsep_at_const(self, self->of_command);
-    const hsep_real *shrinkage = hsep_at_const(self, self->shrinkage) + (self->n - count);
-    memcpy(column, hsep_at_const(self, self->base), (size_t)count * sizeof(hsep_real));
-    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++, shrinkage += self->n, of_command += self->preview) {
-        const int counts = linearised_weight(model, linearised_of_command[i], HSEP_COMMAND_RESIDUAL) > 0.0;
-        for (hsep_int u = 0; counts && u < count; u++) {
-            column[u] += shrinkage[u] * of_command[u];
-        }
-    }
-}
-
 /* Add what an expert, by its place in linearised_experts, makes of the change. */
 static void linearised_add(
     hsep_linearised *self, hsep_averaged *model, hsep_int i, hsep_int first, hsep_int spacing, hsep_int count,
@@ -447,8 +426,17 @@ HSEP_API void hsep_linearised_columns(
     hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
-    for (hsep_int c = 0; c < count; c++) {
-        linearised_begin_column(self, model, first + c * spacing, columns[c]);
+    for (hsep_int c = 0; c < count; c++) { /* what does not pass through the disturbances */
+        const hsep_int length = self->preview - first - c * spacing;
+        const hsep_real *of_command = hsep_at(self, self->of_command);
+        const hsep_real *shrinkage = hsep_at(self, self->shrinkage) + (self->n - length);
+        memcpy(columns[c], hsep_at(self, self->base), (size_t)length * sizeof(hsep_real));
+        for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++, shrinkage += self->n, of_command += self->preview) {
+            const int counts = linearised_weight(model, linearised_of_command[i], HSEP_COMMAND_RESIDUAL) > 0.0;
+            for (hsep_int u = 0; counts && u < length; u++) {
+                columns[c][u] += shrinkage[u] * of_command[u];
+            }
+        }
     }
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         if (linearised_counts(model, linearised_experts[i])) {

@@ -200,12 +200,6 @@ static double plant_disturbed(const hsep_stage *s, double r, double v_d)
     return of->friction_on == HSEP_FRICTION_COMMAND ? r - of->f * tanh(v_d / of->v_friction) : r;
 }
 
-/* The velocity, m/s, with which the command goes on between two instants. */
-static double plant_going_on(const hsep_stage *s, double v_d)
-{
-    return s->settings.input_hold == HSEP_FIRST_ORDER_HOLD ? v_d : 0.0;
-}
-
 /* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it, under a command that goes on by
  * rate, m/s. *v, m/s: a velocity shortly before; that at its beginning. */
 static void plant_stage_internal_step(
@@ -245,17 +239,6 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-/* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v,
- * m/s, is a velocity of the last internal step. */
-static void plant_stage_integrate(const hsep_stage *s, double z[], double acting, double v_d, double time, double *v)
-{
-    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, acting, v_d);
-    const double dt = time / n, rate = plant_going_on(s, v_d);
-    for (double i = 0.0; i < n; i += 1.0) {
-        plant_stage_internal_step(s, z, disturbed + rate * (i * dt), rate, dt, v);
-    }
-}
-
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
     const double r = x_d - self->start;
@@ -271,8 +254,13 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     for (int64_t i = 0; i <= step.n_latched; i++) {
         const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
         if (next > done) {
-            plant_stage_integrate(self, z, acting, v_d, next - done, &v);
-            acting += plant_going_on(self, v_d) * (next - done);
+            const double time = next - done, rate = foh ? v_d : 0.0; /* m/s, with which the command goes on */
+            const double n = plant_internal_steps(time, hsep_stage_rate(self)), dt = time / n;
+            const double disturbed = plant_disturbed(self, acting, v_d);
+            for (double j = 0.0; j < n; j += 1.0) {
+                plant_stage_internal_step(self, z, disturbed + rate * (j * dt), rate, dt, &v);
+            }
+            acting += rate * time;
             done = next;
         }
         if (i < step.n_latched) {

@@ -140,36 +140,30 @@ HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_com
     return (all * all * all - behind * behind * behind) / 6.0 + rows * solution_of_row(self, self->n_head);
 }
 
-/* Take in the last count rows that wait: up to four, with rows of 0 in their place if there are fewer, or one. */
-static void solution_take_in(hsep_solution *self, hsep_int count)
-{
-    const hsep_int width = self->n_head + self->n_tail + 1;
-    hsep_real *work = hsep_at(self, self->work);
-    self->waiting -= count;
-    memcpy(work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
-    if (count > 1) {
-        memset(work + width * count, 0, (size_t)(width * (HSEP_SOLUTION_ABREAST - count)) * sizeof(hsep_real));
-        hsep_cholesky_take_four(hsep_at(self, self->factor), width, self->factored, work);
-    } else if (count == 1) {
-        hsep_cholesky_take_one(hsep_at(self, self->factor), width, self->factored, work);
-    }
-}
-
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)
 {
     const hsep_int width = self->n_head + self->n_tail + 1;
+    hsep_real *factor = hsep_at(self, self->factor), *work = hsep_at(self, self->work);
     while (all || amount > 0.0) {
         const hsep_int left = self->n_head - self->factored, waiting = self->waiting;
         if (waiting >= HSEP_SOLUTION_ABREAST || (all && left == 0 && waiting > 0)) {
             const hsep_int count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
             amount -= (hsep_real)count * solution_of_row(self, self->factored);
-            solution_take_in(self, count);
+            self->waiting -= count;
+            memcpy(
+                work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
+            if (count > 1) { /* with rows of 0 in the place of those that are not there */
+                memset(work + width * count, 0, (size_t)(width * (HSEP_SOLUTION_ABREAST - count)) * sizeof(hsep_real));
+                hsep_cholesky_take_four(factor, width, self->factored, work);
+            } else {
+                hsep_cholesky_take_one(factor, width, self->factored, work);
+            }
         } else if (left > 0) {
             const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
             const hsep_int last = self->factored + count;
             const hsep_real height = (hsep_real)(width - self->factored);
-            (void)hsep_cholesky_rows( /* no pivot is 0 */
-                hsep_at(self, self->factor), width, self->factored, last, hsep_at(self, self->least));
+            /* no pivot is 0 */
+            (void)hsep_cholesky_rows(factor, width, self->factored, last, hsep_at(self, self->least));
             self->factored = last;
             amount -= 0.5 * (hsep_real)count * height * height;
         } else {
