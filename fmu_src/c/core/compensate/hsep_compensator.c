@@ -305,15 +305,6 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Finish a window and begin the next one. */
-static void compensator_next_window(hsep_compensator *self)
-{
-    hsep_predictor *predictor = hsep_compensator_predictor(self);
-    hsep_predictor_finish(predictor);
-    hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-    hsep_compensator_begin(self);
-}
-
 /* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing. */
 static void compensator_monitor(hsep_compensator *self, hsep_real error)
 {
@@ -333,7 +324,9 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
     compensator_monitor(self, (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np]);
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas)) {
-        compensator_next_window(self);
+        hsep_predictor_finish(predictor);
+        hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+        hsep_compensator_begin(self);
         return 1;
     }
     if (predictor->n_published < predictor->Np) {

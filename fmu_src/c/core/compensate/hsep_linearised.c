@@ -141,12 +141,11 @@ static void linearised_pass(
 /* Share of an expert in the stack, sample after sample: what shrinking and bounds leave of its recursion. */
 static void linearised_shrink(const hsep_expert *expert, hsep_real weight, hsep_int n, hsep_real shrink[])
 {
-    const hsep_real *e_h = hsep_at_const(expert, expert->e_h) + n,
-                    *unshrunk = hsep_at_const(expert, expert->unshrunk) + n;
-    const hsep_real *shrinkage = hsep_at_const(expert, expert->shrinkage) + n;
+    const hsep_real *e_h = hsep_at_const(expert, expert->e_h), *unshrunk = hsep_at_const(expert, expert->unshrunk);
     for (hsep_int k = 0; k < n; k++) {
-        e_h--, unshrunk--, shrinkage--;
-        shrink[k] = weight * (*unshrunk == 0.0 ? *shrinkage : *e_h / *unshrunk);
+        const hsep_int j = n - 1 - k;
+        const hsep_real at_zero = hsep_at_const(expert, expert->shrinkage)[j];
+        shrink[k] = weight * (unshrunk[j] == 0.0 ? at_zero : e_h[j] / unshrunk[j]);
     }
 }
 
@@ -331,20 +330,6 @@ static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int f
     linearised_add_stops(self, i, first, c);
 }
 
-/* The disturbances of columns abreast behind G_pb, from rest. */
-static void linearised_filter(hsep_linearised *self, hsep_int count)
-{
-    const hsep_int words = self->filters - self->physics;
-    hsep_physics *filters[HSEP_PHYSICS_ABREAST];
-    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
-        hsep_real *filter = hsep_at(self, self->filters + c * words);
-        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
-        filters[c] = (hsep_physics *)filter;
-    }
-    hsep_physics_abreast(
-        filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
-}
-
 /* The weights of the lags of an expert, each of them as often as a vector has lanes, and zeros behind them. */
 static void linearised_take_lags(hsep_linearised *self, const hsep_expert *expert)
 {
@@ -408,7 +393,14 @@ static void linearised_add(
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
     }
-    linearised_filter(self, padded);
+    const hsep_int words = self->filters - self->physics;
+    hsep_physics *filters[HSEP_PHYSICS_ABREAST]; /* G_pb, each from rest */
+    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
+        filters[c] = (hsep_physics *)hsep_at(self, self->filters + c * words);
+        memcpy(filters[c], hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
+    }
+    hsep_physics_abreast(
+        filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)padded);
     linearised_take_lags(self, expert);
     linearised_run(
         hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),

@@ -185,17 +185,15 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int n = splines->n - first;
-    hsep_real *P = hsep_planner_quadratic(self, first), largest = 0.0;
-    hsep_int place = 0;
+    hsep_real *P = hsep_planner_quadratic(self, first), *diagonal = P, largest = 0.0;
     hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), first, P, hsep_planner_linear(self));
     for (hsep_int i = 0; i < n; i++) {
-        largest = hsep_fmax(largest, P[place]);
-        place += n - i;
+        largest = hsep_fmax(largest, *diagonal);
+        diagonal += n - i;
     }
-    place = 0;
     for (hsep_int i = 0; i < n; i++) {
-        P[place] += HSEP_SPLINES_RIDGE * largest;
-        place += n - i;
+        *P += HSEP_SPLINES_RIDGE * largest;
+        P += n - i;
     }
 }
 
