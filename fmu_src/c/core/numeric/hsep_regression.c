@@ -153,8 +153,6 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
             regression_sweep(tile + REGRESSION_TILE_STRIDE, x + 4, left - 1, pivot, gain);
         } else if (left > 1) {
             regression_sweep_large(tile + REGRESSION_TILE_STRIDE, x + 4, left - 1, pivot, gain, keep, large);
-        } else {
-            self->residual_sum += x[height] * (x[height] / v); /* rho'^2 = rho^2 + x_n^2 / v */
         }
         tile += REGRESSION_TILE_STRIDE * left;
     }
@@ -197,8 +195,7 @@ HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i)
 {
     const hsep_int n = self->n;
     const hsep_real *row = hsep_regression_row(self);
-    if (i == n) {
-        self->residual_sum = row[0] * row[0];
+    if (i == n) { /* rho, which no weight depends on */
         return;
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / hsep_fmax(row[0] * row[0], regression_lambda_min);

@@ -18,17 +18,16 @@
 #include "hsep_real.h"
 
 typedef struct {
-    hsep_int n;             /* features */
-    hsep_int n_tiles;       /* tiles of 4 columns that n features and the target need */
-    hsep_real n_rows;       /* rows so far */
-    hsep_real residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
+    hsep_int n;       /* features */
+    hsep_int n_tiles; /* tiles of 4 columns that n features and the target need */
+    hsep_real n_rows; /* rows so far */
     /* Offsets in words from the beginning of the struct */
     hsep_int inverse_d; /* (4 n_tiles,) 1/D */
     hsep_int row;       /* (4 n_tiles,) the row that comes next */
     hsep_int tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
 } hsep_regression;
 
-HSEP_ASSERT_WORDS(hsep_regression, 7);
+HSEP_ASSERT_WORDS(hsep_regression, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
 HSEP_API hsep_real hsep_regression_size(hsep_int n);
