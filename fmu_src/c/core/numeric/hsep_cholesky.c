@@ -5,34 +5,44 @@
 
 #include <stddef.h>
 
+/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. Apart
+ * from the panel, whose registers are taken. */
+static int cholesky_pivot(hsep_real row[], hsep_int length, const hsep_real *least)
+{
+    if (least != NULL && !(row[0] >= *least)) {
+        row[0] = *least;
+    }
+    if (!(row[0] > 0.0 && row[0] < INFINITY)) {
+        return 0;
+    }
+    const hsep_real root = hsep_sqrt(row[0]), inverse = 1.0 / root;
+    row[0] = root;
+    for (hsep_int j = 1; j < length; j++) {
+        row[j] *= inverse;
+    }
+    return 1;
+}
+
 /* Finish count rows, from row k of n on, from which the rows above have been subtracted; return whether they have
  * pivots. */
 static int cholesky_panel(
     hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_int count, hsep_int length, const hsep_real least[])
 {
     for (hsep_int r = 0; r < count; r++) {
-        hsep_real a[HSEP_CHOLESKY_PANEL], *row = rows[r];
+        hsep_real a[HSEP_CHOLESKY_PANEL];
         const hsep_real *x[HSEP_CHOLESKY_PANEL];
         for (hsep_int above = 0; above < r; above++) {
             x[above] = rows[above] + (r - above);
             a[above] = *x[above];
         }
         if (r >= 4) {
-            hsep_take_four(row, a, x, length - r);
+            hsep_take_four(rows[r], a, x, length - r);
         }
         for (hsep_int above = r - r % 4; above < r; above++) {
-            hsep_axpy(row, -a[above], x[above], length - r);
+            hsep_axpy(rows[r], -a[above], x[above], length - r);
         }
-        if (least != NULL && !(row[0] >= least[r])) {
-            row[0] = least[r];
-        }
-        if (!(row[0] > 0.0 && row[0] < INFINITY)) {
+        if (!cholesky_pivot(rows[r], length - r, least != NULL ? least + r : NULL)) {
             return 0;
-        }
-        const hsep_real root = hsep_sqrt(row[0]), inverse = 1.0 / root;
-        row[0] = root;
-        for (hsep_int j = 1; j < length - r; j++) {
-            row[j] *= inverse;
         }
     }
     return 1;

@@ -19,9 +19,8 @@ typedef hsep_real hsep_lanes;
 
 #define HSEP_LANES_MOST 2 /* whatever the compiler has: blocks are the same */
 
-/* Vectors that hold four numbers, or two. */
+/* Vectors that hold four numbers. */
 #define HSEP_OF_FOUR (4 / HSEP_LANES)
-#define HSEP_OF_TWO (2 / HSEP_LANES)
 
 /* The vectors that begin at a number, in any alignment of numbers. */
 static inline hsep_lanes *hsep_lanes_at(hsep_real *a) { return (hsep_lanes *)(void *)a; }
@@ -47,28 +46,35 @@ static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_
     return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
-/* sums_c := sum_i a_i b_c,i of four arrays side by side, all (n,): a is loaded once for all. */
+/* sums_c := sum_i a_i b_c,i of four arrays side by side, all (n,): a is loaded once for all. Each sum has a name, as
+ * compilers keep no array of them in registers: without, a predictor's dearest sample is 8 % dearer on a Cortex-M7. */
 static inline void hsep_dot_four(const hsep_real a[], const hsep_real *const b[4], hsep_int n, hsep_real sums[4])
 {
-    hsep_lanes s[4][HSEP_OF_TWO];
+    const hsep_real *b0 = b[0], *b1 = b[1], *b2 = b[2], *b3 = b[3];
     hsep_int i = 0;
-    memset(s, 0, sizeof s);
+#if HSEP_LANES == 2
+    hsep_lanes s0 = {0.0}, s1 = {0.0}, s2 = {0.0}, s3 = {0.0};
     for (; i + 2 <= n; i += 2) {
-        const hsep_lanes *x = hsep_lanes_const(a + i);
-        for (int l = 0; l < HSEP_OF_TWO; l++) {
-            s[0][l] += x[l] * hsep_lanes_const(b[0] + i)[l];
-            s[1][l] += x[l] * hsep_lanes_const(b[1] + i)[l];
-            s[2][l] += x[l] * hsep_lanes_const(b[2] + i)[l];
-            s[3][l] += x[l] * hsep_lanes_const(b[3] + i)[l];
-        }
+        const hsep_lanes x = *hsep_lanes_const(a + i);
+        s0 += x * *hsep_lanes_const(b0 + i);
+        s1 += x * *hsep_lanes_const(b1 + i);
+        s2 += x * *hsep_lanes_const(b2 + i);
+        s3 += x * *hsep_lanes_const(b3 + i);
     }
-    for (int c = 0; c < 4; c++) {
-        hsep_real two[2];
-        memcpy(two, s[c], sizeof two);
-        sums[c] = two[0] + two[1];
-        if (i < n) {
-            sums[c] += a[i] * b[c][i];
-        }
+    sums[0] = s0[0] + s0[1], sums[1] = s1[0] + s1[1], sums[2] = s2[0] + s2[1], sums[3] = s3[0] + s3[1];
+#else
+    hsep_real s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0, t0 = 0.0, t1 = 0.0, t2 = 0.0, t3 = 0.0;
+    for (; i + 2 <= n; i += 2) {
+        s0 += a[i] * b0[i], t0 += a[i + 1] * b0[i + 1];
+        s1 += a[i] * b1[i], t1 += a[i + 1] * b1[i + 1];
+        s2 += a[i] * b2[i], t2 += a[i + 1] * b2[i + 1];
+        s3 += a[i] * b3[i], t3 += a[i + 1] * b3[i + 1];
+    }
+    sums[0] = s0 + t0, sums[1] = s1 + t1, sums[2] = s2 + t2, sums[3] = s3 + t3;
+#endif
+    for (; i < n; i++) {
+        sums[0] += a[i] * b0[i], sums[1] += a[i] * b1[i];
+        sums[2] += a[i] * b2[i], sums[3] += a[i] * b3[i];
     }
 }
 
