@@ -14,7 +14,6 @@
 #define _POSIX_C_SOURCE 200809L
 #endif
 
-#include "hsep_encoder.h"
 #include "hsep_fmu.h"
 #include "hsep_table.h"
 #include "hsep_plant.h"

@@ -9,7 +9,6 @@
 #if defined(HSEP_MODEL_FEED_DRIVE) || defined(HSEP_MODEL_STAGE_DRIVE)
 
 #include "hsep_check.h"
-#include "hsep_encoder.h"
 #include "hsep_plant.h"
 #include "hsep_state.h"
 #include "hsep_table.h"

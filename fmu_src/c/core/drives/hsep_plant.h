@@ -1,4 +1,4 @@
-/* Nonlinear feed drives: eq. (13), and a stage with friction and cable stiffness.
+/* Nonlinear feed drives, eq. (13), and a stage with friction and cable stiffness; and their position sensor.
  *
  * The command is held over a step; states are relative to the initial position. Classical
  * Runge-Kutta of order 4 in internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant;
@@ -102,5 +102,20 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
 HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
+
+/* Position sensor with Gaussian noise from a portable generator: SplitMix64 (Steele, Lea and Flood 2014) gives two
+ * uniform numbers per sample, the Box-Muller transform (1958) one normal number. */
+typedef struct {
+    double noise_std; /* m, >= 0 */
+    uint64_t seed;
+    uint64_t n_draws; /* so far */
+} hsep_encoder;
+
+HSEP_ASSERT_WORDS(hsep_encoder, 3);
+
+HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
+
+/* Return one measurement of the position x, m. Constant cost; cannot fail. */
+HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x);
 
 #endif
