@@ -195,6 +195,34 @@ HSEP_API void hsep_physics_from_rest(hsep_physics *self, const hsep_real x_d[], 
     }
 }
 
+/* Add the responses of one mode of count models to n samples of the signals u, their states in registers: a function
+ * of its own, as compilers believe restrict of parameters alone. */
+static void physics_respond_abreast(
+    hsep_physics *const models[], size_t count, hsep_int mode, const hsep_real *restrict u, hsep_real *restrict x,
+    size_t n)
+{
+    const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
+    const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
+    const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d;
+    hsep_real s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
+    for (size_t i = 0; i < count; i++) {
+        s0[i] = physics_modes(models[i])[mode].s[0];
+        s1[i] = physics_modes(models[i])[mode].s[1];
+    }
+    for (size_t k = 0; k < n; k++, u += HSEP_PHYSICS_ABREAST, x += HSEP_PHYSICS_ABREAST) {
+        for (size_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
+            const hsep_real next = a00 * s0[i] + a01 * s1[i] + b0 * u[i];
+            x[i] += c0 * s0[i] + c1 * s1[i] + d * u[i];
+            s1[i] = a10 * s0[i] + a11 * s1[i] + b1 * u[i];
+            s0[i] = next;
+        }
+    }
+    for (size_t i = 0; i < count; i++) {
+        physics_modes(models[i])[mode].s[0] = s0[i];
+        physics_modes(models[i])[mode].s[1] = s1[i];
+    }
+}
+
 HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, hsep_real u[], hsep_real x[], size_t n)
 {
     for (size_t i = 0; i < count && models[i]->dead_time > 0; i++) {
@@ -204,26 +232,7 @@ HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, h
         }
     }
     memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(hsep_real));
-    for (hsep_int mode = 0; mode < models[0]->n_modes; mode++) { /* the states in registers */
-        const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
-        const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
-        const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d, *restrict from = u;
-        hsep_real s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0}, *restrict to = x;
-        for (size_t i = 0; i < count; i++) {
-            s0[i] = physics_modes(models[i])[mode].s[0];
-            s1[i] = physics_modes(models[i])[mode].s[1];
-        }
-        for (size_t k = 0; k < n; k++, from += HSEP_PHYSICS_ABREAST, to += HSEP_PHYSICS_ABREAST) {
-            for (size_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-                const hsep_real next = a00 * s0[i] + a01 * s1[i] + b0 * from[i];
-                to[i] += c0 * s0[i] + c1 * s1[i] + d * from[i];
-                s1[i] = a10 * s0[i] + a11 * s1[i] + b1 * from[i];
-                s0[i] = next;
-            }
-        }
-        for (size_t i = 0; i < count; i++) {
-            physics_modes(models[i])[mode].s[0] = s0[i];
-            physics_modes(models[i])[mode].s[1] = s1[i];
-        }
+    for (hsep_int mode = 0; mode < models[0]->n_modes; mode++) {
+        physics_respond_abreast(models, count, mode, u, x, n);
     }
 }
