@@ -149,16 +149,6 @@ HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real wo
     return 1;
 }
 
-/* Whether the hybrid model may plan the window that begins. */
-static int compensator_averages(hsep_compensator *self)
-{
-    hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    return self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
-           hsep_paper_regression(hsep_residual_paper(hsep_predictor_model(predictor)))->n_rows > 0.0 &&
-           hsep_has_stable_poles(&recursion, hsep_at(self, self->trial_e));
-}
-
 /* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from
  * differences. */
 static hsep_int compensator_pinned(hsep_compensator *self)
@@ -239,9 +229,12 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
 static int compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
+    hsep_paper *paper = hsep_residual_paper(hsep_predictor_model(predictor));
+    const hsep_recursion recursion = hsep_paper_recursion(paper, 0);
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
-    if (compensator_averages(self)) {
+    if (self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
+        hsep_paper_regression(paper)->n_rows > 0.0 && hsep_has_stable_poles(&recursion, hsep_at(self, self->trial_e))) {
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {

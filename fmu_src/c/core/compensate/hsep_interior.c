@@ -291,8 +291,8 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     a.slacks.rho = self->rho;
     a.slacks.sides = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_int begin, end;
-        hsep_splines_touched(splines, self->first, order, &begin, &end);
+        const hsep_int begin = self->first * splines->spacing + 1; /* a spline begins with 0 */
+        const hsep_int end = (splines->n + 3) * splines->spacing + order;
         a.slacks.range[order].begin = begin + order * splines->preview;
         a.slacks.range[order].end = end + order * splines->preview;
         a.slacks.sides += 2.0 * (hsep_real)(end - begin);

@@ -121,13 +121,6 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     }
 }
 
-HSEP_API void hsep_splines_touched(
-    const hsep_splines *self, hsep_int first, unsigned order, hsep_int *begin, hsep_int *end)
-{
-    *begin = first * self->spacing + 1; /* a spline begins with 0 */
-    *end = (self->n - 1) * self->spacing + splines_length(self, order);
-}
-
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[])
 {
     const hsep_real *b = hsep_splines_shape(self);

@@ -57,10 +57,6 @@ HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
 HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[]);
 
-/* Row samples that the splines first ... n - 1 touch, of an order: *begin ... *end - 1. */
-HSEP_API void hsep_splines_touched(
-    const hsep_splines *self, hsep_int first, unsigned order, hsep_int *begin, hsep_int *end);
-
 /* g, (n - first,), += A' rows: the transpose of hsep_splines_rows, whose matrix is A. The rows are
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
