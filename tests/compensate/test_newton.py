@@ -199,8 +199,8 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
 @pytest.mark.slow
 def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles() -> None:
     sep = SepCompensator.from_bytes(learned())
-    sep.change(change_max=2e-4)
-    away = run(sep, sensor=no_faster(0.05), t_init=0.0)
+    sep.change(change_max=1e-4)
+    away = run(sep, sensor=no_faster(0.045), t_init=0.0)
     windows = away.state[: len(away.state) // 50 * 50].reshape(-1, 50)[:, -1] == SepState.HYBRID
     first = int(np.argmin(windows))
     assert 1 <= first < 5
@@ -215,7 +215,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles() 
     assert sep.plan(moves()[:200]).state is SepState.HYBRID
     free = SepCompensator.from_bytes(learned())
     free.change(change_max=None)  # no bound, no plan at it
-    found = cosimulate(free, STAGE.new_plant(), moves()[: 50 * first + 100], sensor=no_faster(0.05), t_init=0.0)
+    found = cosimulate(free, STAGE.new_plant(), moves()[: 50 * first + 100], sensor=no_faster(0.045), t_init=0.0)
     assert (found.state[50 * first :] == SepState.HYBRID).any()
 
 

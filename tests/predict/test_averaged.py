@@ -13,7 +13,8 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, MODEL_RESIDUAL, STATIC
+from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, HOLD, MODEL_RESIDUAL, STATIC
+from hybridsep.predict.averaging.model import AveragedForecast
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-7  # m
@@ -156,7 +157,7 @@ def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
 
 def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     """The last residual may not have been learned; the expert that holds it predicts 1.2 times the largest one."""
-    x_d = cycles(3000)
+    x_d = np.linspace(0.0, 3e-2, 3000)
     rng = np.random.default_rng(5)
     x = physics(x_d) + 1e-5 + np.cumsum(1e-7 * rng.normal(size=3000))  # an offset that drifts, which a hold predicts
     predictor = averaged()
@@ -165,6 +166,21 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     averaged_model(predictor).run.past[MODEL_RESIDUAL][0] = 1.0
     largest = averaged_model(predictor).learned.scales[MODEL_RESIDUAL].largest
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * (1.0 + 1e-12) * largest < 1e-4
+
+
+@pytest.mark.parametrize("direction", [-1.0, 0.0, 1.0])
+def test_nothing_is_held_where_the_command_turns(direction: float) -> None:
+    """Friction of one direction looks like an offset, which behind a reversal is twice as wrong as nothing."""
+    steps = 1e-5 * np.concatenate((np.ones(500), np.zeros(1250), np.full(50, direction)))
+    x_d, predictor = np.cumsum(steps), averaged()
+    run(predictor, x_d[:1700], physics(x_d)[:1700] + FRICTION)
+    predictor.predict(x_d[1700:])
+    pending = predictor.pending
+    assert pending is not None
+    assert isinstance(pending.forecast, AveragedForecast)
+    held = pending.forecast.stacked[HOLD.place]
+    np.testing.assert_allclose(held[:50], FRICTION, rtol=1e-3)
+    np.testing.assert_allclose(held[60:75], 0.0 if direction < 0.0 else FRICTION, rtol=1e-3, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -343,11 +343,12 @@ class Expert(ABC):
 
 @dataclass(frozen=True)
 class Hold(Expert):
-    """The last residual."""
+    """The last residual, as long as the command does not turn: most of it is friction, which turns with it."""
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return it within the bound."""
-        return min(max(at.last, -at.bound), at.bound)
+        turned = at.model.static.turned(at.model.run.static, at.rows)
+        return np.asarray(min(max(at.last, -at.bound), at.bound) * (1.0 - turned))
 
 
 @dataclass(frozen=True)

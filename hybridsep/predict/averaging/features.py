@@ -227,6 +227,13 @@ class StaticFeatures:
             v = v + np.diff(e, prepend=e[:1])
         return np.asarray(v / self.discrete.T_s)
 
+    def turned(self, state: StaticState, rows: Array) -> Array:
+        """Return how far the command of a window goes against the motion before it, ``(n,)``, from 0 to 1.
+
+        The sharpest friction is the direction now, the shortest stop operator that of the last motion, rests or not.
+        """
+        return np.asarray(np.clip(-rows[:, 2 + self.n_differences] * state.filtered[N_FRICTION], 0.0, 1.0))
+
     def angle(self, x: Array | float) -> Array:
         """Return the angle within the period at a position, rad."""
         return np.asarray(2.0 * np.pi / self.period * x)

@@ -120,6 +120,18 @@ static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hse
     }
 }
 
+/* What is held at places begin ... end - 1: the last residual, m, as long as the command does not turn. */
+static void averaged_hold(hsep_averaged *self, hsep_real last, hsep_int begin, hsep_int end)
+{
+    const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    const hsep_real *rows = hsep_at(self, self->rows), hold = hsep_clip(last, self->bound);
+    hsep_real *stacked = hsep_at(self, self->stacked) + HSEP_HOLD * self->n;
+    for (hsep_int j = begin; j < end; j++) {
+        const hsep_real *row = rows + (self->n - 1 - j) * disturbances->n;
+        stacked[j] = hold * (1.0 - hsep_disturbances_turned(disturbances, row));
+    }
+}
+
 /* What an expert that has predicted adds to the physics model, m, at places begin ... end - 1. */
 static void averaged_take(hsep_averaged *self, hsep_int place, const hsep_real x_pb[], hsep_int begin, hsep_int end)
 {
@@ -202,6 +214,7 @@ HSEP_API void hsep_averaged_go_on(
             averaged_take(self, i, x_pb, begin, end);
         }
     }
+    averaged_hold(self, e[self->n], begin, end);
     averaged_stack(self, e, begin, end);
 }
 
@@ -213,14 +226,9 @@ HSEP_API void hsep_averaged_forecast(
     const hsep_real before = self->learned.largest_step;
     self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
     self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_GROWTH) : 1.0;
-    const hsep_real hold = hsep_clip(e[self->n], self->bound);
     averaged_solve(self, outgrown);
     self->settled = 0;
-    hsep_real *stacked = hsep_at(self, self->stacked); /* hold, and what knows nothing */
-    memset(stacked, 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
-    for (hsep_int j = 0; j < self->n; j++) {
-        stacked[HSEP_HOLD * self->n + j] = hold;
-    }
+    memset(hsep_at(self, self->stacked), 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
     averaged_recall(self, e[self->n]);
     averaged_begin(self, x_d, e + self->n);
     hsep_averaged_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */

@@ -215,6 +215,12 @@ HSEP_API hsep_real hsep_disturbances_damped_velocity(
     return step / self->T_s;
 }
 
+HSEP_API hsep_real hsep_disturbances_turned(const hsep_disturbances *self, const hsep_real row[])
+{
+    const hsep_real turned = -row[2 + self->n_differences] * self->before.filtered[HSEP_FEATURES_N_FRICTION];
+    return hsep_fmin(hsep_fmax(turned, 0.0), 1.0);
+}
+
 HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x)
 {
     return self->period > 0.0 ? HSEP_TWO_PI / self->period * (self->origin + x) : 0.0;

@@ -79,6 +79,10 @@ HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int first, hsep_int last,
     hsep_real rows[]);
 
+/* How far the command of a row goes against the motion before the window, 0 ... 1: the sharpest friction is the
+ * direction now, the shortest stop operator that of the last motion. */
+HSEP_API hsep_real hsep_disturbances_turned(const hsep_disturbances *self, const hsep_real row[]);
+
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
