@@ -95,6 +95,9 @@ VARIANTS: Mapping[str, Changes] = {
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(warm_windows_max=3.0)),
     "earlier runs never forgotten": constants(discard_above=2.0),
     "A's bound does not grow": {FORECAST: [("growth = before > 0.0 ?", "growth = before < 0.0 ?")]},
+    "hold goes on where the command turns": {
+        FORECAST: [("(1.0 - hsep_disturbances_turned(disturbances, row))", "((void)row, 1.0)")]
+    },
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no recall": {

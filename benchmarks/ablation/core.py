@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import TypeVar
 
 import numpy as np
+from c_library import AveragingPart, Mode, PredictorPart
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -41,34 +42,15 @@ Changes = Mapping[str, Sequence[tuple[str, str]]]
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
-class _Mode(ctypes.Structure):
-    _fields_ = tuple((name, ctypes.c_double) for name in ("f_n", "zeta", "alpha", "beta"))
-
-
-class _Settings(ctypes.Structure):
-    _fields_ = (
-        *((name, ctypes.c_uint64) for name in ("Np", "p", "q")),
-        *((name, ctypes.c_double) for name in ("lambda", "T_s", "t_init")),
-        *((name, ctypes.c_uint64) for name in ("input_hold", "measurement_delay", "dead_time")),
-    )
-
-
-class _Averaging(ctypes.Structure):
-    _fields_ = (
-        ("averaging", ctypes.c_uint64),
-        *((name, ctypes.c_double) for name in ("effect", "noise_std", "forgetting", "period")),
-    )
-
-
 class _Parameters(ctypes.Structure):
     _fields_ = (
-        ("settings", _Settings),
-        ("averaging", _Averaging),
+        ("settings", PredictorPart),
+        ("averaging", AveragingPart),
         ("preview", ctypes.c_uint64),
         ("n_init", ctypes.c_double),
         ("planned", ctypes.c_int),
         ("n_modes", ctypes.c_uint64),
-        ("modes", ctypes.POINTER(_Mode)),
+        ("modes", ctypes.POINTER(Mode)),
     )
 
 
@@ -76,7 +58,7 @@ class _Run(ctypes.Structure):
     _fields_ = (("n", ctypes.c_uint64), *((name, _DOUBLES) for name in ("x_d", "x", "x_h", "std")))
 
 
-_Filled = TypeVar("_Filled", _Settings, _Averaging)
+_Filled = TypeVar("_Filled", PredictorPart, AveragingPart)
 
 
 class CoreVariant:
@@ -130,9 +112,15 @@ class CoreVariant:
             If a prediction diverges.
         """
         fmi = {**settings.to_fmi(), "dead_time": model.dead_time, "averaging": 1}
-        modes = (_Mode * len(model.modes))(*(_Mode(one.f_n, one.zeta, one.alpha, one.beta) for one in model.modes))
+        modes = (Mode * len(model.modes))(*(Mode(one.f_n, one.zeta, one.alpha, one.beta) for one in model.modes))
         parameters = _Parameters(
-            _filled(_Settings, fmi), _filled(_Averaging, fmi), settings.Np, float(settings.Np), 0, len(modes), modes
+            _filled(PredictorPart, fmi),
+            _filled(AveragingPart, fmi),
+            settings.Np,
+            float(settings.Np),
+            0,
+            len(modes),
+            modes,
         )
         signals = [
             [np.ascontiguousarray(one, dtype=np.float64) for one in (x_d, x, np.zeros(len(x_d)), np.zeros(len(x_d)))]
