@@ -38,7 +38,7 @@ N_COMPONENTS = 1 + len(_SHARES)
 _UNKNOWN_NOISE = 25.0
 """First variance of a noise that is not known, relative to λ."""
 
-_FELT_FOR = 0.2
+_FELT_FOR = 0.1
 """Time constant of the averaging of timing and variance of the experts, in windows."""
 
 _LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4
@@ -59,14 +59,14 @@ _OUTLYING, _VANISHING = 16.0, 0.01
 _RECENT = 0.9
 """Factor by which the mean square of the residual fades from window to window."""
 
-_MEMORY, _FIRST_EVIDENCE, _STEP = 0.97, 0.2, 6.0
+_MEMORY, _FIRST_EVIDENCE, _STEP = 0.97, 1.0, 6.0
 """Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
 step of expectation maximisation, which alone would be slow where components are alike."""
 
 _LEVELS = ((0.6745, 0.5), (1.645, 0.1), (1.96, 0.05))
 """Standard deviations, and the probability that a normal error exceeds them."""
 
-_FACTOR_RATE, _FACTOR_MAX = 0.03, 4.0
+_FACTOR_RATE, _FACTOR_MAX = 0.1, 4.0
 """Change of ``ln c`` in the middle of a window from one window to the next per share of errors; bound on it."""
 
 _RATIO, _RATIO_RATE, _RATIO_MAX = 1.2, 0.8, 16.0
