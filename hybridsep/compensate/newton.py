@@ -155,6 +155,11 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
+    def outgrows(self, share: float) -> bool:
+        """Return whether it moves faster under the remainder of the last plan than ``share`` times all measured."""
+        steps = np.abs(np.diff(self.of_previous_plan.window.x_pb))
+        return not steps.max() <= share * self._model.learned.fastest
+
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
         return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)

@@ -2,7 +2,8 @@
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan, which fades
-to no change. Where its own plan runs away, it plans none for a time.
+to no change. Where its own plan runs away, it plans none for a time. A motion faster than all that were measured is
+compensated with half of the largest change.
 """
 
 from __future__ import annotations
@@ -187,11 +188,10 @@ class Planning(ABC):
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((previous_plan[:N_DECIDED], found.x))
 
-    def limits(self, preview: Preview, *, may_turn: bool = False) -> Bounds:
-        """Return the drive's limits on the coefficients of a plan."""
-        return self.bounds.bounds(
-            preview.command, preview.x_d_before, preview.delta_before, preview.previous_plan, may_turn=may_turn
-        )
+    def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
+        """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
+        before = preview.x_d_before, preview.delta_before, preview.previous_plan
+        return self.bounds.bounds(preview.command, *before, may_turn=may_turn, change=change)
 
 
 _PINNED_PAPER = 8
@@ -272,6 +272,11 @@ RETRY = 0.5
 """Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
 each further one of a run."""
 
+_FASTER, _UNPROVEN = 1.25, 0.5
+"""Speed of the preview, relative to the fastest motion that was measured, above which plans may change the command by
+this share of ``change_max`` only. That is twice the largest error without compensation, as advised: where a model that
+has not been compared with such a motion asks for more than the error, it is wrong."""
+
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -313,7 +318,8 @@ class AveragedPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.preview)
-        physics = self.affine_plan(g, free, preview, self.limits(preview), TOLERANCE)
+        change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
+        physics = self.affine_plan(g, free, preview, self.limits(preview, change=change), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if predictor.k < predictor.n_init or not model.has_learned:
@@ -322,7 +328,7 @@ class AveragedPlanning(Planning):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             of_physics, is_away, values = planner.cost(physics), False, self.basis.values[: self.Np]
             if most is SepState.HYBRID and not self.paused:
-                bounds = self.limits(preview, may_turn=True)
+                bounds = self.limits(preview, may_turn=True, change=change)
                 hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(cost, of_physics):
                     deltas, error = (values @ hybrid, values @ physics), math.sqrt(cost / self.preview)

@@ -305,7 +305,14 @@ class DriveBounds:
         self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
 
     def bounds(
-        self, x_d: Array, x_d_before: Array, delta_before: Array, previous_plan: Array, *, may_turn: bool = False
+        self,
+        x_d: Array,
+        x_d_before: Array,
+        delta_before: Array,
+        previous_plan: Array,
+        *,
+        may_turn: bool = False,
+        change: float = 1.0,
     ) -> Bounds:
         """Return the bounds on the free coefficients of a plan.
 
@@ -319,6 +326,8 @@ class DriveBounds:
             Coefficients of the remainder of the last plan, the decided ones first.
         may_turn : bool
             Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
+        change : float
+            Share of ``change_max`` that bounds ``|δ|``.
         """
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
         command = np.concatenate((x_d_before, x_d)) + past
@@ -328,7 +337,7 @@ class DriveBounds:
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
         offset = offset + self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
         at_rest = self._free @ previous_plan[N_DECIDED:]
-        most = np.full(len(offset), 1.0 - _ROUNDING)
+        most = np.repeat([(1.0 - _ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
         least = -most
         if self._no_reversal and not may_turn:
             steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.compensate.newton import PlanModel
-from hybridsep.compensate.planning import RETRY, runs_away
+from hybridsep.compensate.planning import RETRY, AveragedPlanning, ChosenPlan, runs_away
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
@@ -197,26 +198,35 @@ def no_faster(velocity: float) -> Callable[[int, float], float]:
 
 
 @pytest.mark.slow
-def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles() -> None:
+def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen: list[tuple[int, ChosenPlan]] = []
+    choose = AveragedPlanning.choose
+
+    def recorded(self: AveragedPlanning, *arguments: Any) -> ChosenPlan:
+        plan = choose(self, *arguments)
+        chosen.append((self.paused, plan))
+        return plan
+
+    monkeypatch.setattr(AveragedPlanning, "choose", recorded)
     sep = SepCompensator.from_bytes(learned())
-    sep.change(change_max=1e-4)
-    away = run(sep, sensor=no_faster(0.045), t_init=0.0)
-    windows = away.state[: len(away.state) // 50 * 50].reshape(-1, 50)[:, -1] == SepState.HYBRID
-    first = int(np.argmin(windows))
-    assert 1 <= first < 5
-    ends = np.flatnonzero(np.diff(windows[first:].astype(int)))[:3] + 1 + first
+    sep.change(change_max=1.5e-4)
+    run(sep, sensor=no_faster(0.03), t_init=0.0)
+    away = [i for i, (_, plan) in enumerate(chosen) if plan.runs_away]
     pause = round(RETRY / (50 * TS))
-    assert ends[0] - first == pause + 1  # with the window whose plan ran away
-    assert not windows[ends[1] : ends[1] + 2 * pause + 1].any()
+    assert [chosen[i + 1][0] for i in away] == [pause, 2 * pause]
+    assert all(plan.state is not SepState.HYBRID for paused, plan in chosen if paused > 0)
     restored = SepCompensator.from_bytes(sep.to_bytes())
     for one in (sep, restored):
         assert one.plan(np.full(200, 0.007)).state is not SepState.HYBRID
+    assert chosen[-2][0] == chosen[-1][0] > 0
     sep.restart(0.0)  # another run
-    assert sep.plan(moves()[:200]).state is SepState.HYBRID
+    sep.plan(moves()[:200])
+    assert chosen[-1][0] == 0
     free = SepCompensator.from_bytes(learned())
     free.change(change_max=None)  # no bound, no plan at it
-    found = cosimulate(free, STAGE.new_plant(), moves()[: 50 * first + 100], sensor=no_faster(0.045), t_init=0.0)
-    assert (found.state[50 * first :] == SepState.HYBRID).any()
+    chosen.clear()
+    run(free, sensor=no_faster(0.03), t_init=0.0)
+    assert not any(plan.runs_away for _, plan in chosen)
 
 
 @pytest.mark.parametrize(

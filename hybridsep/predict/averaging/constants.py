@@ -30,6 +30,9 @@ class AveragingConstants:
     last_lag : float
         Prior variance of the weight of the last lag, and of the command's last increment, relative to the first
         one's: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
+    early : int
+        Samples by which the command may act before the physics model's dead time is over: one that is two samples too
+        long, which no weight can mend, leaves 1.7 times the error of no compensation on a warm drive, instead of 0.25.
     least_noise : float
         Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
         would prevent any learning.
@@ -81,6 +84,7 @@ class AveragingConstants:
     gamma: float = 0.95
     lags_of_command: int = 36
     last_lag: float = 0.005
+    early: int = 2
     least_noise: float = 1e-6
     first_noise: float = 0.01
     correlation_max: float = 100.0

@@ -48,7 +48,7 @@ class CommandFeatures:
     Attributes
     ----------
     dead_time : int
-        Of the physics model, in samples.
+        Samples before the command may act.
     """
 
     dead_time: int

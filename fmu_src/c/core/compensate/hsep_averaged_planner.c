@@ -40,6 +40,18 @@ static void averaged_planner_command(
     }
 }
 
+/* Whether the preview, whose commands were set last, moves faster than what was measured. */
+static int averaged_planner_outgrows(const hsep_averaged_planner *self, const hsep_averaged_task *task)
+{
+    const hsep_real *x_pb = hsep_at_const(self, self->x_pb);
+    const hsep_real most = HSEP_PLANNING_FASTER * task->model->learned.fastest;
+    hsep_real fastest = 0.0;
+    for (hsep_int j = 1; j < self->preview + self->late; j++) {
+        fastest = hsep_fmax(fastest, hsep_fabs(x_pb[j - 1] - x_pb[j]));
+    }
+    return !(fastest <= most);
+}
+
 /* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
  * hsep_averaged_go_on has it. */
 static void averaged_planner_predict(
@@ -484,6 +496,7 @@ HSEP_API void hsep_averaged_planner_begin(
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
+    task->planner->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(

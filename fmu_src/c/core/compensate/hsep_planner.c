@@ -45,6 +45,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 {
     memset(self, 0, (size_t)hsep_planner_size(parameters));
     (void)planner_lay_out(self, parameters);
+    self->change = 1.0;
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
@@ -82,7 +83,7 @@ HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real
 {
     const hsep_int preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
-    *most = 1.0 - HSEP_QP_ROUNDING;
+    *most = (1.0 - HSEP_QP_ROUNDING) * (r < preview ? self->change : 1.0);
     *least = -*most;
     if (r >= preview && r < 2 * preview) { /* velocities */
         const hsep_real moves = hsep_at_const(self, self->moves)[r - preview];

@@ -32,6 +32,7 @@ typedef struct {
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
     hsep_real jerk_weight;
+    hsep_real change;                         /* share of the limit of |delta| that bounds it */
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     /* Offsets in words from the beginning of the struct */
     hsep_int c;      /* (3 + n,) m, coefficients */
@@ -43,7 +44,7 @@ typedef struct {
     hsep_int splines, interior;
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 18);
+HSEP_ASSERT_WORDS(hsep_planner, 19);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)

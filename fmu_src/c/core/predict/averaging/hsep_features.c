@@ -272,8 +272,8 @@ HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_
     const hsep_int n = parameters->n;
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
-    self->dead_time = settings->dead_time;
-    self->n_before = settings->dead_time + HSEP_AVERAGING_LAGS_OF_COMMAND + 1;
+    self->dead_time = settings->dead_time > HSEP_AVERAGING_EARLY ? settings->dead_time - HSEP_AVERAGING_EARLY : 0;
+    self->n_before = self->dead_time + HSEP_AVERAGING_LAGS_OF_COMMAND + 1;
     self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)self->n_before);
     self->rows = hsep_take(&end, (hsep_real)n * HSEP_COMMAND_FEATURES);
     return end * sizeof(hsep_real);
