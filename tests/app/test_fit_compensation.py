@@ -114,7 +114,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
-@pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.033}, 15), (0.0022, {}, 0.5)])
+@pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.033}, 17), (0.0022, {}, 0.5)])
 def test_cosim_says_which_limit_binds_and_what_it_costs(
     hybridsep: Run, tmp_path: Path, change_max: float, bound: dict[str, float], most: float
 ) -> None:
