@@ -293,7 +293,8 @@ class CompensatorSettings(Settings):
     ``averaging`` follow the friction and may turn. ``change_max``, None for no bound, is about twice the servo error
     without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
-    (:class:`~hybridsep.online.monitor.Monitor`).
+    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a motion more than 1.25 times as fast as all before
+    is compensated with at most half of ``change_max``.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")

@@ -156,7 +156,7 @@ class PlanModel:
         return STATIC in self._solved
 
     def outgrows(self, share: float) -> bool:
-        """Return whether it moves faster under the remainder of the last plan than ``share`` times all measured."""
+        """Return whether it moves faster under the remainder of the last plan than ``share`` times all before."""
         steps = np.abs(np.diff(self.of_previous_plan.window.x_pb))
         return not steps.max() <= share * self._model.learned.fastest
 
@@ -199,12 +199,12 @@ class PlanModel:
         return total
 
     def _late_changes(self, changes: Array) -> Array:
-        """Return what changes of the commands are after the dead time, ``(n, m)``, m."""
+        """Return changes of the commands as late as the command's expert takes them, ``(n, m)``, m."""
         d = min(self._model.command.dead_time, len(changes))
         return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
 
     def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
-        """Return the change of the command's residual with changes of the commands after the dead time, ``(n, m)``."""
+        """Return the change of the command's residual with such late changes of the commands, ``(n, m)``."""
         increments = np.diff(acted, axis=0, prepend=0.0)
         drive = lfilter(solved.solution.weights[1 : solved.n_static], [1.0], increments, axis=0)
         return _recur(solved, drive)

@@ -2,8 +2,8 @@
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan, which fades
-to no change. Where its own plan runs away, it plans none for a time. A motion faster than all that were measured is
-compensated with half of the largest change.
+to no change. Where its own plan runs away, it plans none for a time. A motion faster than all before is compensated
+with at most half of the largest change.
 """
 
 from __future__ import annotations
@@ -273,9 +273,9 @@ RETRY = 0.5
 each further one of a run."""
 
 _FASTER, _UNPROVEN = 1.25, 0.5
-"""Speed of the preview, relative to the fastest motion that was measured, above which plans may change the command by
-this share of ``change_max`` only. That is twice the largest error without compensation, as advised: where a model that
-has not been compared with such a motion asks for more than the error, it is wrong."""
+"""Speed of the preview, relative to the fastest motion so far, above which plans may change the command by this share
+of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that error:
+where a model that has not been compared with such a motion asks for more, it is wrong."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's

@@ -40,7 +40,7 @@ static void averaged_planner_command(
     }
 }
 
-/* Whether the preview, whose commands were set last, moves faster than what was measured. */
+/* Whether the preview, whose commands were set last, outgrows all before by HSEP_PLANNING_FASTER. */
 static int averaged_planner_outgrows(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *x_pb = hsep_at_const(self, self->x_pb);

@@ -169,8 +169,8 @@ static void linearised_of_increments(
     }
 }
 
-/* Part of a change that is neither friction nor stiffness: the change behind G_pb and after the dead time, and the
- * response of the experts of the command to it. */
+/* Part of a change that is neither friction nor stiffness: the change behind G_pb, and as late as the experts of
+ * the command take it, and their response to it. */
 static void linearised_command(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;

@@ -99,7 +99,7 @@ HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_r
 /* Increments of the command. */
 typedef struct {
     hsep_int n;         /* samples of a prediction */
-    hsep_int dead_time; /* samples */
+    hsep_int dead_time; /* samples before the command may act, HSEP_AVERAGING_EARLY fewer than the physics model's */
     hsep_int n_before;  /* commands before a window that its features need */
     /* Offsets in words from the beginning of the struct */
     hsep_int commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
@@ -118,7 +118,7 @@ HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_
 /* Fill the rows of samples first ... last - 1 of these. */
 HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last);
 
-/* Of these, the commands as many samples ago as the dead time has, (m,), m. */
+/* Of these, the commands dead_time samples ago, (m,), m. */
 HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m);
 
 /* End the window, which are the m samples taken in last. */
