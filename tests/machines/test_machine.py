@@ -144,14 +144,14 @@ def test_bad_entries_are_refused_by_name(tmp_path: Path, old: str, new: str, mes
 
 
 def test_the_compensators_settings_are_the_recommended_ones() -> None:
-    for name in ("spring_mass_damper", "als25010_x", "als25010_y"):
+    for name, change_max in {"spring_mass_damper": 1e-3, "als25010_x": 1e-3, "als25010_y": 1.5e-3}.items():
         machine = load_machine(name)
         compensator = machine.new_compensator()
         assert compensator.predictor.settings == PredictorSettings(Np=50)
         paper = {"averaging": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
-        assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=1e-3)
+        assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=change_max)
         assert machine.new_predictor().Np == 100
 
 
