@@ -156,9 +156,13 @@ class PlanModel:
         return STATIC in self._solved
 
     def outgrows(self, share: float) -> bool:
-        """Return whether it moves faster under the remainder of the last plan than ``share`` times all before."""
-        steps = np.abs(np.diff(self.of_previous_plan.window.x_pb))
-        return not steps.max() <= share * self._model.learned.fastest
+        """Return whether the unmodified commands, and the physics model behind them, are faster than all before.
+
+        By a factor of more than ``share``. Commands may have corners that no drive follows; a model may overshoot them.
+        """
+        window = self._window(self._path[len(self._late) :])
+        fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
+        return not fastest <= share * self._model.learned.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""

@@ -40,16 +40,23 @@ static void averaged_planner_command(
     }
 }
 
-/* Whether the preview, whose commands were set last, outgrows all before by HSEP_PLANNING_FASTER. */
-static int averaged_planner_outgrows(const hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Largest change from sample to sample of a signal over the preview and the late samples, m. */
+static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, const hsep_real x[])
 {
-    const hsep_real *x_pb = hsep_at_const(self, self->x_pb);
-    const hsep_real most = HSEP_PLANNING_FASTER * task->model->learned.fastest;
     hsep_real fastest = 0.0;
     for (hsep_int j = 1; j < self->preview + self->late; j++) {
-        fastest = hsep_fmax(fastest, hsep_fabs(x_pb[j - 1] - x_pb[j]));
+        fastest = hsep_fmax(fastest, hsep_fabs(x[j - 1] - x[j]));
     }
-    return !(fastest <= most);
+    return fastest;
+}
+
+/* Whether the unmodified commands, and the physics model behind them, outgrow all before by HSEP_PLANNING_FASTER. */
+static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
+{
+    averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
+    const hsep_real of_command = averaged_planner_fastest(self, hsep_at(self, self->command));
+    const hsep_real of_model = averaged_planner_fastest(self, hsep_at(self, self->x_pb));
+    return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 
 /* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
@@ -495,8 +502,8 @@ HSEP_API void hsep_averaged_planner_begin(
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
-    averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     task->planner->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
+    averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(
