@@ -155,14 +155,15 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
-    def outgrows(self, share: float) -> bool:
+    def outgrows(self, factor: float) -> bool:
         """Return whether the unmodified commands, and the physics model behind them, are faster than all before.
 
-        By a factor of more than ``share``. Commands may have corners that no drive follows; a model may overshoot them.
+        They are, if they exceed the fastest motion so far by ``factor``. Both count, as commands may have corners that
+        no drive follows, and a model may overshoot them.
         """
         window = self._window(self._path[len(self._late) :])
         fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
-        return not fastest <= share * self._model.learned.fastest
+        return not fastest <= factor * self._model.learned.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""

@@ -207,8 +207,8 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(mo
         chosen.append((self.paused, plan))
         return plan
 
-    monkeypatch.setattr(AveragedPlanning, "choose", recorded)
     sep = SepCompensator.from_bytes(learned())
+    monkeypatch.setattr(AveragedPlanning, "choose", recorded)
     sep.change(change_max=1.5e-4)
     run(sep, sensor=no_faster(0.03), t_init=0.0)
     away = [i for i, (_, plan) in enumerate(chosen) if plan.runs_away]
@@ -227,6 +227,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(mo
     chosen.clear()
     run(free, sensor=no_faster(0.03), t_init=0.0)
     assert not any(plan.runs_away for _, plan in chosen)
+    assert all(plan.state is SepState.HYBRID for _, plan in chosen[away[0] :])
 
 
 @pytest.mark.parametrize(
