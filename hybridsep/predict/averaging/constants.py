@@ -47,8 +47,9 @@ class AveragingConstants:
     growth : float
         Largest growth of these bounds.
     velocity_jump : float
-        Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep:
-        without, the rounding of a command at rest sets their scale, and drives have to 1.4 times the error.
+        Growth of the commanded velocity, for each window learned so far, that makes the static features begin anew, as
+        they were learned at a creep: without, the rounding of a command at rest sets their scale, and drives have to
+        1.4 times the error; where the windows do not count, a milling machine forgets in mid-part, and has 1.2 times.
     warm_windows_max : float
         Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
     warm_prior_weight : float

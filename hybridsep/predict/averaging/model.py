@@ -295,7 +295,8 @@ class AveragedModel:
         T_s = settings.T_s
         before = learned.velocity_scale
         peak = static.peak_velocity(self.run.static, window.x_d)
-        outgrown = peak > max(CONSTANTS.velocity_jump * before, LEAST_VELOCITY)
+        n_windows = self.evidence[MODEL_RESIDUAL].n_rows / settings.Np
+        outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
             peak = max(float(np.abs(np.diff(window.path[settings.n_late :])).max(initial=0.0)) / T_s, before)
