@@ -1,11 +1,10 @@
-"""Figures of merit of sampled signals: RMS, largest magnitude, coverage, hold, derivatives, shares."""
+"""Figures of merit of sampled signals, and how results show theirs: in one line, in a table, in a plot."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from html import escape
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -33,7 +32,6 @@ __all__ = [
     "reduction_percent",
     "rms",
     "rms_ratio",
-    "shares",
     "shown_figure",
 ]
 
@@ -150,11 +148,6 @@ def peak_derivatives(x: Array, T_s: float) -> tuple[float, float, float]:
     """Return the peak velocity, acceleration and jerk, m/s, m/s², m/s³, by differences of positions ``(n,)``, m."""
     velocity, acceleration, jerk = (largest(np.diff(x, order)) / T_s**order for order in (1, 2, 3))
     return velocity, acceleration, jerk
-
-
-def shares(states: NDArray[np.int64], kinds: type[IntEnum]) -> dict[str, float]:
-    """Return the share of samples in each state, 0 … 1, by its name in lower case."""
-    return {kind.name.lower(): float(np.mean(states == kind)) for kind in kinds}
 
 
 def shown_figure(value: float | None, unit: str = "") -> str:

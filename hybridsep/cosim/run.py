@@ -22,7 +22,6 @@ from ..base.metrics import (
     one_line,
     peak_derivatives,
     rms,
-    shares,
 )
 from ..base.signals import Array
 from ..online.look_ahead import SepState
@@ -212,7 +211,7 @@ class Run:
         peaks = peak_derivatives(self.x_dm, self.T_s)
         for name, peak in zip(("velocity_m_s", "acceleration_m_s2", "jerk_m_s3"), peaks, strict=True):
             figures[f"peak_{name}"] = peak
-        figures |= {f"share_{name}": share for name, share in shares(self.state, SepState).items()}
+        figures |= {f"share_{one.name.lower()}": float(np.mean(self.state == one)) for one in SepState}
         return {**figures, "n_samples": len(self.t)}
 
     def batch_rms(self) -> dict[str, Array]:

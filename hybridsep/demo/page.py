@@ -33,7 +33,7 @@ class Table(NamedTuple):
 def compensation_table(summary: Summary) -> Table:
     """Return the tracking errors of the compensated runs: what the product is worth."""
     kinds = list(summary["staircase"]["compensation"])
-    wanted = {name: (name, "tracking_rms_um") for name, case in summary.items() if "compensation" in case}
+    wanted = {name: (name, "tracking_rms_um") for name in summary}
     if "spiral_x" in summary:
         wanted["spiral, contour"] = ("spiral_x", "contour_rms_um")
     rows = [

@@ -46,6 +46,9 @@ velocity only it is up to 3.7 times it, with errors as large as the motion; on t
 _STEADY = 0.05
 """Change of velocity, relative to it, from one half of some samples to the other, below which it is steady."""
 
+_VELOCITIES = 20
+"""Bins of a friction table, even, from the fastest steady motion one way to that the other way."""
+
 
 @dataclass(frozen=True)
 class ReversalCurve:
@@ -161,9 +164,7 @@ def _reversals(x: Array, least: float) -> Indices:
     return np.array(turns, dtype=np.intp)
 
 
-def friction_table(
-    pieces: Iterable[tuple[ArrayLike, ArrayLike]], slope: float, n_steady: int, n_velocities: int = 20
-) -> tuple[Array, Array]:
+def friction_table(pieces: Iterable[tuple[ArrayLike, ArrayLike]], slope: float, n_steady: int) -> tuple[Array, Array]:
     """Return velocities, and the median residuals where the axis is due to move at them steadily.
 
     Parameters
@@ -174,8 +175,6 @@ def friction_table(
         Part that grows with the velocity, samples, which is taken off.
     n_steady : int
         Samples over which a velocity is steady.
-    n_velocities : int
-        Bins from the fastest steady motion one way to that the other way, even.
 
     Returns
     -------
@@ -193,7 +192,7 @@ def friction_table(
         found.append(np.vstack((v, np.asarray(residuals)[:, 2 * half :] - slope * v))[:, steady & (v != 0.0)])
     rows = np.concatenate(found, axis=1)
     fastest = np.abs(rows[0]).max(initial=0.0) or 1.0
-    place = np.minimum((rows[0] / fastest + 1.0) / 2.0 * n_velocities, n_velocities - 1).astype(np.intp)
-    kept = [inside for i in range(n_velocities) if (inside := place == i).sum() >= n_steady]
+    place = np.minimum((rows[0] / fastest + 1.0) / 2.0 * _VELOCITIES, _VELOCITIES - 1).astype(np.intp)
+    kept = [inside for i in range(_VELOCITIES) if (inside := place == i).sum() >= n_steady]
     medians = np.array([np.median(rows[:, inside], axis=1) for inside in kept]).reshape(-1, len(rows)).T
     return medians[0], medians[1:]

@@ -16,7 +16,7 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["ALIKE", "PEERS", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
+__all__ = ["ALIKE", "PEERS", "STANDSTILL", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
 
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
@@ -30,8 +30,8 @@ WINDOWS_ENOUGH = 20
 _LEAST_SHARE = 0.01
 """Share of the samples from which on a place is judged."""
 
-_STANDSTILL = 1e-3
-"""Commanded motion of a sample, relative to the largest so far, below which the axis is at rest."""
+STANDSTILL = 1e-3
+"""Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
 
 _UNSTABLE = 3.0
 """Largest change of the prediction, relative to the largest residual, from which on the model counts as unstable."""
@@ -147,7 +147,7 @@ class Tally:
         np.abs(x_d[1:] - x_d[:-1], out=speed[1:])
         self._last_x_d = float(x_d[-1])
         self._fastest = max(self._fastest, float(speed.max()))
-        moving = (speed > _STANDSTILL * self._fastest).astype(np.int64)
+        moving = (speed > STANDSTILL * self._fastest).astype(np.int64)
         third = np.minimum(np.arange(len(x)) * _N_THIRDS // self.Np, _N_THIRDS - 1)
         known = ~np.isnan(x)
         squares = (x - predictions) ** 2

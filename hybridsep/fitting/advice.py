@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.metrics import rms_ratio
 from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD
-from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
+from ..evaluate.verdict import ALIKE, STANDSTILL, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
 from ..logs.controller import Controller
 from ..logs.log import Log
@@ -22,10 +22,6 @@ __all__ = ["OF_ITSELF", "Judged", "extent", "peers_in_words", "recommendation", 
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
-
-_STANDSTILL = 1e-3
-"""Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
-
 
 OF_ITSELF = "What the controller says of itself"
 """Heading of :meth:`Judged.of_the_controller`."""
@@ -165,7 +161,7 @@ def _more_motion(judged: Judged) -> str:
     """Return that more motion is to be recorded, in words; empty where the axis moves enough to learn from."""
     steps = [np.abs(np.diff(one.x_d)) for one in judged.replay.recordings]
     fastest = max(float(one.max(initial=0.0)) for one in steps)
-    moving = sum(int((one > _STANDSTILL * fastest).sum()) for one in steps) / sum(len(one) for one in steps)
+    moving = sum(int((one > STANDSTILL * fastest).sum()) for one in steps) / sum(len(one) for one in steps)
     if moving >= LITTLE_MOTION:
         return ""
     return f"; the axis moves in {100 * moving:.2g} % of the samples: record more motion"

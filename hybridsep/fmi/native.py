@@ -15,10 +15,8 @@ import re
 import struct
 from collections.abc import Sequence
 
-from numpy.typing import ArrayLike
-
 from ..base.files import data_folder
-from ..base.signals import as_samples
+from ..base.signals import Array
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
@@ -98,7 +96,7 @@ def _licenses() -> dict[str, bytes]:
     }
 
 
-def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:
+def _trajectories(T_s: float, samples: Array | None) -> dict[str, bytes]:
     """Return ``trajectory_<n>.bin`` of the staircase, the spiral's axes and, if there are some, the user's samples.
 
     The spiral is rounded to 10 pm: NumPy's sine differs by 0.1 fm from one version or processor to another, and the
@@ -106,8 +104,7 @@ def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:
     """
     played = [staircase(T_s), *(axis.round(11) for axis in spiral(T_s))]
     if samples is not None:
-        played.append(as_samples(samples, "samples"))
-        as_samples(played[-1][:1], "samples", 1)
+        played.append(samples)
     return {
         f"trajectory_{n}.bin": _TRAJECTORY_MAGIC + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
         for n, x_d in enumerate(played)

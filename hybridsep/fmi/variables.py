@@ -353,7 +353,7 @@ class FmuTable:
     Attributes
     ----------
     model : str
-        Of :data:`hybridsep.fmi.variables.MODELS`.
+        A key of :data:`hybridsep.fmi.variables._MODELS`.
     name : str
         Model identifier.
     parameters : mapping

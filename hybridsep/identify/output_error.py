@@ -56,15 +56,15 @@ class Segment:
         return np.asarray(~np.isnan(self.y))
 
 
-def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]], samples_max: int = SAMPLES_MAX) -> list[Segment]:
+def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]]) -> list[Segment]:
     """Return the segments of pairs ``(x_d, x)``, of long ones the parts with most motion; none without measurements."""
     segments = []
     for x_d, x in recordings:
         u = as_samples(x_d, "x_d")
         y = as_measured(x, "x", len(u))
         segments.append((u, y))
-    if sum(len(u) for u, _ in segments) > samples_max:
-        segments = _liveliest(segments, samples_max // PIECE)
+    if sum(len(u) for u, _ in segments) > SAMPLES_MAX:
+        segments = _liveliest(segments, SAMPLES_MAX // PIECE)
     return [Segment(u - u[0], y - u[0], len(u)) for u, y in segments if np.count_nonzero(~np.isnan(y)) > 1]
 
 

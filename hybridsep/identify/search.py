@@ -36,11 +36,11 @@ def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, kno
     return _minimum(at, first, limit)
 
 
-def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit, steps: int = 2) -> Fit:
-    """Return the fit of the same structure to other samples, with a dead time near the known one."""
+def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit) -> Fit:
+    """Return the fit of the same structure to other samples, with a dead time within a sample of the known one."""
     fits = [
         fit_structure(segments, T_s, fit.structure, Delay(halves), [fit.theta], fit.slowest)
-        for halves in range(max(0, fit.delay.halves - steps), fit.delay.halves + steps + 1)
+        for halves in range(max(0, fit.delay.halves - 2), fit.delay.halves + 3)
     ]
     best = min(fits, key=lambda fit: fit.rms)
     n = sum(segment.stop for segment in segments)

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
-from .source import ArraysSource, check_column, past_midnights
+from .source import ArraysSource, past_midnights
 
 __all__ = ["MatSource", "NpzSource", "ParquetSource", "TableSource"]
 
@@ -41,6 +42,18 @@ def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
         raise LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}") from error
 
 
+def _check(path: Path, name: str, values: NDArray[Any]) -> None:
+    """Raise LogError unless the values of a column are real numbers, in a vector, one row or one column."""
+    shape, dtype = values.shape, values.dtype
+    if dtype.kind == "c":
+        raise LogError(f"{path}: column {brief(name)} must be real, got complex numbers ({dtype})")
+    if dtype.kind not in "fiu":
+        hint = "; save (t - t[0]) / numpy.timedelta64(1, 's') in its place" if dtype.kind == "M" else ""
+        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}{hint}")
+    if len(shape) != 1 and not (len(shape) == 2 and {0, 1}.intersection(shape)):
+        raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
+
+
 class TableSource(ArraysSource):
     """Columns in memory: a mapping of arrays, or a table with ``columns``, as pandas and polars have it."""
 
@@ -64,7 +77,7 @@ class TableSource(ArraysSource):
         values = self._arrays[name]
         if name in self.stamps:
             values = (values - values[:1]) / np.timedelta64(1, "s")
-        check_column(self.path, name, values.shape, values.dtype)
+        _check(self.path, name, values)
         return values.astype(np.float64).ravel()
 
 
@@ -90,7 +103,7 @@ class NpzSource(ArraysSource):
         what = f"column {brief(name)}"
         with _reading(self.path, "an array", what), self.path.open("rb") as file, np.load(file) as archive:
             values = archive[name]
-        check_column(self.path, name, values.shape, values.dtype)
+        _check(self.path, name, values)
         return np.asarray(values, dtype=np.float64).ravel()
 
 
@@ -124,7 +137,7 @@ class MatSource(ArraysSource):
         if not isinstance(value, np.ndarray) or value.dtype.names is not None:
             kind = type(value).__name__ if not isinstance(value, np.ndarray) else "structs"
             raise LogError(f"{self.path}: column {brief(name)} must be a full matrix, got {kind}")
-        check_column(self.path, name, value.shape, value.dtype)
+        _check(self.path, name, value)
         return value.astype(np.float64).ravel()
 
 

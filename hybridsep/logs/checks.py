@@ -86,7 +86,6 @@ class Picture:
     x_label: str  # both with units
     y_label: str
     lines: Mapping[str, tuple[Array, Array]]  # name → abscissa and ordinate, (n,) each
-    marks: Array = field(default_factory=lambda: np.empty(0))  # (m,), abscissae that the finding is about
 
 
 @dataclass(frozen=True)
@@ -366,7 +365,7 @@ def _note_missing(log: Log) -> Iterator[Finding]:
             f"{len(missing)} of {len(log.t)} measured positions {'are' if len(missing) > 1 else 'is'} missing, the "
             f"first is sample {missing[0] + 1}: they are left out"
         )
-        yield Finding("missing samples", words, {"n": float(len(missing))}, _over_time(log, "Missing", missing))
+        yield Finding("missing samples", words, {"n": float(len(missing))}, _over_time(log, "Missing"))
 
 
 def _note_rate(log: Log) -> Iterator[Finding]:
@@ -379,7 +378,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
             "rows are taken as if they were even"
         )
         t = log.t - log.t[0]
-        picture = Picture("Intervals", "time [s]", "interval [ms]", {"interval": (t[1:], 1e3 * steps)}, t[where])
+        picture = Picture("Intervals", "time [s]", "interval [ms]", {"interval": (t[1:], 1e3 * steps)})
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, picture, options=options)
 
@@ -417,7 +416,7 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
                 "blank in the file it counts as missing"
             )
             evidence = {"n": float(len(wrong)), "largest": height}
-            yield Finding("outliers", words, evidence, _over_time(log, "Outliers", wrong))
+            yield Finding("outliers", words, evidence, _over_time(log, "Outliers"))
 
 
 def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
@@ -436,12 +435,12 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
     speed = np.abs(np.diff(x_d))
     fast = speed > max(_REPEATED * float(np.quantile(speed, _USUAL)), resolution(x))
     if fast.sum() > _SAMPLES_MIN and same[fast].mean() > _REPEATED:
-        share, where = float(same[fast].mean()), np.flatnonzero(same & fast) + 1
+        share = float(same[fast].mean())
         words = (
             f"{100 * share:.3g} % of the measured positions repeat the one before in fast motion: they are renewed "
             f"every {fast.sum() / max((fast & ~same).sum(), 1):.2g} samples in the mean"
         )
-        yield Finding("repeated samples", words, {"share": share}, _over_time(log, "Repeated samples", where))
+        yield Finding("repeated samples", words, {"share": share}, _over_time(log, "Repeated samples"))
     edges = np.flatnonzero(~np.concatenate(([False], same, [False])))  # a run is from edge to edge
     moved = (np.maximum.reduceat(x_d, edges[:-1]) - np.minimum.reduceat(x_d, edges[:-1])) / _travel(x_d)
     longest = int(np.argmax(moved))
@@ -459,7 +458,7 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
             else "the sensor was held, or the axis sticks"
         )
         evidence = {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])}
-        yield Finding(name, words, evidence, _over_time(log, name.capitalize(), np.arange(first, last)))
+        yield Finding(name, words, evidence, _over_time(log, name.capitalize()))
 
 
 _NOTES = (
@@ -488,9 +487,9 @@ def _liveliest(log: Log) -> slice:
     return best
 
 
-def _over_time(log: Log, title: str, marks: Indices | None = None) -> Picture:
+def _over_time(log: Log, title: str) -> Picture:
     """Return the picture of both positions over time."""
     t = log.t - log.t[0]
     factor, unit = log.shown.position
     lines = {name: (t, factor * x) for name, x in (("commanded", log.x_d), ("measured", log.x_meas))}
-    return Picture(title, "time [s]", f"position [{unit}]", lines, t[marks] if marks is not None else np.empty(0))
+    return Picture(title, "time [s]", f"position [{unit}]", lines)

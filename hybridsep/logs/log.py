@@ -267,4 +267,4 @@ def check_reading(unit: str | None, T_s: float | None) -> float | None:
         raise LogError(
             f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
         )
-    return None if T_s is None else float(check("T_s", T_s, label="T_s"))
+    return None if T_s is None else float(check("T_s", T_s))

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = ["ArraysSource", "Block", "Source", "check_column", "line_number", "past_midnights", "sample_number"]
+__all__ = ["ArraysSource", "Block", "Source", "line_number", "past_midnights", "sample_number"]
 
 
 @dataclass(frozen=True)
@@ -98,17 +98,3 @@ def sample_number(i: int) -> str:
 def line_number(numbers: Sequence[int] | NDArray[np.int64]) -> Callable[[int], str]:
     """Return the location, for messages, of samples in a block whose lines have these numbers."""
     return lambda i: f"line {numbers[i]}"
-
-
-def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> int:
-    """Return the number of samples of a column of that shape and type; LogError if it is not one."""
-    if dtype.kind == "c":
-        raise LogError(f"{path}: column {brief(name)} must be real, got complex numbers ({dtype})")
-    if dtype.kind not in "fiu":
-        hint = "; save (t - t[0]) / numpy.timedelta64(1, 's') in its place" if dtype.kind == "M" else ""
-        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}{hint}")
-    # Row and column vectors are accepted.
-    lengths = [length for length in shape if length != 1]
-    if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
-        raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
-    return 0 if 0 in lengths else max(lengths, default=1)

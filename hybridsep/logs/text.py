@@ -310,7 +310,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
                 score = (n, width - (delimiter is None and bool(table.clocks)))
                 if best is None or score > best[0]:
                     best = (score, table)
-    return _first_line(lines) if best is None else best[1]
+    return _only_names(lines) if best is None else best[1]
 
 
 def _width(fields: Sequence[str]) -> int:
@@ -375,7 +375,8 @@ def _kind(cells: Sequence[str]) -> str:
     return kind if 2 * n > len(cells) else ""
 
 
-def _first_line(lines: Sequence[tuple[int, str]]) -> _Table | None:
+def _only_names(lines: Sequence[tuple[int, str]]) -> _Table | None:
+    """Return the table whose names are in the first line that is no comment."""
     known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
     if not known:
         return None

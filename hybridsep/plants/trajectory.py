@@ -214,9 +214,9 @@ def _speed(derivative: Curve, u: Array) -> Array:
     return np.asarray(np.linalg.norm(derivative(u), axis=-1))
 
 
-def _panel_lengths(derivative: Curve, left: Array, right: Array, order: int = 8) -> Array:
-    """Return ``∫ |dr/du| du`` over each panel ``[left, right]``, Gauss-Legendre."""
-    x, w = np.polynomial.legendre.leggauss(order)
+def _panel_lengths(derivative: Curve, left: Array, right: Array) -> Array:
+    """Return ``∫ |dr/du| du`` over each panel ``[left, right]``, Gauss-Legendre of order 8."""
+    x, w = np.polynomial.legendre.leggauss(8)
     half = (right - left) / 2
     u = ((left + right) / 2)[:, None] + half[:, None] * x
     return np.asarray(half * (_speed(derivative, u.ravel()).reshape(u.shape) @ w))

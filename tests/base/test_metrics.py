@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from hybridsep.base.metrics import (
     reduction_percent,
     rms,
     rms_ratio,
-    shares,
 )
 from hybridsep.base.signals import Array
 
@@ -73,11 +71,3 @@ def test_peak_derivatives_of_a_cubic() -> None:
     assert acceleration == pytest.approx(6 - 6 * T_s)
     assert jerk == pytest.approx(6.0, rel=1e-6)
     assert peak_derivatives(t[:1], T_s) == (0.0, 0.0, 0.0)
-
-
-def test_shares_have_the_names_of_the_states() -> None:
-    class State(IntEnum):
-        OFF = 0
-        ON = 1
-
-    assert shares(np.array([0, 1, 1, 1]), State) == {"off": 0.25, "on": 0.75}
