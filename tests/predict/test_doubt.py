@@ -74,7 +74,8 @@ def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert
 
 @pytest.mark.slow
 def test_the_commands_expert_is_doubted_where_it_led() -> None:
-    """On a plant whose frequencies fall by a tenth; with a doubt of L alone A kept its earlier runs, at 3.3 times."""
+    """On a plant whose frequencies fall by a tenth; with arx_residual alone in doubt
+    arx_command kept its earlier runs, at 3.3 times."""
     recipe = Recipe.draw(35, SEED)
     model = recipe.true.model
     modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in model.modes]
