@@ -26,7 +26,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.predict.averaging.constants import CONSTANTS
 
 AVERAGING = "predict/averaging/"
-STACK, START = AVERAGING + "hsep_stacking.c", AVERAGING + "hsep_start.c"
+START = AVERAGING + "hsep_start.c"
 STATE, FORECAST = (AVERAGING + f"hsep_averaged_{part}.c" for part in ("model", "forecast"))
 
 
@@ -44,7 +44,7 @@ def constants(**values: float) -> Changes:
 
 
 def first_weights(residual: float, static: float) -> Changes:
-    """Return the change of the first weights of L and S."""
+    """Return the change of the first weights of arx_residual and static."""
     old = "{0.5, 0, 1, 0}, {0.5, 0, 0, 0}"
     return {"predict/hsep_predict_constants.h": [(old, f"{{{residual}, 0, 1, 0}}, {{{static}, 0, 0, 0}}")]}
 

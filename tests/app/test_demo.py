@@ -164,9 +164,9 @@ def test_what_one_cause_alone_leaves_to_learn(full: Demonstration) -> None:
         assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
 
 
-def row_of(label: str, page: str = PAGE) -> list[float]:
-    """Return the figures of a page's only row that begins with a label, each RMS followed by its largest error."""
-    (row,) = re.findall(rf"^\| {label}[^|]*\|(.*)\|$", page, re.MULTILINE)
+def row_of(label: str) -> list[float]:
+    """Return the figures of the page's only row that begins with a label, each RMS followed by its largest error."""
+    (row,) = re.findall(rf"^\| {label}[^|]*\|(.*)\|$", PAGE, re.MULTILINE)
     return [float(figure) for figure in re.findall(r"(?<=\| )[\d.]+(?= [|%(])|(?<= \()[\d.]+(?=\))", f"|{row}|")]
 
 

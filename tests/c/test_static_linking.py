@@ -42,8 +42,8 @@ def compiled(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
     return built
 
 
-def shown(path: Path, *, dynamic: bool = False) -> list[str]:
-    return [symbol.name for symbol in elf.symbols(path, dynamic=dynamic) if symbol.defined and symbol.exported]
+def shown(path: Path) -> list[str]:
+    return [symbol.name for symbol in elf.symbols(path) if symbol.defined and symbol.exported]
 
 
 @pytest.mark.slow

@@ -16,9 +16,9 @@ from hybridsep.predict.predictor import HybridPredictor
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 
 
-def ringing(n: int = 800) -> list[Recording]:
+def ringing() -> list[Recording]:
     """A log whose residual rings with a period of 30 samples, so that many lags are needed to see it."""
-    rng = np.random.default_rng(1)
+    rng, n = np.random.default_rng(1), 800
     k = np.arange(n)
     x_d = 1e-3 * np.cumsum(rng.normal(size=n) * (k % 97 == 0))
     ring, state = np.zeros(n), np.zeros(2)

@@ -28,12 +28,12 @@ HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (50,), }"
 # NumPy
 
 
-def with_member(path: Path, header: str, values: bytes = bytes(400)) -> Path:
+def with_member(path: Path, header: str) -> Path:
     """Write a log whose array ``x`` is this one."""
     write(path, {name: values for name, values in DATA.items() if name != "x"})
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
         length = len(header).to_bytes(2, "little")
-        archive.writestr("x.npy", b"\x93NUMPY\x01\x00" + length + header.encode("latin-1") + values)
+        archive.writestr("x.npy", b"\x93NUMPY\x01\x00" + length + header.encode("latin-1") + bytes(400))
     return path
 
 

@@ -30,8 +30,9 @@ RECORDED = [
 ]
 
 
-def names(log: Log, *, refused: bool = True) -> list[str]:
-    return [one.name for one in check(log) if one.refused == refused]
+def names(log: Log) -> list[str]:
+    """Return what a log is refused for."""
+    return [one.name for one in check(log) if one.refused]
 
 
 # Good logs
@@ -71,12 +72,12 @@ def test_an_axis_without_lag_is_not_refused(axis: str) -> None:
 # What is refused
 
 
-def swept(gain: float = 1.0) -> Log:
+def swept() -> Log:
     t = 1e-3 * np.arange(12_000)
     x_d = 5e-4 * chirp(t, 0.5, t[-1], 80.0, phi=-90)
     lag = np.exp(-np.arange(100) / 8.0)
     x = np.convolve(x_d - x_d[0], lag / lag.sum())[: len(t)] + x_d[0]
-    return log_of(x_d, gain * x + 2e-7 * np.random.default_rng(1).normal(size=len(t)))
+    return log_of(x_d, x + 2e-7 * np.random.default_rng(1).normal(size=len(t)))
 
 
 def early(log: Log) -> Log:
@@ -161,11 +162,11 @@ NOTES: dict[str, Callable[[Log], Log]] = {
 }
 
 
-def sines(n: int = 3000) -> Log:
-    t = 1e-3 * np.arange(n)
+def sines() -> Log:
+    t = 1e-3 * np.arange(3000)
     x_d = 0.05 * (1.0 - np.cos(2 * np.pi * 1.3 * t)) + 0.01 * (1.0 - np.cos(2 * np.pi * 3.1 * t))
     lag = np.exp(-np.arange(60) / 6.0)
-    return log_of(x_d, np.convolve(x_d, lag / lag.sum())[:n])
+    return log_of(x_d, np.convolve(x_d, lag / lag.sum())[: len(t)])
 
 
 @pytest.mark.parametrize("name", NOTES)

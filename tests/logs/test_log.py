@@ -104,8 +104,8 @@ def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | 
 # Times
 
 
-def time_at(i: int, value: float, n: int = 25_000) -> Array:
-    t = np.arange(n, dtype=np.float64) * 1e-3
+def time_at(i: int, value: float) -> Array:
+    t = np.arange(25_000, dtype=np.float64) * 1e-3
     t[i] = value
     return t
 

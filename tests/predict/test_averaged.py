@@ -24,11 +24,11 @@ def rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def with_friction(n: int, noise: float = NOISE, seed: int = 0) -> tuple[Array, Array, Array]:
+def with_friction(n: int, noise: float = NOISE) -> tuple[Array, Array, Array]:
     """Return a command to and fro, the physics model's response, and a position off it by friction and noise."""
     x_d = cycles(n)
     x_pb = physics(x_d)
-    return x_d, x_pb, x_pb + friction(x_d) + noise * np.random.default_rng(seed).normal(size=n)
+    return x_d, x_pb, x_pb + friction(x_d) + noise * np.random.default_rng(0).normal(size=n)
 
 
 def test_a_residual_that_is_a_feature_is_predicted_to_the_noise() -> None:

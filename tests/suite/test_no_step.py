@@ -17,12 +17,12 @@ FADED = 20 + 60
 LIMITS = {"v_max": 0.1, "a_max": 16.0, "j_max": 5000.0}
 
 
-def random_run(stream: Stream, seed: int, n: int = 700) -> Array:
+def random_run(stream: Stream, seed: int) -> Array:
     """Step through rests, moves up to ten times as fast as the limit, jumps, gaps, trips and changed parameters."""
     rng = np.random.default_rng(seed)
     position = velocity = wanted = x = 0.0
     gap, outputs = 0, []
-    for k in range(n):
+    for k in range(700):
         what = rng.integers(0, 150)
         if what < 3:
             wanted = rng.choice((0.0, 0.09, -0.09, 0.3, -1.0)) * rng.uniform(0.5, 1.0)

@@ -52,9 +52,9 @@ def change_learned(predictor: HybridPredictor, **changes: Any) -> None:
     predictor.state = replace(predictor.state, residual=residual)
 
 
-def cycles(n: int, amplitude: float = 5e-3) -> Array:
+def cycles(n: int) -> Array:
     """Return a command to and fro, (n,), m, fastest at the beginning."""
-    return np.asarray(amplitude * np.sin(2 * np.pi * np.arange(n) / PERIOD))
+    return np.asarray(5e-3 * np.sin(2 * np.pi * np.arange(n) / PERIOD))
 
 
 def physics(x_d: Array) -> Array:

@@ -20,9 +20,9 @@ Rated = Mapping[str, tuple[float, Array]]
 """Sampling interval, s, and values by column."""
 
 
-def write_parquet(path: Path, data: Mapping[str, Any], rows: int = 20) -> Path:
+def write_parquet(path: Path, data: Mapping[str, Any]) -> Path:
     """Write a Parquet file in row groups."""
-    pq.write_table(pa.table(dict(data)), path, row_group_size=rows)
+    pq.write_table(pa.table(dict(data)), path, row_group_size=20)
     return path
 
 
