@@ -251,12 +251,14 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self.begin(values, start_time=start_time)
         self.finish()
 
-    def begin(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
+    def begin(
+        self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
+    ) -> None:
         """Set structural parameters, enter Initialization Mode, set other parameters and start values.
 
         For errors see :meth:`initialise`.
         """
-        slave, experiment = self.slave, {"startTime": start_time}
+        slave, experiment = self.slave, {"startTime": start_time, "stopTime": stop_time}
         given = dict(values or {})
         structural = [name for name in given if self._variable(name).causality == "structuralParameter"]
         if structural:
