@@ -50,7 +50,7 @@ _SECTIONS = {
     "physics.spring_mass_damper": "Moving mass, damping and stiffness.",
     "predictor": "Settings of the predictor.",
     "compensator": "Settings of the compensator; where one is left out the setting of `[predictor]` is taken.",
-    "plant": "A simulated drive of kind `feed_drive` or `stage`, or `identified`, which `fit` writes; it makes the plant FMU.",
+    "plant": "A simulated drive, `feed_drive`, `stage`, or `identified`, which `fit` writes; it makes the plant FMU.",
     "limits": "Limits of the test trajectories.",
     "drive_limits": "What the drive allows the modified command; with it the machine gets a compensator FMU.",
     "log": "How logs of the axis are read.",
