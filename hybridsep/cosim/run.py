@@ -29,10 +29,7 @@ from ..online.look_ahead import SepState
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COMPENSATOR", "PREDICTOR", "RESULT_SUFFIXES", "Kind", "Run", "save_columns"]
-
-RESULT_SUFFIXES = (".csv", ".npz")
-"""Endings of files that :func:`save_columns` can write."""
+__all__ = ["COMPENSATOR", "PREDICTOR", "Kind", "Run", "save_columns"]
 
 
 @dataclass(frozen=True)
@@ -252,4 +249,4 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
             writer.writerow(columns)
             writer.writerows(zip(*texts, strict=True))
     else:
-        raise ValueError(f"results are written as {' or '.join(RESULT_SUFFIXES)}, got {path.name!r}")
+        raise ValueError(f"results are written as .csv or .npz, got {path.name!r}")

@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import ParameterError
+from ..base.errors import FmuError, ParameterError
 from ..base.files import data_folder, written_text
 from ..base.version import __version__
-from ..machines.machine import Machine, check_drive_limits
+from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
 from .pages import filled
 from .spec import content_guid, table_of
@@ -82,7 +82,7 @@ def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = N
         If a compensator is asked for a machine without limits of its drive.
     """
     if model == "SepCompensator":
-        check_drive_limits(machine, "--predictor writes the component that predicts alone")
+        _check_limits(machine, "--predictor writes the component that predicts alone")
     table = table_of(machine, model, machine.name, warm=trained is not None)
     files: dict[str, bytes] = {}
     if trained is not None:
@@ -90,6 +90,15 @@ def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = N
 
         files[WEIGHTS_FILE] = weights_file(trained)
     return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
+
+
+def _check_limits(machine: Machine, instead: str) -> None:
+    """Raise FmuError if a machine has no limits of its drive, which a compensator needs; ``instead`` needs none."""
+    if machine.drive_limits is None:
+        raise FmuError(
+            "the compensator needs what the drive allows: [drive_limits] in the machine file of "
+            f"{machine.name}; {instead}"
+        )
 
 
 _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
@@ -105,7 +114,7 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
     """
     compensates = model == "SepCompensator"
     if compensates:
-        check_drive_limits(machine, "--predictor writes the header of a predictor")
+        _check_limits(machine, "--predictor writes the header of a predictor")
     numbers = machine.fmi_compensator_parameters() if compensates else machine.fmi_parameters()
     settings = [
         f"    parameters->{part}.{name} = {numbers[name] + 0!r};"  # truth values are numbers there

@@ -16,10 +16,7 @@ from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["COUNT", "Column", "channels", "choose_columns", "side_by_side", "signal_columns"]
-
-COUNT = "such as unit='0.1um' (--unit 0.1um)"
-"""Example of the unit of a log in encoder counts, for messages."""
+__all__ = ["Column", "channels", "choose_columns", "side_by_side", "signal_columns"]
 
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
@@ -210,7 +207,10 @@ def _position(source: Source, name: str, given: str | None) -> Column:
     unit = position_unit(text) if text else None
     counts = plain_name(text) in _COUNTS
     if counts and given is None:
-        raise LogError(f"{source.path}: column {brief(name)} is in encoder counts; give the length of one, {COUNT}")
+        raise LogError(
+            f"{source.path}: column {brief(name)} is in encoder counts; give the length of one, such as unit='0.1um' "
+            "(--unit 0.1um)"
+        )
     if text and unit is None and not counts:
         raise LogError(
             f"{source.path}: column {brief(name)} must be a position in one of {', '.join(POSITION_UNITS)}, its unit "

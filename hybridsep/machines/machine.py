@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..base.errors import FmuError, MachineError, ParameterError, brief, first_line, listed
+from ..base.errors import MachineError, ParameterError, brief, first_line, listed
 from ..base.files import data_folder
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
@@ -56,7 +56,6 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
 __all__ = [
     "PAPER_SETTINGS",
     "Machine",
-    "check_drive_limits",
     "check_interval",
     "check_unit",
     "checked_name",
@@ -338,14 +337,6 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
     if machine is None:
         raise ParameterError(listed(problems, str, "; "))
     return machine
-
-
-def check_drive_limits(axis: Machine, instead: str) -> None:
-    """Raise FmuError if a machine has no limits of its drive, which a compensator needs; ``instead`` needs none."""
-    if axis.drive_limits is None:
-        raise FmuError(
-            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {axis.name}; {instead}"
-        )
 
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:
