@@ -18,7 +18,7 @@ from .source import ArraysSource, past_midnights
 
 __all__ = ["MatSource", "NpzSource", "ParquetSource", "TableSource"]
 
-_TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Durations, s, of the units of Arrow's times."""
 
 _OWN = (TypeError, AttributeError, LookupError)
@@ -192,8 +192,8 @@ class ParquetSource(ArraysSource):
             kind, types = values.type, self._arrow.types
             if name in self.stamps:
                 whole = self._arrow.int32() if kind.bit_width == 32 else self._arrow.int64()
-                ticks = values.cast(whole).to_numpy()
-                since = np.asarray((ticks - ticks[:1]) * _TICKS[kind.unit], dtype=np.float64)
+                counts = values.cast(whole).to_numpy()
+                since = np.asarray((counts - counts[:1]) * _UNITS[kind.unit], dtype=np.float64)
                 return past_midnights(since, 86_400.0) if types.is_time(kind) else since
             if types.is_decimal(kind):
                 values = values.cast(self._arrow.float64())

@@ -98,10 +98,8 @@ class Log:
 
     def segments(self) -> list[Log]:
         """Return each stretch without a gap as a log of its own."""
-        ends = (*self.starts[1:], len(self.t))
-        pieces = [slice(start, end) for start, end in zip(self.starts, ends, strict=True)]
-        whole = Samples(self.t, self.x_d, self.x_meas, self.T_s, signals=self.signals)
-        return [replace(self, **whole.at(piece)._asdict()) for piece in pieces]
+        whole = Samples(self.t, self.x_d, self.x_meas, self.T_s, self.starts, self.signals)
+        return [replace(self, **part._asdict()) for part in whole.segments()]
 
 
 def read_log(

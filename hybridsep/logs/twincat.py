@@ -29,7 +29,7 @@ _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttim
 _HEAD_LINES = 400
 """Lines in which the numbers must begin."""
 
-_FILETIME, _TICK, _MS = 1e12, 1e-7, 1e-3
+_FILETIME, _COUNT, _MS = 1e12, 1e-7, 1e-3
 """Times above the first are Windows file times, counted in the second, s; others in milliseconds."""
 
 
@@ -130,10 +130,10 @@ class TwinCatSource(ArraysSource):
     def _scale_times(self, head: Sequence[tuple[int, list[str]]], first: Sequence[str]) -> None:
         """Find out what times are counted in, and from when."""
         time = float(decimal_points(first[0]))
-        self._ticks = time > _FILETIME
+        self._counted = time > _FILETIME
         start = next((row[1] for _, row in head if row[0] == _START and len(row) > 1 and row[1].isdigit()), "")
         whole = start if len(start) < 19 and start else decimal_points(first[0]).partition(".")[0]
-        self._origin = int(whole) if self._ticks and whole.isdigit() and len(whole) < 19 else 0
+        self._origin = int(whole) if self._counted and whole.isdigit() and len(whole) < 19 else 0
 
     def column(self, name: str) -> Array:
         """Return a channel down to its last sample, or times in s."""
@@ -147,17 +147,17 @@ class TwinCatSource(ArraysSource):
     def _field(self, field: int, name: str) -> Array:
         """Return a field of all lines down to the last one that has it."""
         is_time = field in {place.time for place in self._places.values()}
-        ticks = is_time and self._ticks
+        counted = is_time and self._counted
         end = next((i for i in reversed(range(len(self._lines))) if self._row_cell(i, field)), -1) + 1
         try:
-            kind, mark = np.int64 if ticks else np.float64, self._mark
+            kind, mark = np.int64 if counted else np.float64, self._mark
             values = np.loadtxt(self._lines[:end], kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
         except (ValueError, OverflowError) as error:
             raise LogError(
                 f"{self.path}, below line {self._first - 1}: column {brief(name)} must be numbers: {first_line(error)}"
             ) from error
-        if ticks:
-            return np.asarray((values - self._origin) * _TICK, dtype=np.float64)
+        if counted:
+            return np.asarray((values - self._origin) * _COUNT, dtype=np.float64)
         return np.asarray(values * _MS if is_time else values, dtype=np.float64)
 
     def _row_cell(self, i: int, field: int) -> str:
