@@ -20,7 +20,7 @@ from .formats import open_source
 from .names import SIGNALS
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
 from .source import Block, Source
-from .times import given_times, recorded_times
+from .times import NOT_LATER, given_times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
 __all__ = ["Log", "Table", "check_reading", "read_log"]
@@ -116,7 +116,8 @@ def read_log(
 
     Measured positions that are missing are NaN. Gaps, and times that go back, begin another segment. What keeps the
     file's meaning is done, and said in :attr:`Log.remarks`: the wraps of a counter and the whole turns of a rotary axis
-    are unwrapped, and of a sensor that is renewed every n samples the samples are taken in which it is new.
+    are unwrapped, rows that repeat the one before, time included, are left out, and of a sensor that is renewed every n
+    samples the samples are taken in which it is new.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def read_log(
     _check_twins(source, chosen)
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
-    read = _checked(path, block, chosen)
+    read, repeats = _without_repeats(_checked(path, block, chosen))
     signals = {
         what: chosen[what].unit.factor * read[what]
         for what in SIGNALS
@@ -185,7 +186,7 @@ def read_log(
         starts=samples.starts,
         remarks=(
             *source.remarks,
-            *filter(None, [resampling]),
+            *filter(None, [resampling, repeats]),
             *_guessed(source, chosen, columns or {}),
             *source.notes(),
             *remarks,
@@ -223,6 +224,21 @@ def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[st
             f"{path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or record it"
         )
     return read
+
+
+def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
+    """Return the columns without rows that repeat the one before, time included, and how many these are, in words.
+
+    Where others repeat a time alone, or many rows do, times are rounded, and all rows stay.
+    """
+    n = len(read["x_d"])
+    same = {role: (one[1:] == one[:-1]) | (np.isnan(one[1:]) & np.isnan(one[:-1])) for role, one in read.items()}
+    again = np.all(list(same.values()), axis=0)
+    repeats = np.flatnonzero(again) + 1
+    if "t" not in read or not 0 < len(repeats) < NOT_LATER * n or (same["t"] & ~again).any():
+        return read, ""
+    said = f"{len(repeats)} of {n} rows repeat the one before, time included, first row {repeats[0] + 1}: left out"
+    return {role: np.delete(one, repeats) for role, one in read.items()}, said
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ..base.errors import LogError, brief
 from ..base.signals import Array, Indices
 
-__all__ = ["Times", "given_times", "recorded_times"]
+__all__ = ["NOT_LATER", "Times", "given_times", "recorded_times"]
 
 _DAY = 86_400.0
 
@@ -25,7 +25,7 @@ _PLAUSIBLE = (2e-6, 0.5)
 _COUNTED = 10
 """Fewest times whose unit is doubted: two or three seconds are no index yet."""
 
-_NOT_LATER = 0.05
+NOT_LATER = 0.05
 """Share of times not above the one before from which on they are rounded too coarsely to tell an interval or a gap."""
 
 _RESOLVED = 0.2
@@ -75,7 +75,7 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
     steps = np.diff(t)
     if not (steps > 0.0).any():
         raise LogError(f"{path}: time {brief(name)} must increase, it never does")
-    if coarse or np.mean(steps <= 0.0) > _NOT_LATER:
+    if coarse or np.mean(steps <= 0.0) > NOT_LATER:
         return _rows(path, name, t, given, remarks)
     interval, error = _mean_interval(t)
     told = stated or len(t) < _COUNTED

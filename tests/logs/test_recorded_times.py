@@ -56,6 +56,16 @@ def test_a_clock_that_is_set_back_an_hour(tmp_path: Path) -> None:
     assert read(tmp_path, t).starts == (0, 400)
 
 
+def test_rows_that_are_written_twice_are_left_out(tmp_path: Path) -> None:
+    """They counted as samples: a log of 1 kHz was taken to have 1017 Hz, and so had its FMUs."""
+    twice = np.sort(np.concatenate((np.arange(N), [7, 50, 51, 180, 182, 300, 420, 421, 422, 590])))
+    columns = {"t": 1e-3 * twice, "x_d": X_D[twice], "x": X[twice]}
+    log = read_log(write(tmp_path / "twice.npz", columns))
+    assert (log.T_s, log.starts, len(log.t)) == (1e-3, (0,), N)
+    np.testing.assert_array_equal(log.x_meas, X)
+    assert log.remarks == ("10 of 610 rows repeat the one before, time included, first row 9: left out",)
+
+
 def test_rows_that_jitter_or_repeat_a_little_stay_one_segment(tmp_path: Path) -> None:
     t = 1e-3 * np.arange(N)
     t[[100, 101]] = t[[101, 100]]  # out of order
