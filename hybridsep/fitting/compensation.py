@@ -174,8 +174,8 @@ class Tracking:
         With the hybrid, over the first samples of each log; None where no limit binds it.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
-    n_samples : int
-        Test samples, the first ones.
+    duration : float
+        Of the test samples, the first ones, s.
     """
 
     none: ErrorSize
@@ -185,13 +185,13 @@ class Tracking:
     costs: LimitCosts | None
     change_max: float | None
     following_error_max: float
-    n_samples: int
+    duration: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         lines = [
-            f"Tracking error (commanded minus measured, RMS) over the first {self.n_samples} test samples: "
+            f"Tracking error (commanded minus measured, RMS) over the first {self.duration:.3g} s of the test samples: "
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
             f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
             "(compensate = physics).",
@@ -239,7 +239,7 @@ def expected_tracking(
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
     limits = allowed.change_max, allowed.following_error_max
-    return Tracking(none, physics, hybrid, bound, costs, *limits, n_samples=len(without))
+    return Tracking(none, physics, hybrid, bound, costs, *limits, duration=len(without) * machine.T_s)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
