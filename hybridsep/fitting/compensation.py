@@ -176,6 +176,8 @@ class Tracking:
         Largest change of the command, and following error above which the compensator trips, m.
     duration : float
         Of the test samples, the first ones, s.
+    largest : float
+        Largest servo error of the whole logs, m.
     """
 
     none: ErrorSize
@@ -186,6 +188,7 @@ class Tracking:
     change_max: float | None
     following_error_max: float
     duration: float
+    largest: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
@@ -197,6 +200,12 @@ class Tracking:
             "(compensate = physics).",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
+        if self.change_max is not None and self.change_max < self.largest:
+            left = shown.words(self.largest - self.change_max, ".4g")
+            lines.append(
+                f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
+                f"{left} of it cannot be compensated."
+            )
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
@@ -215,9 +224,12 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
 
 
 def expected_tracking(
-    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
+    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object], largest: float = 0.0
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
+
+    ``largest``, m, is the largest servo error of the logs that the recordings begin.
+    """
     allowed = machine.compensator_settings
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
     judged = {model: _expected(machine, one, recordings) for model, one in settings.items()}
@@ -239,7 +251,7 @@ def expected_tracking(
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
     limits = allowed.change_max, allowed.following_error_max
-    return Tracking(none, physics, hybrid, bound, costs, *limits, duration=len(without) * machine.T_s)
+    return Tracking(none, physics, hybrid, bound, costs, *limits, duration=len(without) * machine.T_s, largest=largest)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

@@ -322,7 +322,8 @@ def fit(
     tracking = None
     if given_limits:
         estimate = within(0.95, 1.0, "tracking error with compensation")
-        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate)
+        largest = estimated.get("change_max", 0.0) / 2.0
+        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,
