@@ -176,8 +176,10 @@ class Tracking:
         Largest change of the command, and following error above which the compensator trips, m.
     duration : float
         Of the test samples, the first ones, s.
-    largest : float
-        Largest servo error of the whole logs, m.
+    largest, fastest : float
+        Largest servo error of the whole logs, m, and largest velocity of their commands, m/s.
+    v_max : float
+        The drive's, m/s.
     """
 
     none: ErrorSize
@@ -189,6 +191,8 @@ class Tracking:
     following_error_max: float
     duration: float
     largest: float
+    fastest: float
+    v_max: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
@@ -205,6 +209,12 @@ class Tracking:
             lines.append(
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
+            )
+        if self.v_max < self.fastest:
+            factor, unit = shown.position
+            lines.append(
+                f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "
+                f"{factor * self.v_max:.4g} {unit}/s: what is that fast cannot be compensated; is it the drive's?"
             )
         return [
             *lines,
@@ -224,11 +234,16 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
 
 
 def expected_tracking(
-    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object], largest: float = 0.0
+    machine: Machine,
+    recordings: Sequence[Recording],
+    progress: Callable[[float], object],
+    largest: float = 0.0,
+    fastest: float = 0.0,
 ) -> Tracking:
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
 
-    ``largest``, m, is the largest servo error of the logs that the recordings begin.
+    ``largest``, m, is the largest servo error of the logs that the recordings begin, ``fastest``, m/s, their commands'
+    largest velocity.
     """
     allowed = machine.compensator_settings
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
@@ -251,7 +266,8 @@ def expected_tracking(
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
     limits = allowed.change_max, allowed.following_error_max
-    return Tracking(none, physics, hybrid, bound, costs, *limits, duration=len(without) * machine.T_s, largest=largest)
+    v_max = math.inf if allowed.limits is None else allowed.limits.velocity
+    return Tracking(none, physics, hybrid, bound, costs, *limits, len(without) * machine.T_s, largest, fastest, v_max)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

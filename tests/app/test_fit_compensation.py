@@ -99,7 +99,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
         predictor={"Np": 50},
         drive_limits=limits,
     )
-    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None, 1.5 * change_max)
+    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None, 1.5 * change_max, 0.5)
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert found.costs is not None
     assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
@@ -113,6 +113,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
     assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
+    assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: what is that fast cannot" in said
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
