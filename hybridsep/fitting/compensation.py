@@ -175,7 +175,7 @@ class Tracking:
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
     duration : float
-        Of the test samples, the first ones, s.
+        Of the samples that are tried, of a long log from its beginning, s.
     largest, fastest : float
         Largest servo error of the whole logs, m, and largest velocity of their commands, m/s.
     v_max : float
@@ -198,7 +198,7 @@ class Tracking:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         lines = [
-            f"Tracking error (commanded minus measured, RMS) over the first {self.duration:.3g} s of the test samples: "
+            f"Tracking error (commanded minus measured, RMS) over {self.duration:.3g} s of the log: "
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
             f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
             "(compensate = physics).",
