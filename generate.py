@@ -57,7 +57,7 @@ PLACES = (
 )
 """Constants without a prefix in C."""
 
-OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "REGRESSIONS")
+OF_LIBRARY = ("_OWN_MAX", "_OWN_REACH", "REGRESSIONS", "_FIRST")
 """Constants of these modules that C has not."""
 
 

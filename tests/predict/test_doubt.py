@@ -6,15 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from averaged_cases import PERIOD, averaged, averaged_model, cycles, friction, physics, run
+from averaged_cases import PERIOD, averaged, averaged_model, change_learned, cycles, friction, physics, run
 from random_drives.generator import SEED, Recipe
 from random_drives.simulation import simulate
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS
-from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, FRESH_START, MODEL_RESIDUAL, Regression
+from hybridsep.predict.averaging.experts import (
+    ARX_COMMAND,
+    ARX_RESIDUAL,
+    EXPERTS,
+    FRESH_START,
+    MODEL_RESIDUAL,
+    Regression,
+)
 from hybridsep.predict.averaging.model import AveragedModel
+from hybridsep.predict.averaging.stacking import Stack
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-6  # m
@@ -53,6 +61,23 @@ def test_what_has_not_changed_keeps_what_was_learned() -> None:
     found, cold = run(warm, x_d, x), run(averaged(), x_d, x)
     assert rms(x - found) < 1.15 * NOISE < 0.5 * rms(x - cold)
     assert averaged_model(warm).evidence[MODEL_RESIDUAL].n_rows == pytest.approx(carried + len(x_d))
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.03, True), (0.1, False)])
+def test_earlier_runs_are_forgotten_where_what_they_taught_errs_enough(share: float, kept: bool) -> None:
+    """Relative to the largest residual; by less, the noise of an axis at rest may decide for the expert that doubts."""
+    x_d = cycles(4 * PERIOD)
+    warm = learned(x_d, friction(x_d, 200 * NOISE))
+    assert averaged_model(warm).leading == ARX_RESIDUAL
+    largest = np.sqrt(averaged_model(warm).learned.scales[MODEL_RESIDUAL].largest_square)
+    measured = largest * np.sin(np.arange(100.0))
+    predicted = np.zeros((len(EXPERTS), 100))
+    predicted[FRESH_START.place], predicted[ARX_RESIDUAL.place] = measured, measured - share * largest
+    stack = Stack.init().update(predicted, measured, NOISE**2)
+    assert stack.weights[FRESH_START.place] > CONSTANTS.discard_above
+    change_learned(warm, stack=stack)
+    run(warm, np.zeros(100), NOISE * np.random.default_rng(9).normal(size=100))
+    assert averaged_model(warm).doubts == kept
 
 
 def assert_doubts(model: AveragedModel, leading: Regression) -> None:

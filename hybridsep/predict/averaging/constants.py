@@ -47,17 +47,18 @@ class AveragingConstants:
     growth : float
         Largest growth of these bounds.
     velocity_jump : float
-        Growth of the commanded velocity, for each window learned so far, that makes the static features begin anew, as
-        they were learned at a creep: without, the rounding of a command at rest sets their scale, and drives have to
-        1.4 times the error; where the windows do not count, a milling machine forgets in mid-part, and has 1.2 times.
+        Growth of the commanded velocity, for each window that earlier runs weigh, that makes the static features begin
+        anew, as they were learned at a creep: without, the rounding of a command at rest sets their scale, and drives
+        have to 1.4 times the error; where earlier runs do not count, a milling machine forgets them in mid-part.
     warm_windows_max : float
         Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
     warm_prior_weight : float
         Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
         window. Without any, changed plants are worse by an eighth.
-    discard_above : float
-        Weight of that expert in the stack from which on earlier runs are forgotten: with 0.5 plants that have not
-        changed are worse by 2 %.
+    discard_above, discard_error : float
+        Weight of that expert in the stack, and mean square error of the one that led, relative to the largest of a
+        window, from which on earlier runs are forgotten: with a weight of 0.5 plants that have not changed are worse by
+        2 %; without an error noise at rest decides; with 0.01 a changed drive has 5 times the error.
     friction_least, friction_ratio : float
         Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the
         six to the next: half a decade, which neighbours interpolate within; with 5/6 of one the stage's spiral has four
@@ -74,7 +75,7 @@ class AveragingConstants:
         that are repeated have to 7 times the error.
     difference_share : float
         Effect of a disturbance's first difference relative to its own: it only corrects the timing.
-    gate_residuals, gate_steps : float
+    gate : float
         Largest residual that is believed: relative to the largest so far, and in steps of the fastest motion of the
         physics model so far on top of it.
     patience : float
@@ -97,6 +98,7 @@ class AveragingConstants:
     warm_windows_max: float = 30.0
     warm_prior_weight: float = 0.003
     discard_above: float = 0.7
+    discard_error: float = 0.003
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795
     stop_least: float = 0.01
@@ -104,8 +106,7 @@ class AveragingConstants:
     recall_tolerance: float = 0.1
     recall_fade: float = 0.5
     difference_share: float = 0.03
-    gate_residuals: float = 2.0
-    gate_steps: float = 2.0
+    gate: float = 2.0
     patience: float = 1.0
 
 

@@ -303,11 +303,6 @@ class ExpertWindow:
         return CONSTANTS.bound * largest
 
     @property
-    def last(self) -> float:
-        """Last residual, m."""
-        return float(self.model.last)
-
-    @property
     def growth(self) -> float:
         """Largest step of the command relative to that before the window, ≥ 1.
 
@@ -348,7 +343,7 @@ class Hold(Expert):
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return it within the bound."""
         turned = at.model.static.turned(at.model.run.static, at.rows)
-        return np.asarray(min(max(at.last, -at.bound), at.bound) * (1.0 - turned))
+        return np.asarray(min(max(at.model.last, -at.bound), at.bound) * (1.0 - turned))
 
 
 @dataclass(frozen=True)
@@ -432,7 +427,7 @@ class Recall(Expert):
         n, Np = len(at.window.x_d), at.model.settings.Np
         residuals, before, _ = at.recalled
         fade = np.exp(-np.arange(1, n + 1) / (CONSTANTS.recall_fade * Np))
-        return np.asarray(np.clip(residuals[:n] + (at.last - before) * fade, -at.bound, at.bound))
+        return np.asarray(np.clip(residuals[:n] + (at.model.last - before) * fade, -at.bound, at.bound))
 
 
 _FIRST = 0.5

@@ -64,7 +64,7 @@ def gated(
         n_missing += 1
         if not believed[k]:
             continue
-        beyond = size > CONSTANTS.gate_residuals * largest + CONSTANTS.gate_steps * fastest
+        beyond = size > CONSTANTS.gate * (largest + fastest)
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
             believed[k], farthest = False, max(farthest, min(size, PREDICTION_MAX))

@@ -295,7 +295,7 @@ class AveragedModel:
         T_s = settings.T_s
         before = learned.velocity_scale
         peak = static.peak_velocity(self.run.static, window.x_d)
-        n_windows = self.evidence[MODEL_RESIDUAL].n_rows / settings.Np
+        n_windows = self.evidence[MODEL_RESIDUAL].earlier.n_rows / settings.Np
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
@@ -528,8 +528,10 @@ def _judged(
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[MODEL_RESIDUAL][published], settings.lam)
-    learned = replace(learned, stack=stack)
-    if not (state.doubts and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
+    learned, (total, n_rows), led = replace(learned, stack=stack), stack.evidence.tolist(), state.leading.place
+    least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * n_rows
+    errs = total - 2.0 * stack.cross[led] + stack.gram[led, led] > least  # at rest noise would decide
+    if not (state.doubts and errs and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}

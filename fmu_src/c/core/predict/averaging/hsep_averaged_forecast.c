@@ -11,10 +11,11 @@ static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const h
 {
     const hsep_real before = self->learned.velocity_scale;
     hsep_real peak = hsep_disturbances_peak_velocity(hsep_averaged_disturbances(self), x_d, self->n);
-    const hsep_real n_rows = hsep_warm_start_n_rows(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL));
-    hsep_real most = HSEP_AVERAGING_VELOCITY_JUMP * hsep_fmax(n_rows / (hsep_real)self->Np, 1.0) * before;
+    hsep_warm_start *evidence = hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL);
+    const hsep_real n_windows = hsep_warm_start_earlier(evidence)->n_rows / (hsep_real)self->Np;
+    hsep_real most = HSEP_AVERAGING_VELOCITY_JUMP * hsep_fmax(n_windows, 1.0) * before;
     self->forecast_step = hsep_fmax(self->learned.largest_step, peak * self->T_s);
-    if (path != NULL && n_rows == 0.0) {
+    if (path != NULL && hsep_warm_start_n_rows(evidence) == 0.0) {
         peak = 0.0;
         for (hsep_int j = 0; j + 1 < n_path; j++) {
             peak = hsep_fmax(peak, hsep_fabs(path[j] - path[j + 1]));

@@ -294,7 +294,12 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     hsep_learned *learned = &self->learned;
     averaged_judge_experts(self, e, self->Np, learned->scales, learned->errors);
     averaged_judge_stack(self, e);
-    if (hsep_averaged_doubts(self) && learned->stack.weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
+    const hsep_stack *stack = &learned->stack;
+    const hsep_int led = self->leading;
+    const hsep_real square = stack->evidence[0] - 2.0 * stack->cross[led] + stack->gram[led * (HSEP_N_EXPERTS + 1)];
+    const hsep_real least = HSEP_AVERAGING_DISCARD_ERROR * learned->scales[HSEP_MODEL_RESIDUAL].largest_square;
+    const int errs = square > least * stack->evidence[1]; /* at rest noise would decide */
+    if (errs && hsep_averaged_doubts(self) && stack->weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
         /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
         hsep_expert_errors *errors = learned->errors;
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {

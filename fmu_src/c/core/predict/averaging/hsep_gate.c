@@ -12,12 +12,12 @@ HSEP_API void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real fast
 
 HSEP_API int hsep_gate_judge(hsep_gate *self, hsep_real e, hsep_real T_s)
 {
-    const hsep_real size = hsep_fabs(e), most = HSEP_AVERAGING_GATE_RESIDUALS * self->largest;
+    const hsep_real size = hsep_fabs(e), most = HSEP_AVERAGING_GATE * (self->largest + self->fastest);
     self->n_missing++;
     if (!isfinite(e)) {
         return 0;
     }
-    if (self->known && size > most + HSEP_AVERAGING_GATE_STEPS * self->fastest) {
+    if (self->known && size > most) {
         self->n_beyond++;
     } else if (self->n_beyond > 0) {
         self->n_beyond--;
