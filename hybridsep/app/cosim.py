@@ -130,6 +130,8 @@ def cosim(
     if not as_json:
         for line in () if costs is None else costs.lines(shown, "--set drive_limits.{entry}="):
             console.print(line)
+        if plant is None:
+            _say_optimistic(axis)
         print_written(out, figure)
 
 
@@ -163,7 +165,10 @@ def _two_axes(
         _check_pair(axis, "SepCompensator", None, None, None, flavour, ())
     delays = [f"{axis.T_s:g} s and {axis.compensator_settings.preview} samples" for axis in machines]
     if delays[0] != delays[1]:
-        raise ParameterError(f"both axes must have one T_s and one preview, got {' and '.join(delays)}")
+        raise ParameterError(
+            f"both axes must have one T_s and one preview, got {' and '.join(delays)}; fit them to logs of one "
+            "rate with one Np, or set compensator.preview in both files"
+        )
     inputs = {"path": path, **{f"machine file {axis}": machine_path(axis) for axis in axes}}
     check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), inputs, force=force)
     limits = Limits(*map(min, *map(_path_limits, machines)))
@@ -192,7 +197,19 @@ def _two_axes(
         contour_figure(contours, title, figure)
     print_contours({key: contour.figures() for key, contour in contours.items()}, as_json, title)
     if not as_json:
+        _say_optimistic(*machines)
         print_written(out, figure)
+
+
+def _say_optimistic(*machines: Machine) -> None:
+    """Say what errors on an identified plant are worth, if one of the machines has such a plant."""
+    from ..machines.sections import IdentifiedSection
+    from .console import console
+
+    if any(isinstance(axis.plant, IdentifiedSection) for axis in machines):
+        console.print(
+            "The plant is identified from a log, to try with and no measurement: results on it are optimistic."
+        )
 
 
 def _path_limits(axis: Machine) -> tuple[float, ...]:

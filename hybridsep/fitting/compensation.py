@@ -174,8 +174,12 @@ class Tracking:
         With the hybrid, over the first samples of each log; None where no limit binds it.
     change_max, following_error_max : float
         Largest change of the command, and following error above which the compensator trips, m.
-    n_samples : int
-        Test samples, the first ones.
+    duration : float
+        Of the samples that are tried, of a long log from its beginning, s.
+    largest, fastest : float
+        Largest servo error of the whole logs, m, and largest velocity of their commands, m/s.
+    v_max : float
+        The drive's, m/s.
     """
 
     none: ErrorSize
@@ -185,18 +189,33 @@ class Tracking:
     costs: LimitCosts | None
     change_max: float | None
     following_error_max: float
-    n_samples: int
+    duration: float
+    largest: float
+    fastest: float
+    v_max: float
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         lines = [
-            f"Tracking error (commanded minus measured, RMS) over the first {self.n_samples} test samples: "
+            f"Tracking error (commanded minus measured, RMS) over {self.duration:.3g} s of the log: "
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
             f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
             "(compensate = physics).",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
+        if self.change_max is not None and self.change_max < self.largest:
+            left = shown.words(self.largest - self.change_max, ".4g")
+            lines.append(
+                f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
+                f"{left} of it cannot be compensated."
+            )
+        if self.v_max < self.fastest:
+            factor, unit = shown.position
+            lines.append(
+                f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "
+                f"{factor * self.v_max:.4g} {unit}/s: what is that fast cannot be compensated; is it the drive's?"
+            )
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
@@ -215,9 +234,17 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
 
 
 def expected_tracking(
-    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
+    machine: Machine,
+    recordings: Sequence[Recording],
+    progress: Callable[[float], object],
+    largest: float = 0.0,
+    fastest: float = 0.0,
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
+
+    ``largest``, m, is the largest servo error of the logs that the recordings begin, ``fastest``, m/s, their commands'
+    largest velocity.
+    """
     allowed = machine.compensator_settings
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
     judged = {model: _expected(machine, one, recordings) for model, one in settings.items()}
@@ -239,7 +266,8 @@ def expected_tracking(
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
     limits = allowed.change_max, allowed.following_error_max
-    return Tracking(none, physics, hybrid, bound, costs, *limits, n_samples=len(without))
+    v_max = math.inf if allowed.limits is None else allowed.limits.velocity
+    return Tracking(none, physics, hybrid, bound, costs, *limits, len(without) * machine.T_s, largest, fastest, v_max)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

@@ -34,7 +34,7 @@ from ..predict.window import Prediction
 from .advice import Judged, recommendation
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, window_scores, with_window
-from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking
+from .compensation import LIMITS_WORDS, MARGINS, Tracking, drive_limits, estimated_limits, expected_tracking
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -322,7 +322,8 @@ def fit(
     tracking = None
     if given_limits:
         estimate = within(0.95, 1.0, "tracking error with compensation")
-        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate)
+        largest, fastest = estimated.get("change_max", 0.0) / 2.0, estimated.get("velocity", 0.0) / float(MARGINS[0])
+        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest, fastest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,

@@ -71,7 +71,8 @@ def write_other_windows(report: Report, windows: Sequence[WindowErrors], judged:
             "look-ahead Np·T_s [ms]",
             (f"RMS error [{unit}]",),
             lines,
-            "The look-ahead is the controller's; it is not chosen, as a shorter one always looks better.",
+            "The look-ahead is the controller's; it is not chosen, as a shorter one always looks better. Of a long "
+            "log the beginning alone.",
         )
     )
 

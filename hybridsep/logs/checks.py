@@ -194,7 +194,7 @@ def _unit(log: Log) -> Iterator[Finding]:
         return
     words = (
         f"read in m, {travel:.4g} m of travel and {usual:.4g} m/s² of acceleration are more than a feed axis has: "
-        "the positions are rather in mm (--unit mm), µm (--unit um), or deg of a rotary axis (--unit deg)"
+        "the positions are rather in mm, µm (--unit um) or, of a rotary axis, deg"
     )
     evidence = {"travel": travel, "acceleration": usual}
     yield Finding("unit", words, evidence, _over_time(log, "Positions as read"), refused=True, options=UNIT_OPTIONS)

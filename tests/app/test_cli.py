@@ -151,6 +151,16 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["stage", "identified"])
+def test_cosim_says_that_an_identified_plant_is_no_measurement(hybridsep: Run, tmp_path: Path, kind: str) -> None:
+    command = write_rows(tmp_path / "command.csv", commanded()[:400], commanded()[:400])
+    how = ("--set", f"plant.kind='{kind}'", "--compensate", "off", "--trajectory", command)
+    status, out, err = hybridsep("cosim", "-m", "als25010_x", *how)
+    assert status == 0, err
+    assert ("no measurement: results on it are optimistic." in " ".join(out.split())) == (kind == "identified")
+
+
+@pytest.mark.slow
 def test_cosim_of_two_axes_along_a_path(hybridsep: Run, tmp_path: Path) -> None:
     """A machine without [limits] moves within 1/1.25, 1/2 and 1/5 of the drive's."""
     text = (data_folder("models") / "als25010_y.toml").read_text(encoding="utf-8")

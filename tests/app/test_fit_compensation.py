@@ -50,7 +50,7 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, *LIMITS)
     assert status == 0, err
     words = " ".join(said.split())
-    assert "over the first 1651 test samples: " in words
+    assert "over 1.65 s of the log: " in words
     assert re.search(r"by the hybrid, with which the FMU starts, and about [\d.]+ µm \(largest [\d.]+ µm\)", words)
     assert re.search(r"change_max is [\d.]+ µm\. (No limit binds|Limits bind) the compensated command", words)
     assert re.search(r"above following_error_max = [\d.]+ µm for three samples in a row", words)
@@ -99,7 +99,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
         predictor={"Np": 50},
         drive_limits=limits,
     )
-    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
+    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None, 1.5 * change_max, 0.5)
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert found.costs is not None
     assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
@@ -111,6 +111,9 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     assert found.costs.advised_error.rms == two
     said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))))
     assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
+    beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
+    assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
+    assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: what is that fast cannot" in said
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
