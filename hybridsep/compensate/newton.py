@@ -122,20 +122,27 @@ class PlanModel:
         Commands between there and the preview, relative to the start.
     start : float, m
     x_d, path : (n,) array, m
-        Commands from which the scales of the features follow, of the remainder of the last plan; and unmodified
-        commands. Both relative to the start.
+        Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
+        last plan; and unmodified commands.
+        Both relative to the start.
 
     Attributes
     ----------
     scales : FeatureScales
+    of_previous_plan : AveragedForecast
+        Prediction under ``x_d``, whose variances all others have.
     """
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
         self._model, self._static, self._discrete = model, model.static, model.static.discrete
         self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
-        self.scales = model.scales_of(self._window(x_d))
+        window = self._window(x_d)
+        self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)
-        self._varied: AveragedForecast | None = None
+        counts = np.arange(len(late) + len(x_d))
+        behind = counts[len(late) + model.settings.Np :]
+        behind -= np.arange(len(behind)) % _APART
+        self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the preview under commands ``x_d``, and what is late before it."""
@@ -159,19 +166,8 @@ class PlanModel:
         return not fastest <= factor * self._model.learned.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
-        """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m.
-
-        The first prediction's variances count for all others.
-        """
-        n_late, counts = len(self._late), None
-        if self._varied is None:
-            counts = np.arange(n_late + len(x_d))
-            behind = counts[n_late + self._model.settings.Np :]
-            behind -= np.arange(len(behind)) % _APART
-        window = self._window(x_d)
-        forecast = self._model.forecast_by(self._solved, window, self.scales, self._varied, counts)
-        self._varied = self._varied or forecast
-        return forecast
+        """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
+        return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)
 
     def position(self, at: AveragedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
@@ -354,6 +350,10 @@ class AveragedPlanner:
         """Return the cost of a plan, m²; not finite if its prediction overflows."""
         return self._at(coefficients).cost
 
+    def cost_of_previous(self, previous_plan: Array) -> float:
+        """Return the cost of the remainder of the last plan, m²."""
+        return self._point(previous_plan, self._model.of_previous_plan).cost
+
     def plan(self, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
         """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
 
@@ -368,7 +368,7 @@ class AveragedPlanner:
             Free splines filtered by ``G_pb``.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
-        here, last = self._at(previous_plan), None
+        here, last = self._point(previous_plan, self._model.of_previous_plan), None
         for reach, steps in zip(_REACHES, _SOLVED[1:], strict=True):
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]

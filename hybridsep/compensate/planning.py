@@ -335,7 +335,7 @@ class AveragedPlanning(Planning):
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
                         return ChosenPlan(SepState.HYBRID, hybrid, scales)
-            if is_better(planner.cost(previous_plan), of_physics):
+            if is_better(planner.cost_of_previous(previous_plan), of_physics):
                 return ChosenPlan(SepState.OFF, previous_plan, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
 

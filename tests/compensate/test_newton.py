@@ -24,10 +24,8 @@ from hybridsep.compensate.planning import RETRY, AveragedPlanning, ChosenPlan, r
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.machines.machine import Machine
-from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, simulate
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -274,42 +272,3 @@ def test_positions_in_another_unit_are_commanded_the_same() -> None:
         return np.concatenate(found)
 
     np.testing.assert_allclose(commands(1e3), commands(1.0), rtol=0, atol=1e-8)
-
-
-class LateAxis:
-    """Axis with dead time, a lag and friction, which follows a constant velocity late by a constant distance."""
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self, start: float = 0.0) -> None:
-        """Rest at ``start``, m."""
-        self.x, self.late = start, [start] * 6
-
-    def step(self, x_d: float, h: float) -> None:
-        """Follow the command for ``h``, s."""
-        self.late.append(x_d)
-        velocity = (self.late.pop(0) - self.x) / 1.5e-3
-        self.x += h * (velocity - 2e-3 * float(np.tanh(velocity / 1e-3)))
-
-
-@pytest.mark.slow
-def test_where_the_last_plan_ends_the_next_one_is_no_less_certain() -> None:
-    """Its remainder falls by 340 µm there: shrunk by variances under it, windows began 5 µm off at even velocity."""
-
-    def smooth(x_d: Array) -> Array:
-        return np.convolve(np.pad(x_d, (29, 0), mode="edge"), np.ones(30) / 30, mode="valid")
-
-    generator = np.random.default_rng(0)
-    parts = [np.zeros(200)]
-    for _ in range(14):
-        length, velocity = generator.uniform(0.002, 0.02) * generator.choice([-1, 1]), generator.uniform(5e-3, 45e-3)
-        end = parts[-1][-1] + length
-        parts += [np.linspace(parts[-1][-1], end, int(abs(length) / velocity / TS)), np.full(100, end)]
-    moved = smooth(np.concatenate(parts))
-    model = ModalModel((Mode(f_n=159.155, zeta=1.0, alpha=1e6, beta=1e3),), dead_time=5)
-    predictor = HybridPredictor(model, PredictorSettings(Np=100, p=50, q=3))
-    backtest(predictor, moved, simulate(LateAxis(), moved, TS) + 2e-6 * generator.standard_normal(len(moved)))
-    sep = SepCompensator(predictor, CompensatorSettings(limits=Limits(0.25, 15.0, 5000.0)))
-    found = cosimulate(sep, LateAxis(), smooth(np.concatenate((np.zeros(300), 45e-6 * np.arange(1300)))))
-    assert np.ptp((found.x_d - found.x)[700:1500]) < 2.5e-6

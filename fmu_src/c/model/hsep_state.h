@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 31 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 30 /* changes whenever the layout of any state does */
 
 typedef struct {
     uint64_t version;    /* HSEP_STATE_VERSION */

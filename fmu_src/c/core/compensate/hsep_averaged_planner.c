@@ -106,13 +106,16 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     hsep_planner_open(task->planner, task->x_d);
 }
 
-/* Linearise at the best plan, which was predicted last. */
+/* Linearise at the best plan, which was predicted last, the remainder of the last plan before the physics model's. */
 static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     const hsep_real *e_h = hsep_at(self, self->e_h);
     hsep_real *target = hsep_at(self, self->target);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    if (self->steps == 0) {
+        averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n);
+    }
     hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
     for (hsep_int k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
         const hsep_int j = self->preview - 1 - k;
@@ -233,8 +236,10 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
 /* Take the plan whose cost is lowest. */
 static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    hsep_int plan = self->planned ? self->of_physics : self->rest;
-    if (self->follows && averaged_planner_better(self->cost, self->hurdle)) {
+    const hsep_real cost = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
+    hsep_int plan = averaged_planner_better(self->unchanged, cost) ? self->rest : self->of_physics;
+    self->planned = plan == self->of_physics;
+    if (self->follows && averaged_planner_better(self->cost, cost)) {
         if (averaged_planner_runs_away(self, task)) {
             self->paused = self->pause;
             self->pause *= 2;
@@ -321,12 +326,12 @@ static hsep_real averaged_planner_left(
 {
     const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, n = self->n, pinned = self->n_pinned;
-    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np;
+    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
     if (self->place == 0 && self->judges) {
-        left += work->commands + (hsep_real)(window + behind) * work->sample +
-                (hsep_real)(window + behind / HSEP_NEWTON_APART + 1) * work->row + 2.0 * work->predict;
+        left += (hsep_real)(window - first + behind) * work->sample +
+                (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
     if (self->place == 0 && self->planned) {
         left += 9.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
@@ -343,7 +348,7 @@ static hsep_real averaged_planner_left(
             left += newton + (hsep_real)averaged_planner_solved[1 + steps] * parts;
         }
     }
-    return left;
+    return left + (self->judges ? 2.0 * work->predict : 0.0);
 }
 
 /* Cut a plan: what follows costs so much, and is done when averaged_planner_go_on is called again; place: another one
@@ -371,45 +376,36 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
     case 0:
         self->left = averaged_planner_left(self, task, &work, 0);
 
+        /* The remainder of the last plan, with the variances of all plans */
+        while (self->judges && self->samples < all) {
+            AVERAGED_PLANNER_YIELD(1, averaged_planner_vary(self, task, &work, NULL));
+            (void)averaged_planner_vary(self, task, &work, rest);
+        }
+        if (self->judges) {
+            self->cost = self->unchanged = averaged_planner_cost(self, task, rest);
+        }
+
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(1, (self->follows ? 9.0 : 6.0) * work.number);
+            AVERAGED_PLANNER_YIELD(2, (self->follows ? 9.0 : 6.0) * work.number);
             averaged_planner_open(self, task);
-            AVERAGED_PLANNER_YIELD(2, HSEP_WORK_NUMBER * work.pairs);
+            AVERAGED_PLANNER_YIELD(3, HSEP_WORK_NUMBER * work.pairs);
             hsep_planner_aim(planner, task->spline, hsep_at(self, self->target));
             hsep_planner_pin(planner);
-            AVERAGED_PLANNER_YIELD(3, work.factor);
+            AVERAGED_PLANNER_YIELD(4, work.factor);
             self->planned = (hsep_int)hsep_planner_factor(planner, 1);
         }
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(4, work.solve);
+            AVERAGED_PLANNER_YIELD(5, work.solve);
             self->planned = (hsep_int)averaged_planner_solve(self, task, 0);
             while (self->solving) {
-                AVERAGED_PLANNER_YIELD(5, work.step);
+                AVERAGED_PLANNER_YIELD(6, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
         }
         averaged_planner_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
-
-        /* Its prediction, whose variances all plans have, as the last plan ends within the preview and its end is
-         * uncertain; and the remainder of that one */
-        for (self->samples = 0; self->judges && self->samples < all;) {
-            AVERAGED_PLANNER_YIELD(
-                6, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
-            (void)averaged_planner_vary(self, task, &work, of_physics);
-        }
-        if (self->judges) {
-            self->hurdle = averaged_planner_cost(self, task, of_physics);
-            self->samples = 0;
-            AVERAGED_PLANNER_YIELD(7, work.predict);
-            averaged_planner_predict(self, task, rest, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(8, work.predict);
-            averaged_planner_predict(self, task, rest, all - self->samples, 0);
-            self->cost = averaged_planner_cost(self, task, rest);
-            self->planned = !averaged_planner_better(self->cost, self->hurdle);
-        }
 
         /* Newton steps from the remainder of the last plan, as long as they gain */
         if (self->follows) {
@@ -421,35 +417,35 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
             self->left = averaged_planner_left(self, task, &work, self->steps);
             self->gains = 0;
-            AVERAGED_PLANNER_YIELD(9, work.linearise);
+            AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = self->n_pinned; self->spline < self->n;) {
-                AVERAGED_PLANNER_YIELD(10, hsep_linearised_work(linearised, task->model, self->spline * spacing));
+                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = self->n_pinned; self->spline < self->n;) {
                 AVERAGED_PLANNER_YIELD(
-                    11, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
+                    9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, task);
             }
-            AVERAGED_PLANNER_YIELD(12, self->bounded ? 3.0 * work.number : work.factor);
+            AVERAGED_PLANNER_YIELD(10, self->bounded ? 3.0 * work.number : work.factor);
             hsep_planner_complete(planner, self->n_pinned);
             if (!self->bounded && !hsep_planner_factor(planner, 1)) { /* a bounded one is solved again without it */
                 break;
             }
-            AVERAGED_PLANNER_YIELD(13, work.solve);
+            AVERAGED_PLANNER_YIELD(11, work.solve);
             if (!averaged_planner_solve(self, task, 1 + self->steps)) {
                 break;
             }
             while (self->solving) {
-                AVERAGED_PLANNER_YIELD(14, work.step);
+                AVERAGED_PLANNER_YIELD(12, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
                 self->samples = 0;
-                AVERAGED_PLANNER_YIELD(15, work.predict);
+                AVERAGED_PLANNER_YIELD(13, work.predict);
                 averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
-                AVERAGED_PLANNER_YIELD(16, work.predict);
+                AVERAGED_PLANNER_YIELD(14, work.predict);
                 averaged_planner_predict(self, task, c, all - self->samples, 0);
                 averaged_planner_judge(self, task);
             }
@@ -457,7 +453,12 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The best of them */
         self->left = averaged_planner_left(self, task, &work, HSEP_AVERAGED_STEPS);
+        self->samples = 0;
         if (self->judges) {
+            AVERAGED_PLANNER_YIELD(15, work.predict);
+            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(16, work.predict);
+            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
             averaged_planner_compare(self, task);
         }
 

@@ -45,7 +45,7 @@ typedef struct {
     hsep_int paused;      /* windows that the averaged model does not plan, now */
     hsep_int pause;       /* and after the next of its plans that runs away */
     hsep_real cost;       /* m2, of the best plan so far, */
-    hsep_real hurdle;     /* and of the physics model's */
+    hsep_real unchanged;  /* and of the remainder of the last one */
     hsep_real start;      /* m, position of rest */
     hsep_real next;       /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;       /* and that this part and all after it take at most */
