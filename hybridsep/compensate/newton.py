@@ -60,7 +60,7 @@ class DisturbanceSlopes(NamedTuple):
         Last sample at which it was there, counted from 1; 0: before all of them.
     stiffness, damping : (n,) array, m and m/s
         Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
-    of_position : (n, n_disturbances − 8) array, 1/m
+    of_position : (n, n_disturbances − N_LASTING) array, 1/m
         Of all others with ``x``.
     of_velocity : (n, n_own) array, s/m
         Of the user's own, the last ones, with the commanded velocity.
