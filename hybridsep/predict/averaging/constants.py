@@ -76,8 +76,8 @@ class AveragingConstants:
     difference_share : float
         Effect of a disturbance's first difference relative to its own: it only corrects the timing.
     gate : float
-        Largest residual that is believed: relative to the largest so far, and in steps of the fastest motion of the
-        physics model so far on top of it.
+        Largest residual that is believed, relative to the largest so far and the physics model's fastest step so far
+        together.
     patience : float
         Time, s, after which a value beyond it is believed: a sensor may read zero for half a second.
     """

@@ -528,10 +528,10 @@ def _judged(
     if published.any():
         predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, e[MODEL_RESIDUAL][published], settings.lam)
-    learned, (total, n_rows), led = replace(learned, stack=stack), stack.evidence.tolist(), state.leading.place
-    least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * n_rows
-    errs = total - 2.0 * stack.cross[led] + stack.gram[led, led] > least  # at rest noise would decide
-    if not (state.doubts and errs and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
+    learned, led = replace(learned, stack=stack), state.leading.place
+    squares = stack.evidence[0] - 2.0 * stack.cross[led] + stack.gram[led, led]
+    least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * stack.evidence[1]
+    if not (state.doubts and squares > least and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}

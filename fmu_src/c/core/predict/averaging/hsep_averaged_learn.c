@@ -296,10 +296,10 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     averaged_judge_stack(self, e);
     const hsep_stack *stack = &learned->stack;
     const hsep_int led = self->leading;
-    const hsep_real square = stack->evidence[0] - 2.0 * stack->cross[led] + stack->gram[led * (HSEP_N_EXPERTS + 1)];
+    const hsep_real squares = stack->evidence[0] - 2.0 * stack->cross[led] + stack->gram[led * (HSEP_N_EXPERTS + 1)];
     const hsep_real least = HSEP_AVERAGING_DISCARD_ERROR * learned->scales[HSEP_MODEL_RESIDUAL].largest_square;
-    const int errs = square > least * stack->evidence[1]; /* at rest noise would decide */
-    if (errs && hsep_averaged_doubts(self) && stack->weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
+    if (hsep_averaged_doubts(self) && squares > least * stack->evidence[1] &&
+        stack->weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
         /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
         hsep_expert_errors *errors = learned->errors;
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
