@@ -12,6 +12,7 @@ import numpy as np
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import ErrorSize, peak_derivatives
 from ..base.settings import DRIVE_LIMIT_ENTRIES, CompensatorSettings, Limits
+from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
@@ -27,6 +28,7 @@ __all__ = [
     "drive_limits",
     "estimated_limits",
     "expected_tracking",
+    "largest_motion",
     "limit_costs",
 ]
 
@@ -83,15 +85,20 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
+def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
+    """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
+    long = [one for one in recordings if len(one.x_d) > 3]
+    peaks = np.array([peak_derivatives(one.x_d, T_s) for one in long]).reshape(-1, 3).max(axis=0, initial=0.0)
+    return peaks, max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in long), default=0.0)
+
+
 def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
     """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
 
     They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
     largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it.
     """
-    long = [one for one in recordings if len(one.x_d) > 3]
-    peaks = np.array([peak_derivatives(one.x_d, T_s) for one in long]).reshape(-1, 3).max(axis=0, initial=0.0)
-    error = max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in long), default=0.0)
+    peaks, error = largest_motion(recordings, T_s)
     bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
     values = dict(zip(DRIVE_LIMIT_ENTRIES, bounds, strict=True))
     found: dict[str, Any] = {}
@@ -210,7 +217,7 @@ class Tracking:
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
             )
-        if self.v_max < self.fastest:
+        if self.v_max < float(f"{self.fastest:.4g}"):  # as it is shown
             factor, unit = shown.position
             lines.append(
                 f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "

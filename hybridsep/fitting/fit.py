@@ -34,7 +34,7 @@ from ..predict.window import Prediction
 from .advice import Judged, recommendation
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, WindowErrors, choose_settings, period_finding, window_scores, with_window
-from .compensation import LIMITS_WORDS, MARGINS, Tracking, drive_limits, estimated_limits, expected_tracking
+from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, largest_motion
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -314,15 +314,14 @@ def fit(
     windows = window_scores(model, tried, settings, found.offset, within(0.78, 0.9, "error over Np"))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
-    estimated = estimated_limits(recordings, T_s)
-    limits: dict[str, Any] = {**estimated, **given_limits}
+    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
     machine = _machine(name, logs, model, settings, plant.entries, limits, required=bool(given_limits))
     tracking = None
     if given_limits:
         estimate = within(0.95, 1.0, "tracking error with compensation")
-        largest, fastest = estimated.get("change_max", 0.0) / 2.0, estimated.get("velocity", 0.0) / float(MARGINS[0])
+        (fastest, *_), largest = largest_motion(recordings, T_s)
         tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest, fastest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
