@@ -41,43 +41,24 @@ WINDOWS = (100, 20)
 
 @dataclass(frozen=True)
 class Case:
-    """Axis and a run to predict.
-
-    Attributes
-    ----------
-    name : str
-    model : ModalModel
-    settings : PredictorSettings
-        Of the paper's model.
-    x_d : (n,) array, m
-        Commanded positions.
-    x_meas : tuple of two (n,) arrays, m
-        Measured positions of the cold and the warm run.
-    """
+    """Axis and a run to predict."""
 
     name: str
     model: ModalModel
-    settings: PredictorSettings
-    x_d: Array
-    x_meas: tuple[Array, Array]
+    settings: PredictorSettings  # of the paper's model
+    x_d: Array  # (n,), m: commanded positions
+    x_meas: tuple[Array, Array]  # each (n,), m: measured positions of the cold and the warm run
 
 
 @dataclass(frozen=True)
 class Row:
-    """RMS errors of a case, m; infinite where the replay was refused, because the prediction diverged.
-
-    Attributes
-    ----------
-    name : str
-    physics, hold : float
-        Of the cold run.
-    paper, averaging : tuple of two floats
-        Cold and warm.
-    """
+    """RMS errors of a case, m; infinite where the replay was refused, because the prediction diverged."""
 
     name: str
+    # of the cold run
     physics: float
     hold: float
+    # cold and warm
     paper: tuple[float, float]
     averaging: tuple[float, float]
 

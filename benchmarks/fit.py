@@ -34,20 +34,11 @@ COLUMNS = ("lag + hold", "hold", "ARX20", "ARX40", "physics", "hybrid", "best of
 
 @dataclass(frozen=True)
 class Row:
-    """Log judged with one window.
-
-    Attributes
-    ----------
-    name : str
-    Np : int
-    rms : mapping
-        Name of a prediction → RMS, 1e-6 of the unit; infinite where it diverged.
-    advice : str
-    """
+    """Log judged with one window."""
 
     name: str
     Np: int
-    rms: dict[str, float]
+    rms: dict[str, float]  # name of a prediction → RMS, 1e-6 of the unit; infinite where it diverged
     advice: str
 
     @property

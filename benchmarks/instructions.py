@@ -26,8 +26,6 @@ from benchmarks.step_time.compensator import trained as trained_in_loop
 from benchmarks.step_time.host import PREDICTOR, Host, build, instructions, warm
 from benchmarks.step_time.run import trained
 
-__all__ = ["count"]
-
 WINDOWS = 60
 LIMITS = {
     "predictor, cold": 0.32e6,

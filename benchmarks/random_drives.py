@@ -32,27 +32,18 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 
-__all__ = ["GENERATORS", "Generator", "print_faults", "print_replays", "read_positions", "write_positions"]
-
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator of random drives.
+    """A generator of random drives."""
 
-    Attributes
-    ----------
-    seed, n, chunk : int
-        Seed and number of the drives that figures are given for; drives of one task.
-    true_positions : callable
-        Returns the true positions, m, of drives, from their indices and ``seed=``.
-    drives_at : callable
-        Returns drives from their indices, true positions and seed.
-    """
-
+    # seed and number of the drives that figures are given for; drives of one task
     seed: int
     n: int
     chunk: int
+    # returns the true positions, m, of drives, from their indices and ``seed=``
     true_positions: Callable[..., list[Array]]
+    # returns drives from their indices, true positions and seed
     drives_at: Callable[[Sequence[int], Sequence[Array], int], Sequence[Drive]]
 
 
@@ -80,33 +71,20 @@ def read_positions(path: Path, generator: str, seed: int, n: int) -> list[Array]
 
 @dataclass(frozen=True)
 class FaultyReplay:
-    """Result of one drive with a faulty sensor, after the fault.
-
-    Attributes
-    ----------
-    index : int
-    fault : str
-    ratio : float
-        RMS against the sound measurement relative to the physics model's (with jitter: to the run without); infinite
-        where the replay ended with an error.
-    change : float
-        Largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement.
-    refused : bool
-        Whether the replay ended with an error.
-    own_noise : float
-        With jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter
-        that costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted.
-    true_ratio : float
-        With jitter: both predictions judged by the samples without it, in the same ratio.
-    """
+    """Result of one drive with a faulty sensor, after the fault."""
 
     index: int
     fault: str
+    # RMS against the sound measurement relative to the physics model's (with jitter: to the run without); infinite
+    # where the replay ended with an error
     ratio: float
+    # largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement
     change: float
-    refused: bool
+    refused: bool  # whether the replay ended with an error
+    # with jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter that
+    # costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted
     own_noise: float = math.nan
-    true_ratio: float = math.nan
+    true_ratio: float = math.nan  # with jitter: both predictions judged by the samples without it, in the same ratio
 
 
 def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:

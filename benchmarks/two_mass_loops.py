@@ -39,24 +39,16 @@ UM = 1e6
 
 @dataclass(frozen=True)
 class Result:
-    """A drive under a condition.
-
-    Attributes
-    ----------
-    condition, run, text : str
-    none, physics, compensated : (RMS, largest) of the tracking error, m
-        Infinite where the compensator refused to go on.
-    excess : float
-        By how much the command exceeds a limit of the drive, relative to it; ≤ 0: by nothing.
-    """
+    """A drive under a condition."""
 
     condition: str
     run: str
     text: str
+    # (RMS, largest) of the tracking error, m: infinite where the compensator refused to go on
     none: tuple[float, float]
     physics: tuple[float, float]
     compensated: tuple[float, float]
-    excess: float
+    excess: float  # by how much the command exceeds a limit of the drive, relative to it; ≤ 0: by nothing
 
     @property
     def ratios(self) -> tuple[float, float, float]:

@@ -5,24 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["ERRORS", "FINDINGS", "Explanation"]
-
 
 @dataclass(frozen=True)
 class Explanation:
-    """Cause and remedy of a message.
+    """Cause and remedy of a message."""
 
-    Attributes
-    ----------
-    cause, remedy : str
-        Sentences in Markdown.
-    printed : tuple of str
-        Words of messages by which a reader finds this entry.
-    """
-
+    # sentences in Markdown
     cause: str
     remedy: str
-    printed: tuple[str, ...] = ()
+    printed: tuple[str, ...] = ()  # words of messages by which a reader finds this entry
 
 
 ERRORS: Mapping[str, Explanation] = {

@@ -24,8 +24,6 @@ from hybridsep.fmi.spec import table_of
 from hybridsep.machines.machine import Machine
 from hybridsep.machines.sections import Section, entries
 
-__all__ = ["FMUS", "pages"]
-
 FOLDER = Path(__file__).resolve().parent / "reference"
 
 FMUS = {

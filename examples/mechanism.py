@@ -37,28 +37,6 @@ from hybridsep.base.signals import Array
 from hybridsep.model.discrete import DiscreteModel
 from hybridsep.model.physics import ModalModel
 
-__all__ = [
-    "Disturbance",
-    "Drive",
-    "Simulation",
-    "characteristic",
-    "coulomb",
-    "decay",
-    "innovation",
-    "lifted",
-    "linear_mode",
-    "markov",
-    "moving_average",
-    "polynomial",
-    "quadratic",
-    "recursion_with_mode",
-    "response",
-    "simulate",
-    "sinusoid",
-    "split",
-    "squared_command",
-]
-
 Disturbance = Callable[[int, Array, float], float]
 """``h(k, z(k), x_d(k))``: what acts on the drive from sample ``k`` to ``k + 1``, N, or m² where it is ``x_d²``."""
 

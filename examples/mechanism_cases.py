@@ -26,8 +26,6 @@ from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.trajectory import staircase
 
-__all__ = ["Case", "demonstrate"]
-
 
 @dataclass(frozen=True)
 class Case:

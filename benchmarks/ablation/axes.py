@@ -33,8 +33,6 @@ from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["LEVELS", "Axis", "Errors", "Folders", "errors_of", "logs_of", "physics", "simulations_of"]
-
 WINDOWS = {"recordings": (100, 20), "so101": (5, 20)}
 """Samples in a window, ``Np``, by the folder of the logs."""
 
@@ -60,55 +58,32 @@ Replay = Callable[[ModalModel, PredictorSettings, Run, Run], Replayed]
 
 @dataclass(frozen=True)
 class Axis:
-    """Axis and its runs.
-
-    Attributes
-    ----------
-    group, name : str
-    model, settings
-        ``G_pb`` and the settings with averaging.
-    x_d : (n,) array, m
-        Commanded positions.
-    x : tuple of two (n,) arrays, m
-        Measured positions of the cold run and of the warm one after it.
-    first : int
-        First test sample.
-    split : bool
-        Whether the warm run is of the test samples alone, after one of the samples before them; else of all samples.
-    best : float, m
-        RMS error over the test samples to which the errors of the cold run are relative; the warm run's are relative to
-        ``best_warm``.
-    best_warm : float, m
-    """
+    """Axis and its runs."""
 
     group: str
     name: str
+    # ``G_pb`` and the settings with averaging
     model: ModalModel
     settings: PredictorSettings
-    x_d: Array
-    x: tuple[Array, Array]
-    first: int
+    x_d: Array  # (n,), m: commanded positions
+    x: tuple[Array, Array]  # each (n,), m: measured positions of the cold run and of the warm one after it
+    first: int  # first test sample
+    # whether the warm run is of the test samples alone, after one of the samples before them; else of all samples
     split: bool
+    # m: RMS error over the test samples to which the errors of the cold run are relative; the warm run's are relative
+    # to ``best_warm``
     best: float
-    best_warm: float
+    best_warm: float  # m
 
 
 class Errors(NamedTuple):
-    """Errors of the prediction, relative to what an axis is judged by.
+    """Errors of the prediction, relative to what an axis is judged by."""
 
-    Attributes
-    ----------
-    cold, warm : float
-        RMS.
-    score : float
-        Of the interval of 90 %, cold: mean of its width, and twenty times what an error is beyond it, m.
-    within : tuple of three floats
-        Percent of the errors within each of the intervals of :data:`LEVELS`, cold.
-    """
-
+    # RMS
     cold: float
     warm: float
-    score: float
+    score: float  # of the interval of 90 %, cold: mean of its width, and twenty times what an error is beyond it, m
+    # percent of the errors within each of the intervals of :data:`LEVELS`, cold
     within: tuple[float, ...]
 
 

@@ -23,8 +23,6 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["Changes", "CoreVariant", "Run"]
-
 SOURCES = Path(__file__).resolve().parents[2] / "fmu_src" / "c" / "core"
 
 PARTS = ("numeric", "modal", "predict", "online")

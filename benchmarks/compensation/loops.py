@@ -21,8 +21,6 @@ from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Encoder, Plant
 
-__all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed", "paper_machine"]
-
 _PAPER = {"averaging": False, "Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
 
 

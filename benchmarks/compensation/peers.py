@@ -17,8 +17,6 @@ from hybridsep.base.signals import Array, as_samples
 from hybridsep.model.discrete import DiscreteModel
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["input_shaper", "shape", "zero_phase_command"]
-
 _RINGING = 0.999
 """Magnitude from which on a zero is not inverted: its inverse would ring for a thousand samples or diverge.
 

@@ -29,8 +29,6 @@ from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import spiral, staircase
 
-__all__ = ["Report"]
-
 
 @dataclass
 class Report:

@@ -26,8 +26,6 @@ from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions", "longest_step", "timed", "warm"]
-
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent

@@ -20,8 +20,6 @@ from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = ["KINDS", "OUTPUTS", "SIZES", "Case", "header", "parameters", "recorded"]
-
 KINDS = ("predictor", "compensator")
 SIZES = ((20, 20), (100, 50))
 OUTPUTS = {"predictor": ("x_h", "x_h_std"), "compensator": ("x_dm", "predicted.x_h")}
@@ -32,27 +30,15 @@ _BLOCK_SIZE = 1_500_000
 
 @dataclass(frozen=True)
 class Case:
-    """A replay.
+    """A replay."""
 
-    Attributes
-    ----------
-    kind : {"predictor", "compensator"}
-    Np, p : int
-        Samples of a window, lags.
-    windows : int
-        Windows that are replayed.
-    warm : bool
-        Whether it begins with what was learned in a run before.
-    recall : int
-        Samples of the memory.
-    """
-
-    kind: str
+    kind: str  # {"predictor", "compensator"}
+    # samples of a window, lags
     Np: int
     p: int
-    windows: int
-    warm: bool = False
-    recall: int = PredictorSettings().recall
+    windows: int  # windows that are replayed
+    warm: bool = False  # whether it begins with what was learned in a run before
+    recall: int = PredictorSettings().recall  # samples of the memory
 
 
 def _predictor(case: Case) -> HybridPredictor:

@@ -16,23 +16,6 @@ from numpy.typing import NDArray
 from benchmarks.targets.cases import Case, header
 from hybridsep.base.signals import Array
 
-__all__ = [
-    "C_SOURCES",
-    "FLOAT32",
-    "HERE",
-    "TARGETS",
-    "Replay",
-    "Sizes",
-    "Target",
-    "build",
-    "core_sources",
-    "include_options",
-    "program",
-    "replay",
-    "run",
-    "sizes",
-]
-
 HERE = Path(__file__).parent
 C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections")
@@ -44,38 +27,20 @@ _STACK_PAINTED = int(re.findall(r"#define STACK_PAINTED (\d+)", (HERE / "replay.
 
 @dataclass(frozen=True)
 class Target:
-    """A processor with its compiler, its C library and what emulates it.
+    """A processor with its compiler, its C library and what emulates it."""
 
-    Attributes
-    ----------
-    name : str
-        As the table has it.
-    compiler : tuple of str
-        With the options of the processor.
-    board, script : str
-        C file of the board; linker script, empty for a program of this machine.
-    emulator : tuple of str
-        Command before the program's name; empty: it runs here.
-    unit : int
-        Instructions in a unit of the board's counter; 0: callgrind counts them.
-    slow : bool
-        Whether it has no doubles: each operation is a call.
-    size_tool, nm : str
-        Of the compiler's binutils.
-    packages : str
-        Debian's, which bring all of it.
-    """
-
-    name: str
-    compiler: tuple[str, ...]
+    name: str  # as the table has it
+    compiler: tuple[str, ...]  # with the options of the processor
+    # C file of the board; linker script, empty for a program of this machine
     board: str
     script: str = ""
-    emulator: tuple[str, ...] = ()
-    unit: int = 0
-    slow: bool = False
+    emulator: tuple[str, ...] = ()  # command before the program's name; empty: it runs here
+    unit: int = 0  # instructions in a unit of the board's counter; 0: callgrind counts them
+    slow: bool = False  # whether it has no doubles: each operation is a call
+    # of the compiler's binutils
     size_tool: str = "size"
     nm: str = "nm"
-    packages: str = ""
+    packages: str = ""  # Debian's, which bring all of it
 
     def missing(self) -> str:
         """Return what is not installed here; empty if nothing."""
@@ -144,24 +109,14 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Replay:
-    """What a replay has printed.
+    """What a replay has printed."""
 
-    Attributes
-    ----------
-    block, stack : int
-        Bytes of the block, and of the stack that the library needed.
-    began : int
-        hsep_began.
-    counts : (n,) array
-        Instructions of each sample; zeros where the board does not count.
-    outputs : (n, 2) array, m
-    """
-
+    # bytes of the block, and of the stack that the library needed
     block: int
     stack: int
-    began: int
-    counts: NDArray[np.int64]
-    outputs: Array
+    began: int  # hsep_began
+    counts: NDArray[np.int64]  # (n,): instructions of each sample; zeros where the board does not count
+    outputs: Array  # (n, 2), m
 
 
 @dataclass(frozen=True)

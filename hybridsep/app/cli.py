@@ -28,12 +28,10 @@ from .start import demo, example_log, init
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["EXAMPLES", "app", "main"]
-
 PLUG_INS = ("fleet", "live", "modal")
 """Commands that this repository has as plug-ins, in ``plugins``."""
 
-DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
+_DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
@@ -132,7 +130,7 @@ def _plug_ins() -> dict[str, EntryPoint]:
 app = typer.Typer(
     cls=_Commands,
     help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",
-    epilog=f"An error is one line and exit status 2, Ctrl-C 130. {DEBUG_VARIABLE}=1 in the environment shows "
+    epilog=f"An error is one line and exit status 2, Ctrl-C 130. {_DEBUG_VARIABLE}=1 in the environment shows "
     "the traceback of an unexpected error.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -197,12 +195,12 @@ def _run() -> int:
     except MemoryError as error:
         return _fail(f"out of memory: {error}; use a smaller Np, p or q, or a shorter log".replace(": ;", ";"))
     except Exception as error:
-        if os.environ.get(DEBUG_VARIABLE):
+        if os.environ.get(_DEBUG_VARIABLE):
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
         return _fail(
             f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep "
-            f"{version_text()}: please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
+            f"{version_text()}: please report it with the command and its files ({_DEBUG_VARIABLE}=1 shows where it is)"
         )
 
 

@@ -26,25 +26,6 @@ if TYPE_CHECKING:
     from ..fitting.advice import Judged
     from ..machines.machine import Machine
 
-__all__ = [
-    "FIGURES",
-    "RUNS",
-    "Output",
-    "check_outputs",
-    "console",
-    "errors_console",
-    "print_built",
-    "print_channels",
-    "print_contours",
-    "print_json",
-    "print_judged",
-    "print_run",
-    "print_written",
-    "progress_bar",
-    "warn_of_estimates",
-    "written_before",
-]
-
 
 class _WholeLines(Console):
     """Console that breaks no line of text where it is no terminal: what reads it may look for one."""

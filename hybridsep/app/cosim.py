@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from ..base.signals import Array
     from ..machines.machine import Machine
 
-__all__ = ["cosim", "system"]
-
 
 def cosim(
     axes: Annotated[

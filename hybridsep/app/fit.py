@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from ..fitting.fit import Fit
     from ..fitting.tuning import Tuning
 
-__all__ = ["fit", "print_tuning", "tune"]
-
 _ROWS = 10
 """Candidates that are printed, besides the machine's own settings."""
 

@@ -17,9 +17,7 @@ from .options import ForceOption, MachineOption, TargetOption, UnitOption, Weigh
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-__all__ = ["build", "hal", "header"]
-
-CONTROLLERS = ("twincat",)
+_CONTROLLERS = ("twincat",)
 """Controllers that ``--for`` takes."""
 
 
@@ -56,7 +54,7 @@ def build(
         str | None,
         typer.Option(
             "--for",
-            help=f"Controller that compiles the sources: {', '.join(CONTROLLERS)}. Weights are compiled in, what "
+            help=f"Controller that compiles the sources: {', '.join(_CONTROLLERS)}. Weights are compiled in, what "
             "plays files is left out, and a file that its tool needs lies beside the FMUs.",
         ),
     ] = None,
@@ -84,8 +82,8 @@ def build(
     }
     if wrong := [option for option, given in native.items() if given and flavour != "native"]:
         raise ParameterError(f"{wrong[0]} is for native FMUs; with --flavour {flavour} leave it out")
-    if controller is not None and controller not in CONTROLLERS:
-        raise ParameterError(f"--for must be {' or '.join(CONTROLLERS)}, got {controller}")
+    if controller is not None and controller not in _CONTROLLERS:
+        raise ParameterError(f"--for must be {' or '.join(_CONTROLLERS)}, got {controller}")
     axis = load_machine(machine)
     models = _models(axis, fmus or [], flavour, target or [], fmi)
     if controller is not None:  # whose sources open no files

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from ..logs.log import Log
     from ..machines.machine import Machine
 
-__all__ = ["backtest", "different_logs", "read_checked", "show"]
-
 
 @takes_reading
 def backtest(

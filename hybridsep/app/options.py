@@ -21,25 +21,6 @@ from ..fmi.compile import TARGET_NAMES
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-__all__ = [
-    "TRAJECTORIES",
-    "CompensateOption",
-    "ForceOption",
-    "JsonOption",
-    "LogArgument",
-    "LogsArgument",
-    "MachineOption",
-    "ReadingOptions",
-    "SavedOption",
-    "SetOption",
-    "TargetOption",
-    "TrajectoryOption",
-    "UnitOption",
-    "WeightsOption",
-    "takes_known",
-    "takes_reading",
-]
-
 TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 """What ``--trajectory`` takes besides a file."""
 

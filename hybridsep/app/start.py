@@ -10,8 +10,6 @@ import typer
 
 from .options import ForceOption
 
-__all__ = ["demo", "example_log", "init", "print_figures"]
-
 _LAG = 0.006
 """Time constant of the axis in a machine file to edit, s."""
 

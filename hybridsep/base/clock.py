@@ -16,9 +16,7 @@ from typing import NamedTuple
 
 from .errors import FmuError, ParameterError, StateError
 
-__all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_communication_point", "check_step_size"]
-
-STEP_MAX = 100.0
+_STEP_MAX = 100.0
 """Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
 
 _TOLERANCE = 0.05  # of T_s: the importer's times may be whole nanoseconds or in single precision
@@ -129,8 +127,8 @@ class ClockStep(NamedTuple):
 
 def check_step_size(h: float) -> None:
     """Raise ParameterError if ``h``, s, is not a valid communication step size."""
-    if not 0 < h <= STEP_MAX:
-        raise ParameterError(f"the communication step size must be > 0 and ≤ {STEP_MAX:g} s, got {float(h)!r}")
+    if not 0 < h <= _STEP_MAX:
+        raise ParameterError(f"the communication step size must be > 0 and ≤ {_STEP_MAX:g} s, got {float(h)!r}")
 
 
 def check_communication_point(t: float, end: float, tolerance: float) -> None:

@@ -20,21 +20,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from itertools import islice
 
-__all__ = [
-    "FmuError",
-    "HybridSepError",
-    "IdentificationError",
-    "LogError",
-    "MachineError",
-    "ModelError",
-    "ParameterError",
-    "SignalError",
-    "StateError",
-    "brief",
-    "first_line",
-    "listed",
-]
-
 _LINE_MAX = 200
 """Largest length of another library's message within one of ours, in characters."""
 

@@ -19,8 +19,6 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
-__all__ = ["COMMANDS", "DEFAULT_MACHINE", "data_folder", "named_errors", "plain", "written_text", "written_whole"]
-
 DEFAULT_MACHINE = "spring_mass_damper"
 """Machine file of the paper's staircase; its FMUs have no suffix."""
 

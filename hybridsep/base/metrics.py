@@ -17,24 +17,6 @@ from .signals import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "ErrorSize",
-    "Score",
-    "batch_rms",
-    "coverage",
-    "hold",
-    "html_table",
-    "known_rms",
-    "largest",
-    "line_plot",
-    "one_line",
-    "peak_derivatives",
-    "reduction_percent",
-    "rms",
-    "rms_ratio",
-    "shown_figure",
-]
-
 
 @dataclass(frozen=True)
 class ErrorSize:

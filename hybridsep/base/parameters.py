@@ -9,8 +9,6 @@ from typing import Any
 
 from .errors import ParameterError, brief
 
-__all__ = ["Parameter", "angular_unit", "choice", "flag", "real", "whole"]
-
 
 @dataclass(frozen=True)
 class Parameter:

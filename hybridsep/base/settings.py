@@ -20,18 +20,6 @@ from typing import Any, ClassVar, TypeVar
 from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
-__all__ = [
-    "DRIVE_LIMIT_ENTRIES",
-    "PARAMETERS",
-    "PLAN_END",
-    "CompensatorSettings",
-    "Limits",
-    "PredictorSettings",
-    "Settings",
-    "check",
-    "samples_before",
-]
-
 PLAN_END = 3
 """Samples without change at the end of a compensator's plan, so that the third difference is zero after it."""
 

@@ -11,21 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
-__all__ = [
-    "POSITION_MAX",
-    "PREDICTION_MAX",
-    "Array",
-    "Indices",
-    "as_measured",
-    "as_published",
-    "as_samples",
-    "check_position",
-]
-
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-POSITION_MAX: Mapping[str, float] = {"m": 1e3, "rad": 1e6}
+_POSITION_MAX: Mapping[str, float] = {"m": 1e3, "rad": 1e6}
 """Largest magnitude of a position: beyond any axis, though a rotary one may turn on and on; a larger value is an error
 or in another unit."""
 
@@ -55,7 +44,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     if not np.isfinite(samples).all():
         i = int(np.flatnonzero(~np.isfinite(samples))[0])
         raise SignalError(f"{name} must be finite, got {samples[i]} at sample {i}")
-    most = max(POSITION_MAX.values())
+    most = max(_POSITION_MAX.values())
     if len(samples) and np.abs(samples).max() > most:
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{most:g} m or rad, got {samples[i]:g} at sample {i}")
@@ -70,11 +59,11 @@ def as_measured(values: ArrayLike, name: str, length: int | None = None) -> Arra
 
 
 def check_position(name: str, value: float, when: str = "", unit: str = "m") -> None:
-    """Raise SignalError if a position is not finite or beyond :data:`POSITION_MAX`; ``when`` ends the message."""
+    """Raise SignalError if a position is not finite or beyond :data:`_POSITION_MAX`; ``when`` ends the message."""
     if not math.isfinite(value):
         raise SignalError(f"{name} must be finite, got {value}{when}")
-    if abs(value) > POSITION_MAX[unit]:
-        raise SignalError(f"{name} must be within ±{POSITION_MAX[unit]:g} {unit}, got {value:g}{when}")
+    if abs(value) > _POSITION_MAX[unit]:
+        raise SignalError(f"{name} must be within ±{_POSITION_MAX[unit]:g} {unit}, got {value:g}{when}")
 
 
 def as_published(window: Array, name: str) -> Array:

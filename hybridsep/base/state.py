@@ -21,9 +21,7 @@ import numpy as np
 from .errors import SignalError, StateError
 from .signals import Array
 
-__all__ = ["FIXED", "VERSION", "arrays_of", "numbers_of", "pack", "restored", "restoring", "unpack", "with_numbers"]
-
-MAGIC = b"HSEP"
+_MAGIC = b"HSEP"
 VERSION = 1
 _PREFIX = struct.Struct("<4sII")
 _CRC = struct.Struct("<I")
@@ -42,7 +40,7 @@ def pack(
     text = json.dumps(header, separators=(",", ":"), sort_keys=True).encode()
     body = b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())
     body += b"".join((parts or {}).values())
-    blob = _PREFIX.pack(MAGIC, VERSION, len(text)) + text + body
+    blob = _PREFIX.pack(_MAGIC, VERSION, len(text)) + text + body
     return blob + _CRC.pack(zlib.crc32(blob))
 
 
@@ -54,7 +52,7 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
     StateError
         If the blob is not one, is truncated or damaged, or is of another kind or version.
     """
-    if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != MAGIC:
+    if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != _MAGIC:
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)
     if version != VERSION:
@@ -89,7 +87,7 @@ def restoring(kind: str) -> Iterator[None]:
         raise StateError(f"the saved {kind} is of another build of the library, train again: {error}") from error
 
 
-Record = TypeVar("Record")
+_Record = TypeVar("_Record")
 
 FIXED: Mapping[str, Any] = {"fixed": True}
 """Metadata of a field that follows from parameters: it is no part of what is saved."""
@@ -118,15 +116,15 @@ def numbers_of(record: Any) -> Array:
     return np.concatenate([np.ravel(value) for _, value in _leaves(record)])
 
 
-def with_numbers(like: Record, numbers: Array) -> Record:
+def with_numbers(like: _Record, numbers: Array) -> _Record:
     """Return a record of the same shapes with the ``numbers`` of :func:`numbers_of`, which are as many."""
     parts = [value for _, value in _leaves(like)]
     found = np.split(numbers, np.cumsum([np.size(part) for part in parts])[:-1])
-    record: Record = _rebuilt(like, (one.reshape(np.shape(part)) for one, part in zip(found, parts, strict=True)))
+    record: _Record = _rebuilt(like, (one.reshape(np.shape(part)) for one, part in zip(found, parts, strict=True)))
     return record
 
 
-def restored(like: Record, arrays: Mapping[str, Array]) -> Record:
+def restored(like: _Record, arrays: Mapping[str, Array]) -> _Record:
     """Return the record of :func:`arrays_of`.
 
     ``like`` has the same shapes; what is fixed is taken from it.
@@ -139,7 +137,7 @@ def restored(like: Record, arrays: Mapping[str, Array]) -> Record:
     for path, value in _leaves(like):
         if arrays[path].shape != np.shape(value):
             raise ValueError(f"{path} must have the shape {np.shape(value)}, got {arrays[path].shape}")
-    record: Record = _rebuilt(like, (arrays[path] for path, _ in _leaves(like)))
+    record: _Record = _rebuilt(like, (arrays[path] for path, _ in _leaves(like)))
     return record
 
 

@@ -13,8 +13,6 @@ from functools import cache
 import scipy.linalg  # noqa: F401  # loads the libraries that are limited
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["one_blas_thread"]
-
 
 class _OneThread(ContextDecorator):
     """Reentrant context manager and decorator; uses are counted, as the number of threads belongs to the process."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["COMMIT_FILE", "VERSION_DATE", "__version__", "commit", "version_text"]
-
 __version__ = "0.1.0"
 
 VERSION_DATE = "2026-11-24"

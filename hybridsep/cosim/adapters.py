@@ -21,17 +21,6 @@ from ..plants.plant import Encoder, Plant
 from ..predict.predictor import HybridPredictor
 from .run import COMPENSATOR, PREDICTOR, Kind
 
-__all__ = [
-    "Compensator",
-    "FmuController",
-    "FmuDrive",
-    "LibraryController",
-    "LibraryDrive",
-    "OwnController",
-    "check_controller",
-    "check_plant",
-]
-
 
 class Compensator(Protocol):
     """Interface of a compensator of your own in a run; :class:`SepCompensator` has it too."""

@@ -16,9 +16,7 @@ from ..plants.plant import Encoder
 from .loop import cosimulate
 from .run import Run
 
-__all__ = ["COMPENSATED", "Advance", "Runs", "compensate", "mean_summary"]
-
-TRAINING_SEED = 1000
+_TRAINING_SEED = 1000
 """Noise seed of the training run of a warm compensator; no case uses it."""
 
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
@@ -71,7 +69,7 @@ def train(machine: Machine, command: Array, path: Path) -> None:
     """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
     assert machine.plant is not None
     compensator = machine.new_compensator()
-    encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
+    encoder = Encoder(machine.plant.noise_std, _TRAINING_SEED)
     cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
     compensator.predictor.save(path)
 

@@ -16,9 +16,7 @@ from ..base.signals import Array
 from ..plants.path import PlanarPath, Points
 from .run import Run
 
-__all__ = ["Contour", "contours_of"]
-
-REACH = 0.1
+_REACH = 0.1
 """Time to either side in which the nearest part of the path is looked for, s: more than any drive lags behind."""
 
 _FINER = 16
@@ -27,34 +25,20 @@ _FINER = 16
 
 @dataclass(frozen=True)
 class Contour:
-    """Motion of two axes along a path.
+    """Motion of two axes along a path."""
 
-    Attributes
-    ----------
-    path : PlanarPath
-        Where the axes should be.
-    reached : (n,) complex array, m
-        Where they are at the same samples.
-    nearest : (n,) complex array, m
-        Points of the commanded path nearest to those reached, within :data:`REACH`.
-    error : (n,) array, m
-        Distances between the two, positive on the left of the path.
-    T_s : float
-        Sampling interval, s.
-    """
-
-    path: PlanarPath
-    reached: Points
-    nearest: Points
-    error: Array
-    T_s: float
+    path: PlanarPath  # where the axes should be
+    reached: Points  # (n,) complex, m: where they are at the same samples
+    nearest: Points  # (n,) complex, m: points of the commanded path nearest to those reached, within :data:`_REACH`
+    error: Array  # (n,), m: distances between the two, positive on the left of the path
+    T_s: float  # sampling interval, s
 
     @classmethod
     def of(cls, path: PlanarPath, reached: Points, T_s: float) -> Contour:
         """Return the contour errors of points ``(n,)``, n ≥ 2, at ``T_s``, s; between samples the path is a spline."""
         from scipy.interpolate import CubicSpline
 
-        n, reach = len(path.points), round(REACH / T_s)
+        n, reach = len(path.points), round(_REACH / T_s)
         finer = CubicSpline(np.arange(n), path.points)(np.arange((n - 1) * _FINER + 1) / _FINER)
         near, *_ = _nearest(reached, path.points, np.arange(n), -reach, reach + 1)
         _, nearest, error = _nearest(reached, finer, near * _FINER, -_FINER, 2 * _FINER)

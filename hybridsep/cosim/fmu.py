@@ -33,8 +33,6 @@ from fmpy.fmi3 import FMU3Slave
 from ..base.errors import FmuError, first_line, listed
 from ..base.files import named_errors
 
-__all__ = ["FmuInstance", "read_description"]
-
 _WORDS_MAX = 1000
 """Most characters of an FMU's message in an error."""
 
@@ -48,32 +46,15 @@ logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs
 
 @dataclass(frozen=True)
 class _Version:
-    """What differs between versions of FMI.
+    """What differs between versions of FMI."""
 
-    Attributes
-    ----------
-    slave : type
-        fmpy's.
-    platform : str
-        Folder of this machine's library below ``binaries/``.
-    prefix : str
-        Begin of the functions' names.
-    sized : bool
-        Whether they are told the number of values, which without arrays is the number of variables.
-    access : mapping
-        Type of a variable → type whose functions get and set it; real numbers first.
-    c_types : mapping
-        That type → type of C.
-    state, deserialise : str
-        What the version's functions call a state, and its deserialisation.
-    """
-
-    slave: type[Any]
-    platform: str
-    prefix: str
-    sized: bool
-    access: Mapping[str, str]
-    c_types: Mapping[str, Any]
+    slave: type[Any]  # fmpy's
+    platform: str  # folder of this machine's library below ``binaries/``
+    prefix: str  # begin of the functions' names
+    sized: bool  # whether they are told the number of values, which without arrays is the number of variables
+    access: Mapping[str, str]  # type of a variable → type whose functions get and set it; real numbers first
+    c_types: Mapping[str, Any]  # that type → type of C
+    # what the version's functions call a state, and its deserialisation
     state: str
     deserialise: str
 

@@ -28,12 +28,10 @@ from ..predict.predictor import HybridPredictor
 from .adapters import Compensator, FmuController, FmuDrive, LibraryController, LibraryDrive, OwnController
 from .run import Run
 
-__all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
-
 Sensor = Callable[[int, float], float]
 """Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what is measured in its place."""
 
-Disturb = Callable[[int, Any], object]
+_Disturb = Callable[[int, Any], object]
 """Called as ``disturb(k, plant)`` before sample ``k``, counted likewise; may change the plant."""
 
 Progress = Callable[[int, int], object]
@@ -51,7 +49,7 @@ def cosimulate(
     t_init: float | None = None,
     start_time: float = 0.0,
     sensor: Sensor | None = None,
-    disturb: Disturb | None = None,
+    disturb: _Disturb | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Run a predictor or a compensator and a drive together over a trajectory.
@@ -74,7 +72,7 @@ def cosimulate(
     start_time : float
         Start of the experiment, s.
     sensor, disturb, progress : callable, optional
-        As :data:`Sensor`, :data:`Disturb` (of an FMU with its ``FmuInstance``) and :data:`Progress` say.
+        As :data:`Sensor`, :data:`_Disturb` (of an FMU with its ``FmuInstance``) and :data:`Progress` say.
 
     Raises
     ------

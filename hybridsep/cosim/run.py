@@ -29,35 +29,17 @@ from ..online.look_ahead import SepState
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COMPENSATOR", "PREDICTOR", "Kind", "Run", "save_columns"]
-
 
 @dataclass(frozen=True)
 class Kind:
-    """Kind of a controller: its outputs in the loop and the columns of its runs' files.
+    """Kind of a controller: its outputs in the loop and the columns of its runs' files."""
 
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    outputs : tuple of str
-        Its positions, m; the first one goes to the drive.
-    state : str
-        Its Integer or Boolean output that says which model predicts.
-    lowest : SepState
-        State that stands for 0 of that output.
-    delay : str
-        Its parameter with the number of samples by which it delays the trajectory.
-    columns : tuple of str
-        Attributes of :class:`Run` that are saved.
-    """
-
-    name: str
-    outputs: tuple[str, ...]
-    state: str
-    lowest: SepState
-    delay: str
-    columns: tuple[str, ...]
+    name: str  # name in error messages
+    outputs: tuple[str, ...]  # its positions, m; the first one goes to the drive
+    state: str  # its Integer or Boolean output that says which model predicts
+    lowest: SepState  # state that stands for 0 of that output
+    delay: str  # its parameter with the number of samples by which it delays the trajectory
+    columns: tuple[str, ...]  # attributes of :class:`Run` that are saved
 
 
 PREDICTOR = Kind(

@@ -22,8 +22,6 @@ from ..machines.machine import PAPER_SETTINGS, Machine, load_machine
 from ..plants.trajectory import spiral, staircase
 from .page import PRINTED, write_page
 
-__all__ = ["demo", "demo_files"]
-
 Summary = dict[str, dict[str, Any]]
 
 MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
@@ -41,7 +39,7 @@ def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
     return predictor, plant
 
 
-def staircase_case(out: Path, seeds: int, advance: Advance) -> dict[str, Any]:
+def _staircase_case(out: Path, seeds: int, advance: Advance) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
@@ -157,7 +155,7 @@ def demo(
         progress(message, done / total)
         done += 1
 
-    summary: Summary = {"staircase": staircase_case(out, seeds, advance)}
+    summary: Summary = {"staircase": _staircase_case(out, seeds, advance)}
     if full:
         summary |= spiral_case(out, advance)
     for name, case in summary.items():

@@ -9,8 +9,6 @@ from typing import Any, NamedTuple
 from ..base.metrics import shown_figure
 from ..evaluate.html_report import Report
 
-__all__ = ["PRINTED", "Table", "compensation_table", "prediction_table", "write_page"]
-
 PRINTED = {
     "staircase": {"rms_pb_um": 33.7, "rms_h_um": 14.7, "reduction_percent": 56.4},
     "spiral_x": {"rms_pb_um": 22.0, "rms_h_um": 13.7, "reduction_percent": 38.0},

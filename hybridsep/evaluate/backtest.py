@@ -27,40 +27,26 @@ from .verdict import Tally, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Backtest", "backtest", "replayed_run"]
-
 
 @dataclass(frozen=True, repr=False)
 class Backtest:
     """Result of a replay: scores and predictions.
 
     It prints as one line, and as a table in a notebook; :meth:`plot` draws the errors window by window.
-
-    Attributes
-    ----------
-    overall, after_warm_up : Score
-        Over all samples, and over the samples after the warm-up.
-    verdict : Verdict
-        Judgement of the hybrid over all samples, in words.
-    x_pb, x_hold, x_h : (n,) array, m
-        Predictions, each made before its window was revealed. With a ``measurement_delay`` they stand where what they
-        predict was measured.
-    x_h_std : (n,) array, m
-        Standard deviation of the error of ``x_h``, as predicted.
-    active : (n,) array of bool
-        Whether the hybrid is published, that is, after the warm-up.
-    batch_rms_pb, batch_rms_hold, batch_rms_h : (n_batches,) array, m
-        RMS errors of each window, NaN where nothing was measured; the last one may be incomplete.
     """
 
+    # over all samples, and over the samples after the warm-up
     overall: Score
     after_warm_up: Score
-    verdict: Verdict
+    verdict: Verdict  # judgement of the hybrid over all samples, in words
+    # (n,), m: predictions, each made before its window was revealed. With a ``measurement_delay`` they stand where what
+    # they predict was measured
     x_pb: Array
     x_hold: Array
     x_h: Array
-    x_h_std: Array
-    active: NDArray[np.bool_]
+    x_h_std: Array  # (n,), m: standard deviation of the error of ``x_h``, as predicted
+    active: NDArray[np.bool_]  # (n,): whether the hybrid is published, that is, after the warm-up
+    # (n_batches,), m: RMS errors of each window, NaN where nothing was measured; the last one may be incomplete
     batch_rms_pb: Array
     batch_rms_hold: Array
     batch_rms_h: Array

@@ -28,8 +28,6 @@ from ..logs.units import DisplayUnits, shown_in
 from ..online.look_ahead import SepState
 from .html_report import HOLD, HYBRID, PHYSICS
 
-__all__ = ["CASES", "contour_figure", "prediction_figure", "save_figure", "tracking_figure"]
-
 CASES = {
     "off": ("no compensation", HOLD),
     "physics": ("physics model", PHYSICS),

@@ -18,8 +18,6 @@ from ..base.signals import Indices
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-__all__ = ["HOLD", "HYBRID", "PHYSICS", "Chart", "Line", "Report", "drawn_places"]
-
 PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
 """Colours of the predictions, in all figures."""
 
@@ -90,31 +88,16 @@ def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
 
 @dataclass(frozen=True)
 class Line:
-    """Line, band or row of points of a chart.
+    """Line, band or row of points of a chart."""
 
-    Attributes
-    ----------
-    name : str
-        In the legend; empty for none.
-    x, y : (n,) array_like
-        Of a long line the extremes of each stretch are drawn.
-    colour : str
-        ``#rrggbb``.
-    upper : (n,) array_like, optional
-        Upper edge of a band, ``y`` being the lower one.
-    points : bool
-        Whether points are drawn instead of a line.
-    panel : int
-        Panel, from 0, top first.
-    """
-
-    name: str
+    name: str  # in the legend; empty for none
+    # (n,): of a long line the extremes of each stretch are drawn
     x: ArrayLike
     y: ArrayLike
-    colour: str
-    upper: ArrayLike | None = None
-    points: bool = False
-    panel: int = 0
+    colour: str  # ``#rrggbb``
+    upper: ArrayLike | None = None  # (n,): upper edge of a band, ``y`` being the lower one
+    points: bool = False  # whether points are drawn instead of a line
+    panel: int = 0  # panel, from 0, top first
 
     def draw(self, figure: Figure) -> None:
         """Draw it into its panel."""
@@ -139,23 +122,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Chart:
-    """Chart of one or more panels over a common abscissa.
-
-    Attributes
-    ----------
-    x_label : str
-    y_labels : tuple of str
-        One a panel.
-    lines : sequence of Line
-    caption : str
-    x_log, y_log : bool
-        Whether an axis is logarithmic.
-    """
+    """Chart of one or more panels over a common abscissa."""
 
     x_label: str
-    y_labels: tuple[str, ...]
+    y_labels: tuple[str, ...]  # one a panel
     lines: Sequence[Line]
     caption: str = ""
+    # whether an axis is logarithmic
     x_log: bool = False
     y_log: bool = False
 
@@ -178,12 +151,7 @@ class Chart:
 
 @dataclass
 class Report:
-    """Report that is put together section by section.
-
-    Attributes
-    ----------
-    title, subtitle : str
-    """
+    """Report that is put together section by section."""
 
     title: str
     subtitle: str

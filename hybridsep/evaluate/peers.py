@@ -20,38 +20,16 @@ from scipy.signal import lfilter, lfiltic
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
 
-__all__ = [
-    "ARX_LAGS",
-    "FROZEN",
-    "LAG_HOLD",
-    "REFITTED",
-    "ArxRun",
-    "FirstOrderLag",
-    "MinimumNorm",
-    "Peer",
-    "Piece",
-    "fitted_lag",
-    "predict_peers",
-]
-
 _LATE_MAX, _TIME_CONSTANTS = 21, (0.05, 1e4)
 """Most samples that a command is tried to be late by; least and largest time constant that are tried, samples."""
 
 
 @dataclass(frozen=True)
 class FirstOrderLag:
-    """Lag ``1/(τs + 1)`` of a command that is late by whole samples.
+    """Lag ``1/(τs + 1)`` of a command that is late by whole samples."""
 
-    Attributes
-    ----------
-    tau : float
-        Time constant, samples.
-    late : int
-        Whole samples: 1 and the dead time over a zero-order hold, 0 where the axis follows within the sample.
-    """
-
-    tau: float
-    late: int
+    tau: float  # time constant, samples
+    late: int  # whole samples: 1 and the dead time over a zero-order hold, 0 where the axis follows within the sample
 
     def position(self, x_d: Array) -> Array:
         """Return the position under a command ``(n,)``, m, from rest at the first one."""
@@ -199,43 +177,23 @@ diverges: no drive gets there."""
 
 
 class Piece(NamedTuple):
-    """Piece of a log without a gap.
+    """Piece of a log without a gap."""
 
-    Attributes
-    ----------
-    x_d, x : (n,) array, m
-        Commanded and measured positions, the latter NaN where missing.
-    n_train : int
-        Leading training samples.
-    first : int
-        First sample that is predicted, the beginning of a window.
-    """
-
+    # (n,), m: commanded and measured positions, the latter NaN where missing
     x_d: Array
     x: Array
-    n_train: int
-    first: int
+    n_train: int  # leading training samples
+    first: int  # first sample that is predicted, the beginning of a window
 
 
 @dataclass(frozen=True)
 class Peer:
-    """Predictions of a peer.
+    """Predictions of a peer."""
 
-    Attributes
-    ----------
-    name : str
-        Such as "ARX20".
-    way : str
-        How it was fitted: :data:`FROZEN`, :data:`REFITTED`; empty if there is one way only.
-    predictions : tuple of (n,) arrays, m
-        One a piece, NaN where it predicts nothing.
-    diverged : bool
-        Whether a window was predicted far beyond where any axis gets; then the predictions end there.
-    """
-
-    name: str
-    way: str
-    predictions: tuple[Array, ...]
+    name: str  # such as "ARX20"
+    way: str  # how it was fitted: :data:`FROZEN`, :data:`REFITTED`; empty if there is one way only
+    predictions: tuple[Array, ...]  # each (n,), m: one a piece, NaN where it predicts nothing
+    # whether a window was predicted far beyond where any axis gets; then the predictions end there
     diverged: bool = False
 
     @property

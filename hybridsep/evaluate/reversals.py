@@ -19,8 +19,6 @@ from scipy.stats import linregress
 
 from ..base.signals import Array, Indices
 
-__all__ = ["ReversalCurve", "friction_table", "reversal_curve"]
-
 _REVERSALS_MIN = 4
 """Fewest reversals that a curve is made from: the median of fewer is no better than one of them."""
 
@@ -52,30 +50,14 @@ _VELOCITIES = 20
 
 @dataclass(frozen=True)
 class ReversalCurve:
-    """Changes of residuals by a reversal, medians over all reversals; positive where the axis stays behind.
+    """Changes of residuals by a reversal, medians over all reversals; positive where the axis stays behind."""
 
-    Attributes
-    ----------
-    n : int
-        Reversals.
-    distance : (m,) array, m
-        Since the reversal, from 0.
-    changes : (rows, m) array, m
-        Of each residual, the measured one first.
-    errors : (rows,) array, m
-        Reversal errors: what the changes come to.
-    deviation : float, m
-        Standard deviation of the measured one.
-    slope : float
-        Part of the measured residual that grows with the velocity, samples; taken off.
-    """
-
-    n: int
-    distance: Array
-    changes: Array
-    errors: Array
-    deviation: float
-    slope: float
+    n: int  # reversals
+    distance: Array  # (m,), m: since the reversal, from 0
+    changes: Array  # (rows, m), m: of each residual, the measured one first
+    errors: Array  # (rows,), m: reversal errors: what the changes come to
+    deviation: float  # m: standard deviation of the measured one
+    slope: float  # part of the measured residual that grows with the velocity, samples; taken off
 
     @property
     def settling(self) -> float:

@@ -16,8 +16,6 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["ALIKE", "PEERS", "STANDSTILL", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
-
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
 
@@ -45,42 +43,25 @@ _N_EARLY = 10
 _N_THIRDS = 3
 _THIRDS = ("first third", "second third", "last third")
 _MOTIONS = ("standstill", "motion")
-PEERS = ("the physics model", "hold")
+_PEERS = ("the physics model", "hold")
 """Peers of every hybrid model, whose errors also tell why it is worse."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Judgement of the hybrid model against its peers.
+    """Judgement of the hybrid model against its peers."""
 
-    Attributes
-    ----------
-    peers : tuple of str
-        Their names, :data:`PEERS` first.
-    ratios : tuple of float
-        RMS error of the hybrid relative to each peer's; NaN where the log's resolution does not show the peer's.
-    worse : tuple of tuples of str
-        Places where it is worse than each peer.
-    judged : tuple of str
-        Places with enough samples.
-    causes : tuple of str
-        What explains it where it is worse, as far as the run shows.
-    n_rejected, n_missing, n_samples : int
-        Number of measurements that were not learned, as they were missing or not plausible; of missing ones; and of
-        all.
-    n_windows : int
-        Whole windows with measurements, which were judged.
-    """
-
-    peers: tuple[str, ...]
+    peers: tuple[str, ...]  # their names, :data:`_PEERS` first
+    # RMS error of the hybrid relative to each peer's; NaN where the log's resolution does not show the peer's
     ratios: tuple[float, ...]
-    worse: tuple[tuple[str, ...], ...]
-    judged: tuple[str, ...]
-    causes: tuple[str, ...]
+    worse: tuple[tuple[str, ...], ...]  # places where it is worse than each peer
+    judged: tuple[str, ...]  # places with enough samples
+    causes: tuple[str, ...]  # what explains it where it is worse, as far as the run shows
+    # number of measurements that were not learned, as they were missing or not plausible; of missing ones; and of all
     n_rejected: int
     n_missing: int
     n_samples: int
-    n_windows: int
+    n_windows: int  # whole windows with measurements, which were judged
 
     def __str__(self) -> str:
         if self.n_windows < WINDOWS_MIN:
@@ -116,14 +97,14 @@ class Tally:
     Np : int
         Samples in a window.
     further : sequence of str
-        Names of peers besides :data:`PEERS`.
+        Names of peers besides :data:`_PEERS`.
     least : float
         Least RMS error, m, that the measurement's resolution shows: no ratio to a smaller one is formed.
     """
 
     def __init__(self, Np: int, further: Sequence[str] = (), least: float = 0.0) -> None:
         self.Np, self._least = Np, least
-        self._peers = (*PEERS, *further)
+        self._peers = (*_PEERS, *further)
         self._squares = np.zeros((len(self._peers) + 1, len(_MOTIONS), _N_THIRDS))
         self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
         self._early, self._n_windows, self._n_whole = np.zeros(len(self._squares)), 0, 0
@@ -179,7 +160,7 @@ class Tally:
             ratios,
             tuple(self._worse(h, peer) for peer in peers),
             tuple(self._places()),
-            tuple(self._causes(ratios[: len(PEERS)])),
+            tuple(self._causes(ratios[: len(_PEERS)])),
             n_rejected,
             min(self._n_missing if n_missing is None else n_missing, n_rejected),
             n_samples,
@@ -201,7 +182,7 @@ class Tally:
         )
 
     def _causes(self, ratios: Sequence[float]) -> list[str]:
-        """Return what explains a hybrid that is worse than some of :data:`PEERS`."""
+        """Return what explains a hybrid that is worse than some of :data:`_PEERS`."""
         if self._largest_change > _UNSTABLE * self._largest_residual > 0.0:
             times = self._largest_change / self._largest_residual
             return [f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"]

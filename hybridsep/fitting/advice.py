@@ -18,8 +18,6 @@ from ..logs.log import Log
 from ..logs.units import DisplayUnits
 from .replay import Replay
 
-__all__ = ["OF_ITSELF", "Judged", "extent", "peers_in_words", "recommendation", "whole_log_words"]
-
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
 
@@ -33,37 +31,18 @@ _KNOWN = (
 
 @dataclass(frozen=True)
 class Judged:
-    """Replay as it is reported.
-
-    Attributes
-    ----------
-    replay : Replay
-    T_s : float
-        Sampling interval, s.
-    shown : DisplayUnits
-        Units in which positions are shown.
-    part : str
-        What the test is on, such as "the log's second half".
-    share : float
-        Share of a log's samples that are test samples.
-    period : str
-        That the residual repeats with the position, and the option that says so, in words; empty where it does not.
-    unidentified : bool
-        Whether the log's first half had too little motion to identify the axis from.
-    known : bool
-        Whether the predictor had been trained with the log.
-    controller : Controller, optional
-        What the controller says of itself; None where the logs have none of its signals.
-    """
+    """Replay as it is reported."""
 
     replay: Replay
-    T_s: float
-    shown: DisplayUnits
-    part: str
-    share: float = 1.0
+    T_s: float  # sampling interval, s
+    shown: DisplayUnits  # units in which positions are shown
+    part: str  # what the test is on, such as "the log's second half"
+    share: float = 1.0  # share of a log's samples that are test samples
+    # that the residual repeats with the position, and the option that says so, in words; empty where it does not
     period: str = ""
-    unidentified: bool = False
-    known: bool = False
+    unidentified: bool = False  # whether the log's first half had too little motion to identify the axis from
+    known: bool = False  # whether the predictor had been trained with the log
+    # what the controller says of itself; None where the logs have none of its signals
     controller: Controller | None = None
 
     @cached_property

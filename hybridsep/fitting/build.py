@@ -11,8 +11,6 @@ from ..fmi.compile import has_native
 from ..fmi.flavours import FLAVOURS
 from ..fmi.spec import fmu_name
 
-__all__ = ["fit_files", "sha256_of", "write_commands"]
-
 
 def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
     """Return the files of a fit of a machine, in their folder, by what they are."""

@@ -20,18 +20,6 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, replay
 
-__all__ = [
-    "WORTH",
-    "Tried",
-    "WindowErrors",
-    "choose_settings",
-    "period_finding",
-    "settings_to_try",
-    "trained_rms",
-    "window_scores",
-    "with_window",
-]
-
 WORTH = 0.05
 """Relative gain below which the default settings stay: less may be chance."""
 
@@ -50,7 +38,7 @@ _GAIN = 0.9
 
 @dataclass(frozen=True)
 class Tried:
-    """Settings that were tried: lags, and RMS of the hybrid as of :func:`trained_rms`, m, infinite if it diverged."""
+    """Settings that were tried: lags, and RMS of the hybrid as of :func:`_trained_rms`, m, infinite if it diverged."""
 
     p: int
     q: int
@@ -96,7 +84,7 @@ def choose_settings(
     candidates, errors = settings_to_try(settings), []
     for i, candidate in enumerate(candidates):
         try:
-            errors.append(trained_rms(model, candidate, recordings))
+            errors.append(_trained_rms(model, candidate, recordings))
         except SignalError:  # it diverges
             errors.append(math.inf)
         progress((i + 1) / len(candidates))
@@ -106,7 +94,7 @@ def choose_settings(
     return candidates[chosen], tuple(tried)
 
 
-def trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
+def _trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
     """Return the RMS of the hybrid's error over the later half of the training samples, m.
 
     The earlier half shows which learns fastest, but machines run warm.
@@ -151,7 +139,7 @@ def period_finding(
     period = residual_period(training, model, settings.T_s, settings.input_hold)
     if period == 0.0 or period > PARAMETERS["period"].maximum:
         return ""
-    without, with_it = (trained_rms(model, one, recordings) for one in (settings, replace(settings, period=period)))
+    without, with_it = (_trained_rms(model, one, recordings) for one in (settings, replace(settings, period=period)))
     if not with_it < _GAIN * without:
         return ""
     factor, position = shown.position

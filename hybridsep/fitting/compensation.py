@@ -18,25 +18,11 @@ from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from .replay import Recording, beginnings
 
-__all__ = [
-    "COSTS_MAX",
-    "LIMITS_WORDS",
-    "MARGINS",
-    "LimitCosts",
-    "Tracking",
-    "binding_words",
-    "drive_limits",
-    "estimated_limits",
-    "expected_tracking",
-    "largest_motion",
-    "limit_costs",
-]
-
 MARGINS = np.array([1.25, 2.0, 5.0])
 """Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
 library."""
 
-FOLLOWING_ERROR = 1.3
+_FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
 error below that was above it (``python -m benchmarks.faults``)."""
 
@@ -96,10 +82,10 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
     """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
 
     They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
-    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it.
+    largest servo error, and the compensator trips above :data:`_FOLLOWING_ERROR` times it.
     """
     peaks, error = largest_motion(recordings, T_s)
-    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
+    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, _FOLLOWING_ERROR * error)
     values = dict(zip(DRIVE_LIMIT_ENTRIES, bounds, strict=True))
     found: dict[str, Any] = {}
     for name, value in values.items():
@@ -112,21 +98,12 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
 
 @dataclass(frozen=True)
 class LimitCosts:
-    """What the drive's limits cost a compensator.
+    """What the drive's limits cost a compensator."""
 
-    Attributes
-    ----------
-    effects : mapping
-        Name of a limit, such as ``a_max`` → factor → :class:`ErrorSize` with this limit alone times the factor.
-    advised : mapping
-        Name → value of the limits that are advised in their place, SI; empty where none is.
-    advised_error : ErrorSize
-        With these.
-    """
-
+    # name of a limit, such as ``a_max`` → factor → :class:`ErrorSize` with this limit alone times the factor
     effects: Mapping[str, Mapping[float, ErrorSize]]
-    advised: Mapping[str, float]
-    advised_error: ErrorSize
+    advised: Mapping[str, float]  # name → value of the limits that are advised in their place, SI; empty where none is
+    advised_error: ErrorSize  # with these
 
     def lines(self, shown: DisplayUnits, option: str = "--{name} ") -> list[str]:
         """Return a line for each limit and, last, the advised ones to paste, each after an ``option`` of its name."""
@@ -169,37 +146,23 @@ def limit_costs(
 
 @dataclass(frozen=True)
 class Tracking:
-    """Tracking errors to be expected over the test samples.
+    """Tracking errors to be expected over the test samples."""
 
-    Attributes
-    ----------
-    none, physics, hybrid : ErrorSize
-        As measured, and estimates with each model; NaN without a test sample, or where a plan diverges.
-    limits : mapping
-        Model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`.
-    costs : LimitCosts, optional
-        With the hybrid, over the first samples of each log; None where no limit binds it.
-    change_max, following_error_max : float
-        Largest change of the command, and following error above which the compensator trips, m.
-    duration : float
-        Of the samples that are tried, of a long log from its beginning, s.
-    largest, fastest : float
-        Largest servo error of the whole logs, m, and largest velocity of their commands, m/s.
-    v_max : float
-        The drive's, m/s.
-    """
-
+    # as measured, and estimates with each model; NaN without a test sample, or where a plan diverges
     none: ErrorSize
     physics: ErrorSize
     hybrid: ErrorSize
+    # model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`
     limits: Mapping[str, Mapping[str, float]]
-    costs: LimitCosts | None
+    costs: LimitCosts | None  # with the hybrid, over the first samples of each log; None where no limit binds it
+    # largest change of the command, and following error above which the compensator trips, m
     change_max: float | None
     following_error_max: float
-    duration: float
+    duration: float  # of the samples that are tried, of a long log from its beginning, s
+    # largest servo error of the whole logs, m, and largest velocity of their commands, m/s
     largest: float
     fastest: float
-    v_max: float
+    v_max: float  # the drive's, m/s
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""

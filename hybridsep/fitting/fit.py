@@ -50,8 +50,6 @@ from .report import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Fit", "fit"]
-
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
 

@@ -27,8 +27,6 @@ from ..model.physics import ModalModel, Mode
 from ..plants.stage_drive import StageDrive
 from .replay import Recording
 
-__all__ = ["IdentifiedPlant", "commands_to_try", "identified_plant"]
-
 _FITTED = 2 / 3
 """Share of the training samples that the fit takes; the others choose."""
 
@@ -59,23 +57,14 @@ _SMALLEST_SPREAD = 1e-3
 
 @dataclass(frozen=True)
 class IdentifiedPlant:
-    """Plant of a fit.
+    """Plant of a fit."""
 
-    Attributes
-    ----------
-    entries : mapping
-        Of the section ``[plant]`` of a machine file.
-    rms, rms_pb : float
-        RMS of what was measured less the plant and less the physics model, over the test samples, without their offset,
-        m; NaN where there are none.
-    reason : str
-        Why there is no plant to this model, empty if there is one.
-    """
-
-    entries: Mapping[str, Any]
+    entries: Mapping[str, Any]  # of the section ``[plant]`` of a machine file
+    # RMS of what was measured less the plant and less the physics model, over the test samples, without their offset,
+    # m; NaN where there are none
     rms: float = math.nan
     rms_pb: float = math.nan
-    reason: str = ""
+    reason: str = ""  # why there is no plant to this model, empty if there is one
 
     @property
     def disturbed(self) -> bool:

@@ -20,27 +20,16 @@ from ..identify.output_error import delayed
 from ..logs.checks import resolution
 from ..predict.predictor import HybridPredictor
 
-__all__ = ["Judgement", "Recording", "Replay", "Scored", "beginnings", "knew", "replay", "split_log"]
-
 
 @dataclass(frozen=True)
 class Recording:
-    """Piece of a recording without a gap.
+    """Piece of a recording without a gap."""
 
-    Attributes
-    ----------
-    x_d, x : (n,) array, m
-        Commanded and measured positions.
-    n_train : int
-        Leading training samples; the others are test samples.
-    n_settling : int
-        Leading samples that do not judge, as after a gap no model knows the state of the axis.
-    """
-
+    # (n,), m: commanded and measured positions
     x_d: Array
     x: Array
-    n_train: int
-    n_settling: int = 0
+    n_train: int  # leading training samples; the others are test samples
+    n_settling: int = 0  # leading samples that do not judge, as after a gap no model knows the state of the axis
 
     @property
     def training(self) -> tuple[Array, Array]:
@@ -102,20 +91,11 @@ def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
 
 @dataclass(frozen=True)
 class Scored:
-    """Errors of a prediction over the test samples.
-
-    Attributes
-    ----------
-    name : str
-    errors : (n,) array, m
-        Measured minus predicted position, NaN where a measurement is missing.
-    diverged : bool
-        Whether the prediction diverged; then its errors mean nothing.
-    """
+    """Errors of a prediction over the test samples."""
 
     name: str
-    errors: Array
-    diverged: bool = False
+    errors: Array  # (n,), m: measured minus predicted position, NaN where a measurement is missing
+    diverged: bool = False  # whether the prediction diverged; then its errors mean nothing
 
     @cached_property
     def rms(self) -> float:
@@ -125,34 +105,19 @@ class Scored:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Figures of a replay over the test samples.
+    """Figures of a replay over the test samples."""
 
-    Attributes
-    ----------
-    rms_pb, rms_hold, rms_h : float
-        RMS of physics model, hold and hybrid, m.
-    peers : mapping
-        Name of a peer → its RMS, m, or ``"diverged"``.
-    best : str
-        Best of physics model, hold and peers.
-    ratio : float
-        The hybrid's RMS relative to its.
-    largest : mapping
-        Name of each that did not diverge, as in :meth:`Replay.scored` → its largest error, m.
-    n_windows : int
-    verdict : str
-        In words.
-    """
-
+    # RMS of physics model, hold and hybrid, m
     rms_pb: float
     rms_hold: float
     rms_h: float
-    peers: Mapping[str, float | str]
-    best: str
-    ratio: float
+    peers: Mapping[str, float | str]  # name of a peer → its RMS, m, or ``"diverged"``
+    best: str  # best of physics model, hold and peers
+    ratio: float  # the hybrid's RMS relative to its
+    # name of each that did not diverge, as in :meth:`Replay.scored` → its largest error, m
     largest: Mapping[str, float]
     n_windows: int
-    verdict: str
+    verdict: str  # in words
 
 
 @dataclass(frozen=True)
@@ -161,29 +126,16 @@ class Replay:
 
     The test samples are the same everywhere: the whole windows from the first one that begins in the test part, and
     the shorter one at a recording's end.
-
-    Attributes
-    ----------
-    recordings : tuple of Recording
-    backtest : Backtest
-        Of all recordings, joined.
-    Np : int
-        Samples in a window.
-    delay : int
-        Samples by which the measurements are late; as many measurements at a recording's beginning are from before it,
-        and count as missing.
-    offset : float
-        Measured minus modelled position, m, identified beside the physics model and tested with it.
-    peers : tuple of Peer
-        What the hybrid is compared with besides physics model and hold.
     """
 
     recordings: tuple[Recording, ...]
-    backtest: Backtest
-    Np: int
+    backtest: Backtest  # of all recordings, joined
+    Np: int  # samples in a window
+    # samples by which the measurements are late; as many measurements at a recording's beginning are from before it,
+    # and count as missing
     delay: int = 0
-    offset: float = 0.0
-    peers: tuple[Peer, ...] = ()
+    offset: float = 0.0  # measured minus modelled position, m, identified beside the physics model and tested with it
+    peers: tuple[Peer, ...] = ()  # what the hybrid is compared with besides physics model and hold
 
     @cached_property
     def least(self) -> float:

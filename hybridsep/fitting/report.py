@@ -21,16 +21,6 @@ from ..logs.log import Log
 from .advice import OF_ITSELF, Judged, extent, peers_in_words, recommendation
 from .choice import WORTH, Tried, WindowErrors
 
-__all__ = [
-    "begun_report",
-    "write_findings",
-    "write_identification",
-    "write_other_windows",
-    "write_settings",
-    "write_use",
-    "write_validation",
-]
-
 _NAMES = ("physics model", "hold the last residual", "hybrid")
 """Names of what a replay predicts by."""
 

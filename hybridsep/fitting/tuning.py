@@ -25,8 +25,6 @@ from ..predict.predictor import HybridPredictor
 from .choice import WORTH, settings_to_try
 from .replay import Recording, replay
 
-__all__ = ["TUNED", "Tuning", "candidates", "default_values", "joint_ratio", "losses", "tune", "unsettled"]
-
 Logs = Mapping[str, Sequence[Recording]]
 """Logs by name, each in pieces without a gap, as of :func:`unsettled`."""
 
@@ -50,25 +48,14 @@ _FORGETTING = 30
 
 @dataclass(frozen=True)
 class Tuning:
-    """Losses of candidates with a given look-ahead.
+    """Losses of candidates with a given look-ahead."""
 
-    Attributes
-    ----------
-    logs : tuple of str
-        Their names.
-    candidates : tuple of PredictorSettings
-        The machine's own settings first.
-    rms_pb, rms_hold : (n_logs,) array, m
-        RMS errors of physics model and hold baseline.
-    rms_h : (n_candidates, n_logs) array, m
-        Of the hybrids; infinite where the prediction diverges.
-    """
-
-    logs: tuple[str, ...]
-    candidates: tuple[PredictorSettings, ...]
+    logs: tuple[str, ...]  # their names
+    candidates: tuple[PredictorSettings, ...]  # the machine's own settings first
+    # (n_logs,), m: RMS errors of physics model and hold baseline
     rms_pb: Array
     rms_hold: Array
-    rms_h: Array
+    rms_h: Array  # (n_candidates, n_logs), m: of the hybrids; infinite where the prediction diverges
 
     @cached_property
     def fields(self) -> tuple[str, ...]:

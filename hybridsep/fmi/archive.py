@@ -23,8 +23,6 @@ from .compile import ALL_TARGETS, default_targets, expanded, has_native
 from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 
-__all__ = ["archived", "build_fmu", "build_here", "default_flavour", "other_platforms"]
-
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 

@@ -29,19 +29,6 @@ from ..base.parameters import angular_unit
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, FmuTable, Value, Variable
 
-__all__ = [
-    "FMI_HEADERS",
-    "KINDS",
-    "TABLE_FILE",
-    "all_c",
-    "c_header",
-    "c_sources",
-    "fmi_headers",
-    "kind_header",
-    "layout_of",
-    "table_file",
-]
-
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)
 
@@ -60,18 +47,11 @@ KINDS: Mapping[str, FmuTable] = {
 
 @dataclass(frozen=True)
 class _Layout:
-    """The parts of an FMU's table: single variables, then the modes' variables, then windows.
-
-    Attributes
-    ----------
-    scalars, modes : tuple of Variable
-    windows : tuple of tuple of Variable
-        The samples of each window, all windows of one length.
-    """
+    """The parts of an FMU's table: single variables, then the modes' variables, then windows."""
 
     scalars: tuple[Variable, ...]
     modes: tuple[Variable, ...]
-    windows: tuple[tuple[Variable, ...], ...]
+    windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
 
     @property
     def window(self) -> int:

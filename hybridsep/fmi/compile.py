@@ -34,29 +34,6 @@ from ..base.files import data_folder, named_errors, written_whole
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
 
-__all__ = [
-    "ALL_TARGETS",
-    "FLAGS",
-    "TARGETS",
-    "TARGET_NAMES",
-    "ZIG",
-    "Compiler",
-    "Library",
-    "check_available",
-    "chosen_targets",
-    "compiler_for",
-    "default_targets",
-    "expanded",
-    "has_native",
-    "host_target",
-    "kept",
-    "libraries",
-    "library_paths",
-    "placed",
-    "ready_targets",
-    "universal",
-]
-
 ZIG = "ziglang 0.17.1"
 """The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
 
@@ -67,23 +44,12 @@ numbers. An overflow of an array on the stack ends the process before the functi
 
 @dataclass(frozen=True)
 class _Target:
-    """A platform an FMU can have a binary for.
+    """A platform an FMU can have a binary for."""
 
-    Attributes
-    ----------
-    triple : str
-        Zig's name of it.
-    folder : str
-        Where importers of FMI 2.0 look for the library, below ``binaries/``.
-    suffix : str
-    flags : tuple of str
-        Options besides :data:`FLAGS`.
-    """
-
-    triple: str
-    folder: str
+    triple: str  # zig's name of it
+    folder: str  # where importers of FMI 2.0 look for the library, below ``binaries/``
     suffix: str
-    flags: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()  # options besides :data:`FLAGS`
 
 
 _ELF = ("-fPIC", "-Wl,--build-id=none", "-lm", "-ldl")

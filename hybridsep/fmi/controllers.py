@@ -30,17 +30,6 @@ from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTI
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-__all__ = [
-    "COMPONENTS",
-    "CONFIGURATION_FILE",
-    "DEFINITIONS",
-    "axis_files",
-    "axis_header",
-    "check_names",
-    "component_files",
-    "write_configuration",
-]
-
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}
 """Name of the component of each model."""
 

@@ -18,18 +18,6 @@ from .c_header import layout_of
 from .spec import AUTHOR, COPYRIGHT, FmuSpec, generation_time
 from .variables import INTERPOLATED, FmuTable, Variable
 
-__all__ = [
-    "ICON_FILE",
-    "TERMINALS",
-    "TERMINALS_FILE",
-    "build_description",
-    "described_variables",
-    "document",
-    "model_description",
-    "terminals_and_icons",
-    "unit_elements",
-]
-
 _TEMPLATES = Path(__file__).parent / "templates"
 
 _FMI3_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..base.errors import FmuError
 
-__all__ = ["FLAVOURS", "FMI_VERSIONS", "check_version"]
-
 FLAVOURS = ("native", "python")
 """The default first."""
 

@@ -17,20 +17,12 @@ from .slave import TableSlave
 from .variables import modes_from
 from .weights import WEIGHTS_FILE, restore_weights
 
-__all__ = ["LookAheadSlave"]
-
 
 class LookAheadSlave(TableSlave):
-    """A slave whose core is a look-ahead.
-
-    Attributes
-    ----------
-    model_type : type
-        Type of the look-ahead's predictor or planner.
-    """
+    """A slave whose core is a look-ahead."""
 
     command = "x_d_ahead"
-    model_type: ClassVar[type[HybridPredictor] | type[Planner]]
+    model_type: ClassVar[type[HybridPredictor] | type[Planner]]  # type of the look-ahead's predictor or planner
 
     @abstractmethod
     def new_model(self) -> HybridPredictor | Planner:

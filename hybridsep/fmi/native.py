@@ -33,8 +33,6 @@ from .pages import compile_note, documentation, filled, icon
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 
-__all__ = ["files"]
-
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
 

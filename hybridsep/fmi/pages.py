@@ -14,8 +14,6 @@ from .reference import AGREEMENT
 from .spec import FmuSpec
 from .variables import Variable
 
-__all__ = ["compile_note", "documentation", "filled", "grouped_table", "icon"]
-
 _HERE = Path(__file__).parent
 
 _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}

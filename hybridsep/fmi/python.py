@@ -25,8 +25,6 @@ from .pages import documentation, filled, icon
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 
-__all__ = ["checked_version", "files"]
-
 _SERIES = "0.7."
 """Series of pythonfmu whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
 

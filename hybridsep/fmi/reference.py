@@ -28,8 +28,6 @@ from .compile import TARGETS, host_target, libraries
 from .spec import FmuSpec, table_of
 from .variables import FmuTable
 
-__all__ = ["AGREEMENT", "REFERENCE_FOLDER", "reference_run"]
-
 REFERENCE_FOLDER = "documentation/reference"
 
 AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}

@@ -27,8 +27,6 @@ from ..base.signals import check_position
 from ..base.state import pack, restoring, unpack
 from .variables import FmuTable, Variable
 
-__all__ = ["TableSlave"]
-
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and GUID of the FMU's content."""
 
@@ -88,14 +86,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     The machine's data are read from the instance's own resources: two FMUs that carry the same library share its
     modules within one process, so nothing of a machine may live at module level.
-
-    Attributes
-    ----------
-    command : str
-        The input whose start value is the position where a run begins, m.
     """
 
-    command: ClassVar[str]
+    command: ClassVar[str]  # the input whose start value is the position where a run begins, m
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)

@@ -28,42 +28,21 @@ from .variables import SAMPLES_TRAJECTORY, FmuTable
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-__all__ = ["AUTHOR", "COPYRIGHT", "FmuSpec", "content_guid", "fmu_name", "fmu_names", "generation_time", "table_of"]
-
-
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
 
 @dataclass(frozen=True, eq=False)
 class FmuSpec:
-    """A machine on its way into an archive: names, table, title and default experiment, resolved once.
-
-    Attributes
-    ----------
-    machine : Machine
-    table : FmuTable
-        Model, model identifier, start values and variables.
-    flavour : {"native", "python"}
-    fmi : {"2", "3"}
-        Version of FMI.
-    title : str
-        Description of the FMU.
-    stop_time : float, s
-        End of the default experiment.
-    samples : (n,) array, m, or None
-        Trajectory 3 of a ReferenceTrajectory.
-    trained : HybridPredictor or None
-        With which a HybridPredictor or SepCompensator starts warm.
-    """
+    """A machine on its way into an archive: names, table, title and default experiment, resolved once."""
 
     machine: Machine
-    table: FmuTable
-    flavour: str
-    fmi: str
-    title: str
-    stop_time: float
-    samples: Array | None = None
-    trained: HybridPredictor | None = None
+    table: FmuTable  # model, model identifier, start values and variables
+    flavour: str  # {"native", "python"}
+    fmi: str  # {"2", "3"}: version of FMI
+    title: str  # description of the FMU
+    stop_time: float  # s: end of the default experiment
+    samples: Array | None = None  # (n,), m: trajectory 3 of a ReferenceTrajectory
+    trained: HybridPredictor | None = None  # with which a HybridPredictor or SepCompensator starts warm
 
     @classmethod
     def of(

@@ -26,8 +26,6 @@ from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
 
-__all__ = ["SSP_VERSIONS", "build_system", "check_system"]
-
 SSP_VERSIONS = ("1", "2")
 """SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""
 
@@ -43,21 +41,13 @@ _NAMESPACES = {
 
 @dataclass(frozen=True)
 class _Component:
-    """An FMU of a system.
-
-    Attributes
-    ----------
-    name : str
-    fmu, parameter_set : str
-        Files below ``resources/``.
-    variables : tuple of Variable
-        Its table; the inputs and outputs become connectors, parameters its parameter set.
-    """
+    """An FMU of a system."""
 
     name: str
+    # files below ``resources/``
     fmu: str
     parameter_set: str
-    variables: tuple[Variable, ...]
+    variables: tuple[Variable, ...]  # its table; the inputs and outputs become connectors, parameters its parameter set
 
     @property
     def connectors(self) -> list[Variable]:

@@ -15,18 +15,6 @@ from typing import Any
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
-__all__ = [
-    "AVERAGING_SETTINGS",
-    "COMPENSATOR_SETTINGS",
-    "INTERPOLATED",
-    "PREDICTOR_SETTINGS",
-    "SAMPLES_TRAJECTORY",
-    "FmuTable",
-    "Value",
-    "Variable",
-    "modes_from",
-]
-
 Value = float | int | bool
 """A start value."""
 
@@ -62,56 +50,31 @@ _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
 @dataclass(frozen=True)
 class Variable:
-    """One FMI 2.0 scalar variable; its value reference is its place in the table.
-
-    Attributes
-    ----------
-    name, description : str
-    kind : {"Real", "Integer", "Boolean", "Enumeration"}
-    causality : {"input", "output", "parameter", "local"}
-        FMI 3.0 adds ``structuralParameter``, the length of its arrays, and ``independent``, the time.
-    variability : {"fixed", "tunable", "continuous", "discrete"}
-    start : float, int, bool or None
-        Start value; None if it is calculated.
-    unit, display_unit : str or None
-        Of a Real; ``"1"`` is written without a unit.
-    minimum, maximum : float or None
-        Closed bounds, as ``min``/``max`` show them.
-    nonzero : float
-        Least value that is not 0; checked, as ``min`` cannot express it.
-    automatic : float or None
-        Value beside the range that stands for an automatic choice.
-    nominal : float or None
-    items : tuple of str
-        Names of an Enumeration's values, which count from 0.
-    item_meanings : tuple of str
-        What each of them means.
-    learned : bool
-        Whether a warm start needs the value with which the weights were learned.
-    initially_from : tuple of str
-        Inputs and parameters an output depends on during initialization; none at any later point.
-    group : str
-        Heading of a parameter in the documentation.
-    """
+    """One FMI 2.0 scalar variable; its value reference is its place in the table."""
 
     name: str
-    kind: str
+    kind: str  # {"Real", "Integer", "Boolean", "Enumeration"}
+    # {"input", "output", "parameter", "local"}: FMI 3.0 adds ``structuralParameter``, the length of its arrays, and
+    # ``independent``, the time
     causality: str
-    variability: str
+    variability: str  # {"fixed", "tunable", "continuous", "discrete"}
     description: str
-    start: Value | None = None
+    start: Value | None = None  # start value; None if it is calculated
+    # of a Real; ``"1"`` is written without a unit
     unit: str | None = None
     display_unit: str | None = None
+    # closed bounds, as ``min``/``max`` show them
     minimum: float | None = None
     maximum: float | None = None
-    nonzero: float = 0.0
-    automatic: float | None = None
+    nonzero: float = 0.0  # least value that is not 0; checked, as ``min`` cannot express it
+    automatic: float | None = None  # value beside the range that stands for an automatic choice
     nominal: float | None = None
+    # inputs and parameters an output depends on during initialization; none at any later point
     initially_from: tuple[str, ...] = ()
-    items: tuple[str, ...] = ()
-    item_meanings: tuple[str, ...] = ()
-    learned: bool = False
-    group: str = ""
+    items: tuple[str, ...] = ()  # names of an Enumeration's values, which count from 0
+    item_meanings: tuple[str, ...] = ()  # what each of them means
+    learned: bool = False  # whether a warm start needs the value with which the weights were learned
+    group: str = ""  # heading of a parameter in the documentation
 
     @property
     def heading(self) -> str:
@@ -348,33 +311,16 @@ SAMPLES_TRAJECTORY = len(PARAMETERS["trajectory"].choices) - 1
 
 @dataclass(frozen=True)
 class FmuTable:
-    """What tables, headers and documents of an FMU are made of.
+    """What tables, headers and documents of an FMU are made of."""
 
-    Attributes
-    ----------
-    model : str
-        A key of :data:`hybridsep.fmi.variables._MODELS`.
-    name : str
-        Model identifier.
-    parameters : mapping
-        Start values by name.
-    modes : tuple of mappings
-        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15); empty where the model has none.
-    unit : {"m", "rad"}
-        Of positions.
-    windows : bool
-        Whether a HybridPredictor shows the samples of its window.
-    rest : float, m
-        Start value of the positions that enter: where the axis is at rest.
-    """
-
-    model: str
-    name: str
-    parameters: Mapping[str, Value]
+    model: str  # a key of :data:`hybridsep.fmi.variables._MODELS`
+    name: str  # model identifier
+    parameters: Mapping[str, Value]  # start values by name
+    # ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15); empty where the model has none
     modes: tuple[Mapping[str, float], ...] = ()
-    unit: str = "m"
-    windows: bool = True
-    rest: float = 0.0
+    unit: str = "m"  # {"m", "rad"}: of positions
+    windows: bool = True  # whether a HybridPredictor shows the samples of its window
+    rest: float = 0.0  # m: start value of the positions that enter: where the axis is at rest
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> FmuTable:

@@ -30,8 +30,6 @@ from ..predict.uncertainty import Uncertainty
 if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
 
-__all__ = ["WEIGHTS_FILE", "learned_settings", "load_trained", "restore_weights", "warm_predictor", "weights_file"]
-
 WEIGHTS_FILE = "weights.bin"
 _MAGIC = b"HSEPWG14"
 _HEAD = struct.Struct("<8s3Q")
@@ -43,7 +41,7 @@ _DAMAGED = (
 )
 
 
-def learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str, float]:
+def _learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str, float]:
     """Return all settings on which a predictor's weights depend, by their names in the FMU."""
     numbers = settings.to_fmi()
     learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
@@ -56,7 +54,7 @@ def learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str
 
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
-    settings = learned_settings(predictor.settings, predictor.model)
+    settings = _learned_settings(predictor.settings, predictor.model)
     learned = numbers_of(_learned(predictor))
     content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), len(learned))
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
@@ -91,7 +89,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         for name, value in _SETTING.iter_unpack(body[_HEAD.size : start])
     }
     problems = _differences("the number of modes", n_modes, len(predictor.model.modes))
-    settings = learned_settings(predictor.settings, predictor.model)
+    settings = _learned_settings(predictor.settings, predictor.model)
     for name, then in learned.items():
         if name in settings or not name.startswith("mode["):
             problems += _differences(name, then, settings.get(name, 0.0))
@@ -147,7 +145,7 @@ def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredict
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
     It must have been trained for the machine: with its ``Np``, ``input_hold``, modes, and all settings on which weights
-    depend (:func:`learned_settings`), those of its predictor or compensator as ``kind`` says.
+    depend (:func:`_learned_settings`), those of its predictor or compensator as ``kind`` says.
 
     Raises
     ------
@@ -162,7 +160,7 @@ def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredict
     compensates = kind == "SepCompensator"
     settings = machine.compensator_predictor if compensates else machine.predictor_settings
     found, expected = (  # by their names in the machine file
-        {"Np": one.Np, **learned_settings(one, model), "input_hold": one.input_hold}
+        {"Np": one.Np, **_learned_settings(one, model), "input_hold": one.input_hold}
         for one, model in ((trained.settings, trained.model), (settings, machine.model))
     )
     differing = [

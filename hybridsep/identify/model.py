@@ -10,8 +10,6 @@ from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
-__all__ = ["Alternative", "IdentifiedModel", "machine_of"]
-
 
 @dataclass(frozen=True)
 class Alternative:

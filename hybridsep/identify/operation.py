@@ -20,12 +20,10 @@ from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
-__all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "TOO_LITTLE", "identify_operation", "unit_gain_model"]
-
 SAMPLES_MIN = 100
 """Samples below which nothing is identified."""
 
-WEAK = 3.0
+_WEAK = 3.0
 """Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
 
 LITTLE_MOTION = 0.25
@@ -165,7 +163,7 @@ def _as_known(value: float, std: float) -> str:
 def _is_weak(fit: Fit, segments: Sequence[Segment], T_s: float) -> bool:
     """Return whether the commanded motion is hardly larger than what no model explains."""
     residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.known] for s in segments])
-    return _spread(segments) < WEAK * float(np.std(residual))
+    return _spread(segments) < _WEAK * float(np.std(residual))
 
 
 def _spread(segments: Sequence[Segment]) -> float:

@@ -16,24 +16,10 @@ from scipy.optimize import least_squares
 from ..base.signals import Array, Indices, as_measured, as_samples
 from .structure import Structure, free_responses, responses, sections_of
 
-__all__ = [
-    "Delay",
-    "Fit",
-    "Segment",
-    "affine",
-    "as_segments",
-    "delayed",
-    "fit_structure",
-    "in_time",
-    "motion_split",
-    "simulated",
-    "without",
-]
-
 SAMPLES_MAX = 60_000
 """Samples that are used of long recordings: the parts in which the axis moves most."""
 
-PIECE = 6_000
+_PIECE = 6_000
 """Samples of one part of a long recording."""
 
 
@@ -64,17 +50,17 @@ def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]]) -> list[Segme
         y = as_measured(x, "x", len(u))
         segments.append((u, y))
     if sum(len(u) for u, _ in segments) > SAMPLES_MAX:
-        segments = _liveliest(segments, SAMPLES_MAX // PIECE)
+        segments = _liveliest(segments, SAMPLES_MAX // _PIECE)
     return [Segment(u - u[0], y - u[0], len(u)) for u, y in segments if np.count_nonzero(~np.isnan(y)) > 1]
 
 
 def _liveliest(segments: list[tuple[Array, Array]], n: int) -> list[tuple[Array, Array]]:
     """Return the ``n`` pieces with the largest sum of squared velocity, in their order."""
     pieces = [
-        (u[i : i + PIECE], y[i : i + PIECE])
+        (u[i : i + _PIECE], y[i : i + _PIECE])
         for u, y in segments
-        for i in range(0, len(u), PIECE)
-        if len(u) - i > PIECE // 2 or i == 0
+        for i in range(0, len(u), _PIECE)
+        if len(u) - i > _PIECE // 2 or i == 0
     ]
     power = [float(np.sum(np.diff(u) ** 2)) for u, _ in pieces]
     return [pieces[i] for i in sorted(np.argsort(power)[::-1][:n])]
@@ -105,14 +91,14 @@ def in_time(x_d: Array, x: Array, n_late: int) -> tuple[Array, Array]:
     return x_d[: max(0, len(x_d) - n_late)], x[n_late:]
 
 
-EVALUATIONS_MAX = 20
+_EVALUATIONS_MAX = 20
 """Largest number of iterations of one start; a good one converges within 15."""
 
-ROWS_MAX = 4000
+_ROWS_MAX = 4000
 """Residuals that take part in a search, evenly spaced: the filters run over every sample, but neighbouring residuals
 tell the same."""
 
-EDGE = 0.01
+_EDGE = 0.01
 """Distance from a bound, in the logarithm of a parameter, within which it counts as at the bound."""
 
 
@@ -206,7 +192,7 @@ def fit_structure(
     delay: Delay,
     starts: Sequence[Array],
     slowest: float,
-    rows_max: int = ROWS_MAX,
+    rows_max: int = _ROWS_MAX,
 ) -> Fit:
     """Return the best fit from several starts, nonlinear parameters ``(order,)`` each.
 
@@ -226,12 +212,12 @@ def fit_structure(
                 xtol=1e-6,
                 ftol=1e-7,
                 gtol=1e-10,
-                max_nfev=EVALUATIONS_MAX,
+                max_nfev=_EVALUATIONS_MAX,
             ).x
         residual, linear, offset = problem.solve(theta)
         rms = float(np.sqrt(np.mean(residual**2)))
         if best is None or rms < best.rms:
-            at_bound = bool(np.any((theta < low + EDGE) | (theta > high - EDGE)))
+            at_bound = bool(np.any((theta < low + _EDGE) | (theta > high - _EDGE)))
             best = Fit(structure, delay, theta, linear, offset, rms, slowest, at_bound)
     assert best is not None  # there is a start
     return best

@@ -17,13 +17,11 @@ from scipy.signal import lombscargle
 from ..base.signals import Array
 from ..model.physics import ModalModel
 
-__all__ = ["residual_period"]
-
 PREDICTED = 0.35
 """Share of the variance in one half that the other predicts, both ways, from which a period is believed: at most 0.18
 on recorded axes, 0.03 on simulated ones without a period, 0.5 and more with one of 2 µm beside 5 µm of friction."""
 
-PERIODS_MIN = 3.0
+_PERIODS_MIN = 3.0
 """Periods within the travel, at least; fewer look like stiffness, which is learned without a period."""
 
 SAMPLES_MIN = 4.0
@@ -61,7 +59,7 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
         return 0.0
     s, v, a, e = s[used], v[used], a[used], e[used]
     travel = float(np.ptp(s))
-    lowest, highest = PERIODS_MIN / travel, 1.0 / (SAMPLES_MIN * fastest)
+    lowest, highest = _PERIODS_MIN / travel, 1.0 / (SAMPLES_MIN * fastest)
     if highest <= lowest:
         return 0.0
     known = _baseline(s, v, a)

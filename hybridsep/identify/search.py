@@ -10,15 +10,13 @@ from ..base.signals import Array
 from .output_error import Delay, Fit, Segment, fit_structure
 from .structure import DECAY_MIN, SLOWEST, Structure
 
-__all__ = ["fit_delay", "fit_near"]
-
-DEAD_TIME_MAX = 0.25
+_DEAD_TIME_MAX = 0.25
 """Longest dead time that is tried, s, and at most a quarter of the recording."""
 
 
 def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:
     """Return the fit of a structure over poles and dead time; ``known`` fits of simpler ones give the starts."""
-    longest = min(DEAD_TIME_MAX / T_s, max(segment.stop for segment in segments) / 4)
+    longest = min(_DEAD_TIME_MAX / T_s, max(segment.stop for segment in segments) / 4)
     limit = int(2 * longest)
     cache: dict[int, Fit] = {}
     rate = _bandwidth(segments, T_s, known)

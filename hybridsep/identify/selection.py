@@ -14,12 +14,10 @@ from .search import fit_delay
 from .structure import DECAY_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
 
-__all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures", "held_out", "slow_parts"]
-
-APART = 2.5
+_APART = 2.5
 """Least ratio of frequencies between slow parts and the others: a 14 Hz part of an axis of 35 Hz is one of its own."""
 
-CANCELLED = 0.25
+_CANCELLED = 0.25
 """Static gain of the slow parts, relative to the others', below which zeros all but cancel their poles: with 0.25 zero
 and pole are a quarter apart."""
 
@@ -32,7 +30,7 @@ def slow_parts(modes: Sequence[Mode]) -> list[float]:
     parts = sorted(part for mode in modes for part in _parts(mode))
     frequencies = [f for f, _, _ in parts]
     for i in range(len(parts) - 1, 0, -1):
-        if frequencies[i] > APART * frequencies[i - 1] and _size(parts[:i]) < CANCELLED * _size(parts[i:]):
+        if frequencies[i] > _APART * frequencies[i - 1] and _size(parts[:i]) < _CANCELLED * _size(parts[i:]):
             return frequencies[:i]
     return []
 
@@ -61,36 +59,36 @@ HELD_OUT = 0.35
 SETTLING = 10
 """Part of a segment, one in so many, that is not judged: it may start in motion, where the model starts at rest."""
 
-BLOCKS = 12
+_BLOCKS = 12
 """Blocks of the held-out part whose errors are compared pair by pair."""
 
 TOLERANCE = 0.02
 """Relative increase of the held-out error that a simpler structure may always have."""
 
-EXCESS_MAX = 0.1
+_EXCESS_MAX = 0.1
 """Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
 whose errors are alike tell little."""
 
-GAINS_MAX = 20.0
+_GAINS_MAX = 20.0
 """Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
 it is 6.6."""
 
-SPREAD_MAX = 0.5
+_SPREAD_MAX = 0.5
 """Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
 
-FITTED_BETTER = 0.7
+_FITTED_BETTER = 0.7
 """Ratio of the fitted errors at which a larger structure is taken though the held-out errors are alike: most of the
 held-out error may be what no structure explains, such as a first reversal."""
 
-CANCELLING_WORTH = 0.6
+_CANCELLING_WORTH = 0.6
 """Ratio of the errors, geometric mean of fitted and held-out ones, at which a model with a slow part that its zeros all
 but cancel is taken: a slow part that fits friction and cables leaves 0.64 to 0.85, one that is in the drive's loops
 less."""
 
-GROWTH = 2
+_GROWTH = 2
 """Orders above the best one that are tried before the search ends."""
 
-LAGS = 20
+_LAGS = 20
 """Lags at which the residual's correlation is looked at: nothing is left to model where it is white."""
 
 
@@ -140,7 +138,7 @@ def compare_structures(
         if known and structure.n_parameters > n_fitted / 10:
             break
         growth = orders.index(structure.order) - orders.index(best_order)
-        if structure.order > GROWTH and (growth > GROWTH or (growth > 0 and white)):
+        if structure.order > _GROWTH and (growth > _GROWTH or (growth > 0 and white)):
             break
         progress(structure.name, i / len(structures))
         fit = known[structure] = fit_delay(split, T_s, structure, known)
@@ -174,7 +172,7 @@ def choose(candidates: Sequence[Candidate]) -> Candidate:
         return chosen
     other = _chosen_of(plain)
     ratio = np.sqrt(chosen.fit.rms / other.fit.rms * chosen.rms_held_out / other.rms_held_out)
-    return chosen if ratio < CANCELLING_WORTH else other
+    return chosen if ratio < _CANCELLING_WORTH else other
 
 
 def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
@@ -184,7 +182,7 @@ def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
     alike = [candidate for candidate in by_size if _as_good(candidate, best)]
     chosen = alike[0]
     for candidate in alike[1:]:
-        if candidate.fit.rms < FITTED_BETTER * chosen.fit.rms:
+        if candidate.fit.rms < _FITTED_BETTER * chosen.fit.rms:
             chosen = candidate
     for other in usable:
         s, c = other.structure, chosen.structure
@@ -202,10 +200,10 @@ def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
 def _as_good(candidate: Candidate, best: Candidate) -> bool:
     if candidate.rms_held_out <= (1 + TOLERANCE) * best.rms_held_out:
         return True
-    if candidate.rms_held_out > (1 + EXCESS_MAX) * best.rms_held_out:
+    if candidate.rms_held_out > (1 + _EXCESS_MAX) * best.rms_held_out:
         return False
     excess = candidate.held_out**2 - best.held_out**2
-    means = np.array([block.mean() for block in np.array_split(excess, min(BLOCKS, len(excess)))])
+    means = np.array([block.mean() for block in np.array_split(excess, min(_BLOCKS, len(excess)))])
     return len(means) > 1 and bool(means.mean() <= means.std(ddof=1) / np.sqrt(len(means)))
 
 
@@ -213,8 +211,8 @@ def _is_white(residual: Array) -> bool:
     """Return whether no correlation at the first lags is significant."""
     centred = residual - residual.mean()
     power = float(centred @ centred)
-    return len(centred) > 10 * LAGS and all(
-        abs(float(centred[lag:] @ centred[:-lag])) < 4 * power / np.sqrt(len(centred)) for lag in range(1, LAGS + 1)
+    return len(centred) > 10 * _LAGS and all(
+        abs(float(centred[lag:] @ centred[:-lag])) < 4 * power / np.sqrt(len(centred)) for lag in range(1, _LAGS + 1)
     )
 
 
@@ -225,7 +223,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
     gain = float(gains.sum())
     if gain <= 0:
         return f"static gain of {gain:.3g}"
-    if float(np.abs(gains).sum()) > GAINS_MAX * gain:
+    if float(np.abs(gains).sum()) > _GAINS_MAX * gain:
         return "large modes that cancel each other"
     if structure.order <= 1:
         return ""
@@ -236,6 +234,6 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
     if structure.order > 2:
         fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
         spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(("f_n", "tau"))]
-        if max(spreads) > SPREAD_MAX:
+        if max(spreads) > _SPREAD_MAX:
             return "poles that the recording does not determine"
     return ""

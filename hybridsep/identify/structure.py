@@ -13,19 +13,7 @@ from ..base.signals import Array
 from ..model.discrete import discretised_block
 from ..model.physics import Mode
 
-__all__ = [
-    "DECAY_MIN",
-    "SLOWEST",
-    "STRUCTURES",
-    "Section",
-    "Structure",
-    "free_responses",
-    "lag_mode",
-    "responses",
-    "sections_of",
-]
-
-ZETA_RANGE = (0.003, 5.0)
+_ZETA_RANGE = (0.003, 5.0)
 """Damping ratios that are tried; Table 1 has 0.007, and at 5 the two poles are a factor of 98 apart."""
 
 SLOWEST = 0.1
@@ -83,7 +71,7 @@ class Structure:
     def bounds(self, T_s: float, slowest: float) -> tuple[Array, Array]:
         """Return the range of the nonlinear parameters with poles no slower than ``slowest``, rad/s."""
         slowest = min(slowest, 1.0 / T_s)
-        mode_low, mode_high = [slowest, ZETA_RANGE[0]], [2 * np.pi * FASTEST / T_s, ZETA_RANGE[1]]
+        mode_low, mode_high = [slowest, _ZETA_RANGE[0]], [2 * np.pi * FASTEST / T_s, _ZETA_RANGE[1]]
         low = mode_low * self.n_modes + [slowest] * self.lag
         high = mode_high * self.n_modes + [10.0 / T_s] * self.lag
         return np.log(low), np.log(high)

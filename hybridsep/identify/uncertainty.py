@@ -17,9 +17,7 @@ from ..base.signals import Array
 from .output_error import Fit, Segment, affine, delayed, without
 from .structure import free_responses, responses, sections_of
 
-__all__ = ["Estimate", "estimates"]
-
-BATCHES = 30
+_BATCHES = 30
 """Batches of the residual: enough for a variance, and each long beside a servo's memory."""
 
 _STEP = 1e-5
@@ -45,7 +43,7 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m"
     scale = np.linalg.norm(jacobian, axis=0)  # columns of unit norm
     scale[scale == 0] = 1.0
     jacobian = jacobian / scale
-    edges = np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
+    edges = np.linspace(0, len(residual), min(_BATCHES, len(residual)) + 1).astype(int)[:-1]
     scores = np.add.reduceat(jacobian * residual[:, None], edges)
     given_delay = [i for i in range(jacobian.shape[1]) if i != jacobian.shape[1] - 2]
     covariance = np.zeros((len(scale), len(scale)))

@@ -18,8 +18,6 @@ from scipy.signal import get_window, lfilter
 from ..base.signals import Array
 from ..model.physics import ModalModel
 
-__all__ = ["FrequencyResponse", "ResidualTest", "frequency_response", "model_response", "residual_test"]
-
 _SEGMENTS = 24
 """Segments that a response is averaged over at least: with fewer, coherence is high by chance."""
 
@@ -39,29 +37,15 @@ the fewest averages, and less often with more."""
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """Frequency response of a recording.
+    """Frequency response of a recording."""
 
-    Attributes
-    ----------
-    f : (n,) array, Hz
-        The first is the inverse of a segment's length.
-    G, expected : (n,) array of complex, m/m
-        Estimate H1, measured over commanded position, and the model's response.
-    coherence : (n,) array
-        Squared coherence of commanded and measured position.
-    half : (n,) array
-        Half of the 95 % interval of the magnitude, relative to it; of the phase as well, rad.
-    known : (n,) array of bool
-        Whether the command has power there, enough to tell the response to 25 %.
-    n_segments : int
-    """
-
-    f: Array
+    f: Array  # (n,), Hz: the first is the inverse of a segment's length
+    # (n,), m/m: estimate H1, measured over commanded position, and the model's response
     G: NDArray[np.complex128]
     expected: NDArray[np.complex128]
-    coherence: Array
-    half: Array
-    known: NDArray[np.bool_]
+    coherence: Array  # (n,): squared coherence of commanded and measured position
+    half: Array  # (n,): half of the 95 % interval of the magnitude, relative to it; of the phase as well, rad
+    known: NDArray[np.bool_]  # (n,): whether the command has power there, enough to tell the response to 25 %
     n_segments: int
 
 
@@ -123,27 +107,15 @@ def model_response(model: ModalModel, T_s: float, input_hold: str, f: Array) -> 
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """Correlations of a residual with itself and with the commanded velocity before it.
+    """Correlations of a residual with itself and with the commanded velocity before it."""
 
-    Attributes
-    ----------
-    autocorrelation : (m,) array
-        Of lags from 0 samples on.
-    with_command : (m,) array
-        Correlation with the command of both after a filter that makes the residual white.
-    band : float
-        Magnitude that the autocorrelation of a white residual keeps to at 99 % of the lags.
-    command_band : (m,) array
-        Magnitude that the correlation with the command keeps to at all lags in 99 % of recordings of a residual that
-        does not depend on it.
-    ljung_box, of_white : float
-        Ljung and Box's statistic, and what it is below for 99 % of white residuals.
-    """
-
-    autocorrelation: Array
-    with_command: Array
-    band: float
+    autocorrelation: Array  # (m,): of lags from 0 samples on
+    with_command: Array  # (m,): correlation with the command of both after a filter that makes the residual white
+    band: float  # magnitude that the autocorrelation of a white residual keeps to at 99 % of the lags
+    # (m,): magnitude that the correlation with the command keeps to at all lags in 99 % of recordings of a residual
+    # that does not depend on it
     command_band: Array
+    # Ljung and Box's statistic, and what it is below for 99 % of white residuals
     ljung_box: float
     of_white: float
 

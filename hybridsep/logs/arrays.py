@@ -16,8 +16,6 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import ArraysSource, past_midnights
 
-__all__ = ["MatSource", "NpzSource", "ParquetSource", "TableSource"]
-
 _UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Durations, s, of the units of Arrow's times."""
 

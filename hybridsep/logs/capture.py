@@ -12,8 +12,6 @@ from ..base.signals import Array
 from .names import SIGNALS, axes_of
 from .source import ArraysSource
 
-__all__ = ["CaptureSource"]
-
 _SIGNALS = b'"SignalListHFData"'
 _COUNTER = "CYCLE"
 _TIME = "t"

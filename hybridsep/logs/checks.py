@@ -24,19 +24,6 @@ from .log import Log
 from .remedies import uneven
 from .units import POSITION_UNITS, UNIT_OPTIONS
 
-__all__ = [
-    "Finding",
-    "Following",
-    "Picture",
-    "check",
-    "checked",
-    "findings_table",
-    "following",
-    "noise_std",
-    "resolution",
-    "starts_in_motion",
-]
-
 _SAMPLES_MIN = 100
 """Samples below which nothing can be learned and judged: a window of the default length."""
 
@@ -79,7 +66,7 @@ motion that repeat the one before, from which they are noted."""
 
 
 @dataclass(frozen=True)
-class Picture:
+class _Picture:
     """Data of a picture that shows a finding."""
 
     title: str
@@ -95,7 +82,7 @@ class Finding:
     name: str  # a key of ``FINDINGS`` of ``docs/messages.py``
     words: str  # what it is, by how much, and what to do
     evidence: Mapping[str, float]  # the statistic, by name; SI units
-    picture: Picture = field(repr=False)
+    picture: _Picture = field(repr=False)
     refused: bool = False  # whether the columns do not mean what they were read for; otherwise it is a note
     options: tuple[tuple[str, str], ...] = ()  # options that put it right, one of them, each with what it means
 
@@ -200,7 +187,7 @@ def _unit(log: Log) -> Iterator[Finding]:
     yield Finding("unit", words, evidence, _over_time(log, "Positions as read"), refused=True, options=UNIT_OPTIONS)
 
 
-class Following(NamedTuple):
+class _Following(NamedTuple):
     """How one signal follows another."""
 
     left: float  # share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1
@@ -210,7 +197,7 @@ class Following(NamedTuple):
     lag_of_one: int  # that lag, samples
 
 
-def following(u: Array, x: Array) -> Following:
+def following(u: Array, x: Array) -> _Following:
     """Return how ``x``, (n,), NaN where it is missing, follows ``u``, (n,), which was at rest before."""
     known = np.isfinite(x)
     largest = min(_LAG_MAX, len(u) // 4)
@@ -221,7 +208,7 @@ def following(u: Array, x: Array) -> Following:
     A, y = A - A.mean(axis=0), x[known] - x[known].mean()
     scale, total = float(np.abs(A).max()), float(np.abs(y).max())
     if not (0.0 < scale < math.inf and 0.0 < total < math.inf):
-        return Following(1.0, 0.0, 0.0, 0.0, 0)
+        return _Following(1.0, 0.0, 0.0, 0.0, 0)
     A, y = A / scale, y / total
     squares, products = (A * A).sum(axis=0), A.T @ y
     alone = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
@@ -230,7 +217,7 @@ def following(u: Array, x: Array) -> Following:
     h, _ = nnls(R, basis.T @ y, maxiter=len(lags) ** 2)
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))
     gain = float(h.sum())
-    return Following(
+    return _Following(
         left,
         gain * total / scale,
         float(h @ lags) / gain if gain > 0.0 else 0.0,
@@ -239,7 +226,7 @@ def following(u: Array, x: Array) -> Following:
     )
 
 
-def _meaning(log: Log, x_d: Array, x: Array, given: Following) -> Iterator[Finding]:
+def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Finding]:
     """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis.
 
     ``x_d`` and ``x``, ``(n,)``, are the liveliest samples, NaN where missing, and ``given`` how x follows x_d there.
@@ -292,7 +279,7 @@ _MEANINGS = {
 }
 
 
-def _other_meaning(x_d: Array, x: Array, filled: Array, given: Following) -> str:
+def _other_meaning(x_d: Array, x: Array, filled: Array, given: _Following) -> str:
     """Return the reading of two columns, ``(n,)``, that explains them far better than the given one; empty without any.
 
     ``filled`` is ``x`` interpolated where it is missing.
@@ -378,12 +365,12 @@ def _note_rate(log: Log) -> Iterator[Finding]:
             "rows are taken as if they were even"
         )
         t = log.t - log.t[0]
-        picture = Picture("Intervals", "time [s]", "interval [ms]", {"interval": (t[1:], 1e3 * steps)})
+        picture = _Picture("Intervals", "time [s]", "interval [ms]", {"interval": (t[1:], 1e3 * steps)})
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, picture, options=options)
 
 
-def _note_relation(log: Log, x_d: Array, x: Array, found: Following) -> Iterator[Finding]:
+def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
     picture = _over_time(log, "Command and measurement")
     if found.lag * log.T_s > _LATE:
@@ -487,9 +474,9 @@ def _liveliest(log: Log) -> slice:
     return best
 
 
-def _over_time(log: Log, title: str) -> Picture:
+def _over_time(log: Log, title: str) -> _Picture:
     """Return the picture of both positions over time."""
     t = log.t - log.t[0]
     factor, unit = log.shown.position
     lines = {name: (t, factor * x) for name, x in (("commanded", log.x_d), ("measured", log.x_meas))}
-    return Picture(title, "time [s]", f"position [{unit}]", lines)
+    return _Picture(title, "time [s]", f"position [{unit}]", lines)

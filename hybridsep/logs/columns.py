@@ -16,8 +16,6 @@ from .text import is_number
 from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["Column", "channels", "choose_columns", "side_by_side", "signal_columns"]
-
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
@@ -227,7 +225,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
 
 
 @dataclass(frozen=True)
-class Channel:
+class _Channel:
     """Column of a file, as it is listed."""
 
     name: str
@@ -237,7 +235,7 @@ class Channel:
     interval: float | None = None  # their mean interval, s
 
 
-def channels(source: Source) -> list[Channel]:
+def channels(source: Source) -> list[_Channel]:
     """Return a file's columns with their units, roles, samples and intervals, as far as they can be told."""
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
@@ -257,7 +255,7 @@ def channels(source: Source) -> list[Channel]:
     for name in source.names:
         clock = name if name in extents else source.times.get(name) or t or ""
         n, interval = extents.get(clock, (None, None))
-        found.append(Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, ""), n, interval))
+        found.append(_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, ""), n, interval))
     return found
 
 

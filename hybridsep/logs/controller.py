@@ -14,32 +14,19 @@ from .log import Log
 from .names import SIGNALS
 from .units import DisplayUnits
 
-__all__ = ["Controller", "controller_of"]
-
 
 @dataclass(frozen=True)
 class Controller:
-    """Figures of a controller's own signals; None of what logs do not have.
+    """Figures of a controller's own signals; None of what logs do not have."""
 
-    Attributes
-    ----------
-    T_s : float
-        Sampling interval, s.
-    delay : int, optional
-        Samples by which the planned position leads the measured one: transport, interpolation and drive together.
-    look_ahead : int, optional
-        Samples by which it leads the command of the position loop.
-    behind_plan, without_delay : ErrorSize, optional
-        Planned minus measured position, and the same with the planned one taken ``delay`` samples later.
-    following_error, contour_deviation : ErrorSize, optional
-        As the controller computes them.
-    """
-
-    T_s: float
+    T_s: float  # sampling interval, s
+    # samples by which the planned position leads the measured one: transport, interpolation and drive together
     delay: int | None = None
-    look_ahead: int | None = None
+    look_ahead: int | None = None  # samples by which it leads the command of the position loop
+    # planned minus measured position, and the same with the planned one taken ``delay`` samples later
     behind_plan: ErrorSize | None = None
     without_delay: ErrorSize | None = None
+    # as the controller computes them
     following_error: ErrorSize | None = None
     contour_deviation: ErrorSize | None = None
 

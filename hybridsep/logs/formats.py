@@ -19,8 +19,6 @@ from .source import Source
 from .text import TextSource
 from .twincat import TwinCatSource
 
-__all__ = ["EXAMPLE", "READERS", "open_source", "write_example"]
-
 EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")
 """The example log, 20 s of a simulated axis at 1 kHz."""
 

@@ -14,8 +14,6 @@ from ..base.errors import LogError
 from .source import Block
 from .text import TextSource, split, with_own_names
 
-__all__ = ["HalscopeSource"]
-
 _PERIOD = re.compile(rb"#\s*Sampling period is\s+(-?\d{1,18})\s+ns\s")
 """First line."""
 

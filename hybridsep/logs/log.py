@@ -23,8 +23,6 @@ from .source import Block, Source
 from .times import NOT_LATER, given_times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-__all__ = ["Log", "Table", "check_reading", "read_log"]
-
 _OWN_NAMES = ("x_d", "x", "x_meas")
 """Names of columns of positions that leave no doubt."""
 

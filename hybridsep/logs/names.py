@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 
 from .units import stated_unit
 
-__all__ = ["ROLES", "SIGNALS", "axes_of", "known_names", "n_known", "signals_of"]
-
 ROLES = ("t", "x_d", "x")
 """Time, commanded and measured position."""
 

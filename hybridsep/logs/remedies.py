@@ -15,8 +15,6 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.signals import Array, Indices
 
-__all__ = ["Samples", "at_sensor_phase", "resampled", "shifted", "uneven", "whole_turns"]
-
 _TURN = 2 * math.pi
 
 _JUMP = 3.0

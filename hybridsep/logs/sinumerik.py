@@ -20,8 +20,6 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import ArraysSource
 
-__all__ = ["SinumerikSource"]
-
 _ROOT = b"<traceSession"
 
 _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")

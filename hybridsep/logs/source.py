@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = ["ArraysSource", "Block", "Source", "line_number", "past_midnights", "sample_number"]
-
 
 @dataclass(frozen=True)
 class Block:

@@ -30,8 +30,6 @@ from .source import Block, Source, line_number, past_midnights
 from .timestamps import SECOND, nanoseconds, stamp_kind
 from .units import plain_name, position_unit, time_unit
 
-__all__ = ["TextSource", "decimal_points", "is_number", "split", "with_own_names"]
-
 _HEAD_LINES = 1000
 """Lines, blank ones aside, in which names and numbers must begin."""
 

@@ -12,8 +12,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ..base.errors import LogError, brief
 from ..base.signals import Array, Indices
 
-__all__ = ["NOT_LATER", "Times", "given_times", "recorded_times"]
-
 _DAY = 86_400.0
 
 _CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _DAY}

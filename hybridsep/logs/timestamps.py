@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["SECOND", "nanoseconds", "stamp_kind"]
-
 SECOND = 1_000_000_000
 """In nanoseconds, which doubles count exactly over a day."""
 

@@ -20,8 +20,6 @@ from ..base.signals import Array
 from .source import ArraysSource
 from .text import decimal_points, is_number
 
-__all__ = ["TwinCatSource"]
-
 _BOM = b"\xef\xbb\xbf"
 _MARKS = (b"\t", b";", b",")
 _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttime of export"

@@ -7,20 +7,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = [
-    "POSITION_UNITS",
-    "TIME_UNITS",
-    "UNIT_OPTIONS",
-    "DisplayUnits",
-    "Unit",
-    "plain_name",
-    "position_unit",
-    "shown_in",
-    "shown_of",
-    "stated_unit",
-    "time_unit",
-]
-
 
 @dataclass(frozen=True)
 class Unit:

@@ -53,20 +53,6 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..logs.log import Log
     from ..predict.predictor import HybridPredictor
 
-__all__ = [
-    "PAPER_SETTINGS",
-    "Machine",
-    "check_interval",
-    "check_unit",
-    "checked_name",
-    "load_machine",
-    "machine_from_table",
-    "machine_name",
-    "machine_names",
-    "machine_path",
-    "paper_machine",
-]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Machine(Section):

@@ -11,32 +11,6 @@ from ..base.errors import ParameterError, brief
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
 
-__all__ = [
-    "COMPENSATOR",
-    "NAME_PATTERN",
-    "PREDICTOR",
-    "DriveLimitsSection",
-    "FeedDriveSection",
-    "IdentifiedSection",
-    "LimitsSection",
-    "LogSection",
-    "ModeSection",
-    "Physics",
-    "PlantSection",
-    "Section",
-    "SpringMassDamper",
-    "StageSection",
-    "choice_entry",
-    "entries",
-    "line_entry",
-    "lines_entry",
-    "name_entry",
-    "parameter_entry",
-    "plant_entry",
-    "read_section",
-    "section_entry",
-]
-
 NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]{0,99}"
 """Names of machines; they become parts of FMUs' names, of which importers make names of files."""
 

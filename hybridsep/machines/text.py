@@ -9,8 +9,6 @@ from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, Limits
 from .machine import Machine
 
-__all__ = ["machine_text"]
-
 _COLUMN = 32
 """Column of the comments, for alignment."""
 

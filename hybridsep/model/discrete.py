@@ -10,8 +10,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ..base.settings import check
 from ..base.signals import Array
 
-__all__ = ["BLOCK_MAX", "DiscreteModel", "discretised_block"]
-
 BLOCK_MAX = 256
 """Largest size of the lifted matrices, for memory's sake; longer windows are split into blocks."""
 

@@ -22,8 +22,6 @@ from .discrete import BLOCK_MAX, DiscreteModel
 if TYPE_CHECKING:
     import control
 
-__all__ = ["ModalModel", "Mode"]
-
 MODES_MAX = 100
 """Largest number of modes; the discrete model's tables grow with its square."""
 
@@ -213,7 +211,7 @@ class ModalModel:
         return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)
 
 
-REPEATED = 1e-3
+_REPEATED = 1e-3
 """Relative distance below which two poles count as repeated: rounding splits a fivefold one by 7e-4."""
 
 _REPEATED_MODES = "G_pb has repeated modes, which a sum of modes as in eq. (15) cannot express; separate them slightly"
@@ -288,7 +286,7 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
     """Solve ``N(s) = Σ_i (α_i + β_i s) Π_{j≠i} D_j(s)`` for the rows ``(α_i, β_i)``."""
     m = len(quadratics)
     for others, some in combinations(map(np.roots, quadratics), 2):
-        if np.any(np.abs(some[:, None] - others[None, :]) < REPEATED * np.abs(others)):
+        if np.any(np.abs(some[:, None] - others[None, :]) < _REPEATED * np.abs(others)):
             raise ModelError(_REPEATED_MODES)
     columns = []
     for i in range(m):

@@ -2,7 +2,7 @@
 
 The timing contract is the same as the FMUs'. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it
 the outputs belong to ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is the planner's preview: ``Np`` with a
-predictor only, which is the planner that changes nothing (:class:`Unmodified`). When ``k + 1`` is a
+predictor only, which is the planner that changes nothing (:class:`_Unmodified`). When ``k + 1`` is a
 multiple of ``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights
 are solved and the window is planned in that sample.
 
@@ -28,8 +28,6 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .monitor import Monitor
 
-__all__ = ["LookAhead", "Planner", "PublishedWindow", "SepState", "Unmodified", "WindowPlanner"]
-
 
 class SepState(IntEnum):
     """Model that the commands of a window are planned with; as an output also that the monitor tripped."""
@@ -42,34 +40,21 @@ class SepState(IntEnum):
 
 @dataclass(frozen=True)
 class PublishedWindow:
-    """Commands of a window and the position predicted under them.
-
-    Attributes
-    ----------
-    x_d, x_dm : (Np,) arrays, m
-        Commanded position, and the modified command sent to the drive; the same without a planner.
-    x_pb, x_h : (Np,) arrays, m
-        Predictions under ``x_dm`` by the physics model and by the best available model.
-    x_h_std : (Np,) array, m
-        Standard deviation of the error of ``x_h``; 0 where it is not known.
-    state : int
-        Model that planned it (:class:`SepState`); 0 without a planner.
-    n_warm_up : int
-        Leading samples where ``x_h = x_pb``.
-    n_followed, state_before : int
-        Number of leading samples that follow the plan before, while a real-time implementation makes this plan; and the
-        model that planned them.
-    """
+    """Commands of a window and the position predicted under them."""
 
     SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
 
+    # (Np,), m: commanded position, and the modified command sent to the drive; the same without a planner
     x_d: Array
     x_dm: Array
+    # (Np,), m: predictions under ``x_dm`` by the physics model and by the best available model
     x_pb: Array
     x_h: Array
-    x_h_std: Array
-    state: int
-    n_warm_up: int
+    x_h_std: Array  # (Np,), m: standard deviation of the error of ``x_h``; 0 where it is not known
+    state: int  # model that planned it (:class:`SepState`); 0 without a planner
+    n_warm_up: int  # leading samples where ``x_h = x_pb``
+    # number of leading samples that follow the plan before, while a real-time implementation makes this plan; and the
+    # model that planned them
     n_followed: int = 0
     state_before: int = 0
 
@@ -86,20 +71,11 @@ class PublishedWindow:
 
 
 class WindowPlanner(Protocol):
-    """Interface of what a look-ahead asks for its windows.
-
-    Attributes
-    ----------
-    predictor : HybridPredictor
-    preview : int
-        Samples of a plan, at least ``Np``.
-    monitor : Monitor
-        Takes in each sample that is measured, before its window is updated.
-    """
+    """Interface of what a look-ahead asks for its windows."""
 
     predictor: HybridPredictor
-    preview: int
-    monitor: Monitor
+    preview: int  # samples of a plan, at least ``Np``
+    monitor: Monitor  # takes in each sample that is measured, before its window is updated
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``, m, for ``lead_in`` samples; what was learned is kept."""
@@ -126,7 +102,7 @@ class Planner(WindowPlanner, Protocol):
         """Return the planner of :meth:`to_bytes`."""
 
 
-class Unmodified:
+class _Unmodified:
     """Planner that sends the commands as they are, with a predictor's prediction of them.
 
     The lead-in is one window, at rest, which is neither predicted nor learned.
@@ -228,7 +204,7 @@ class LookAhead:
     def _hold(self, model: HybridPredictor | Planner) -> None:
         self.model = model
         self.planner: WindowPlanner = (
-            Unmodified(model, at_rest=self.k < model.Np) if isinstance(model, HybridPredictor) else model
+            _Unmodified(model, at_rest=self.k < model.Np) if isinstance(model, HybridPredictor) else model
         )
         self.predictor = self.planner.predictor
         self.Np, self.delay = self.predictor.Np, self.planner.preview

@@ -12,8 +12,6 @@ from ..base.clock import SampleClock
 from ..base.errors import SignalError
 from .look_ahead import LookAhead
 
-__all__ = ["LookAheadInputs"]
-
 
 class LookAheadInputs:
     """Sample clock of a look-ahead, and the latched inputs of its current sample.

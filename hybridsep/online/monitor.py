@@ -7,38 +7,20 @@ from dataclasses import dataclass, field
 
 from ..base.state import FIXED
 
-__all__ = ["Monitor"]
-
 _N_OVER = 3
 """Samples in a row above the limit that trip: one or two may be outliers of the sensor. Missing ones do not count."""
 
 
 @dataclass
 class Monitor:
-    """Counts of samples without a measurement, and above the largest following error.
+    """Counts of samples without a measurement, and above the largest following error."""
 
-    Attributes
-    ----------
-    n_lost : int
-        Samples without a measurement after which it is lost; 0: never.
-    error_max : float
-        Largest following error, m; 0: none.
-    n_missing : int
-        Measurements that were missing one after another.
-    n_over : int
-        Samples above ``error_max`` one after another, three from when it tripped on.
-    n_taken : int
-        Samples taken in since the window began.
-    was_reset : bool
-        Last level of the reset.
-    """
-
-    n_lost: int = field(default=0, metadata=FIXED)
-    error_max: float = field(default=0.0, metadata=FIXED)
-    n_missing: int = 0
-    n_over: int = 0
-    n_taken: int = 0
-    was_reset: bool = False
+    n_lost: int = field(default=0, metadata=FIXED)  # samples without a measurement after which it is lost; 0: never
+    error_max: float = field(default=0.0, metadata=FIXED)  # largest following error, m; 0: none
+    n_missing: int = 0  # measurements that were missing one after another
+    n_over: int = 0  # samples above ``error_max`` one after another, three from when it tripped on
+    n_taken: int = 0  # samples taken in since the window began
+    was_reset: bool = False  # last level of the reset
 
     @property
     def is_lost(self) -> bool:

@@ -9,8 +9,6 @@ from ..base.settings import check
 from ..base.signals import check_position
 from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
-__all__ = ["FeedDrive"]
-
 
 class FeedDrive:
     """Spring-mass-damper drive with quadratic damping and stiffness, eq. (13).

@@ -23,8 +23,6 @@ from ..base.settings import Limits, samples_before
 from ..base.signals import Array
 from .trajectory import read_trajectory, rest_to_rest
 
-__all__ = ["PlanarPath", "Points", "read_path"]
-
 Points = NDArray[np.complexfloating[Any, Any]]
 """Planar positions, ``(n,)``, m: X + iY."""
 
@@ -46,21 +44,11 @@ _ROUNDED = 5e-6
 
 @dataclass(frozen=True)
 class PlanarPath:
-    """Commanded positions of two axes.
+    """Commanded positions of two axes."""
 
-    Attributes
-    ----------
-    points : (n,) complex array, m
-        X + iY at ``k·T_s``.
-    cutting : (n,) array of bool
-        Whether a sample is of a move at a feed, no rapid one.
-    centre : (n,) complex array, m
-        Centre of the full circle that a sample is on; NaN elsewhere.
-    """
-
-    points: Points
-    cutting: NDArray[np.bool_]
-    centre: Points
+    points: Points  # (n,) complex, m: X + iY at ``k·T_s``
+    cutting: NDArray[np.bool_]  # (n,): whether a sample is of a move at a feed, no rapid one
+    centre: Points  # (n,) complex, m: centre of the full circle that a sample is on; NaN elsewhere
 
     @classmethod
     def of(cls, points: Points) -> PlanarPath:

@@ -18,18 +18,6 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
-__all__ = [
-    "INTERNAL_STEP",
-    "RATE_MAX",
-    "STATE_MAX",
-    "Drive",
-    "Encoder",
-    "Plant",
-    "check_step",
-    "internal_steps",
-    "simulate",
-]
-
 INTERNAL_STEP = 1e-4
 """Longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval."""
 

@@ -11,8 +11,6 @@ from ..base.signals import check_position
 from ..model.physics import ModalModel, Mode
 from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
-__all__ = ["StageDrive", "velocity_under_friction"]
-
 _STEPS_MAX = 60
 """Largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end."""
 

@@ -22,9 +22,7 @@ from ..logs.log import read_log
 if TYPE_CHECKING:
     import ruckig
 
-__all__ = ["PAPER_LIMITS", "along_path", "archimedean_spiral", "read_trajectory", "rest_to_rest", "spiral", "staircase"]
-
-Curve = Callable[[Array], Array]
+_Curve = Callable[[Array], Array]
 
 _PANELS = 2000
 """Panels of a path, over which its length is integrated."""
@@ -158,7 +156,7 @@ def read_trajectory(
     return log.x_d, log.T_s
 
 
-def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float]:
+def archimedean_spiral(radius: float, turns: float) -> tuple[_Curve, _Curve, float]:
     """Return ``r = radius · θ / θ_end`` as position, derivative and end parameter for :func:`along_path`."""
     for name, value in (("radius", radius), ("turns", turns)):
         if not (np.isfinite(value) and value > 0):
@@ -175,7 +173,7 @@ def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float
     return position, derivative, end
 
 
-def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T_s: float = 1e-3) -> Array:
+def along_path(position: _Curve, derivative: _Curve, end: float, limits: Limits, T_s: float = 1e-3) -> Array:
     """Return a rest-to-rest motion along a planar path, with limits along the arc, ``(n, d)``, m, at ``k·T_s``.
 
     ``position`` and ``derivative``, (n,) → (n, d), m, are the path and its derivative over a parameter from 0 to
@@ -210,11 +208,11 @@ def _plan(here: float, there: float, limits: Limits) -> ruckig.Trajectory:
     return move
 
 
-def _speed(derivative: Curve, u: Array) -> Array:
+def _speed(derivative: _Curve, u: Array) -> Array:
     return np.asarray(np.linalg.norm(derivative(u), axis=-1))
 
 
-def _panel_lengths(derivative: Curve, left: Array, right: Array) -> Array:
+def _panel_lengths(derivative: _Curve, left: Array, right: Array) -> Array:
     """Return ``∫ |dr/du| du`` over each panel ``[left, right]``, Gauss-Legendre of order 8."""
     x, w = np.polynomial.legendre.leggauss(8)
     half = (right - left) / 2

@@ -18,25 +18,17 @@ from ..base.state import FIXED
 from .regression import RidgeRegression, lags
 from .window import FeatureScales, Forecast, ResidualWindow
 
-__all__ = ["PaperModel"]
-
 
 @dataclass(frozen=True, eq=False)
 class PaperModel:
-    """State of the paper's model.
-
-    Attributes
-    ----------
-    x_pb, e_pb : (q,) and (p,) array, m
-        Past samples, oldest first, zero before the first one.
-    regression : RidgeRegression
-    """
+    """State of the paper's model."""
 
     n_rejected: ClassVar[int] = 0
     farthest: ClassVar[float] = 0.0
     learned: ClassVar[tuple[()]] = ()
 
     settings: PredictorSettings = field(metadata=FIXED)
+    # (q,) and (p,), m: past samples, oldest first, zero before the first one
     x_pb: Array
     e_pb: Array
     regression: RidgeRegression

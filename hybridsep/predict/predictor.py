@@ -30,40 +30,22 @@ from .regression import RidgeRegression
 from .uncertainty import Uncertainty, first_variance
 from .window import FeatureScales, Forecast, PredictedWindow, Prediction, ResidualWindow, WindowOperator
 
-__all__ = ["HybridPredictor", "PredictorState"]
-
 _KIND = "predictor"
 
-ResidualModel: TypeAlias = PaperModel | AveragedModel
+_ResidualModel: TypeAlias = PaperModel | AveragedModel
 """Model of the residual: a record; its methods return another."""
 
 
 @dataclass(frozen=True, eq=False)
 class PredictorState:
-    """What is known between two windows; it is saved as it is.
+    """What is known between two windows; it is saved as it is."""
 
-    Attributes
-    ----------
-    k : int
-        Samples of this run that are measured.
-    n_init : int
-        Samples of its warm-up.
-    start : float, m
-        Initial position; None until it is known. All other positions are relative to it.
-    physics : (n_state,) array, m
-        State of ``G_pb`` behind the measured samples.
-    late : (n_late,) array, m
-        Commands that are predicted and not measured yet.
-    residual : ResidualModel
-    uncertainty : Uncertainty
-    """
-
-    k: int
-    n_init: int
-    start: float | None
-    physics: Array
-    late: Array
-    residual: ResidualModel
+    k: int  # samples of this run that are measured
+    n_init: int  # samples of its warm-up
+    start: float | None  # m: initial position; None until it is known. All other positions are relative to it
+    physics: Array  # (n_state,), m: state of ``G_pb`` behind the measured samples
+    late: Array  # (n_late,), m: commands that are predicted and not measured yet
+    residual: _ResidualModel
     uncertainty: Uncertainty
 
 
@@ -318,7 +300,7 @@ class HybridPredictor:
         return self.state.start
 
     @property
-    def residual(self) -> ResidualModel:
+    def residual(self) -> _ResidualModel:
         """State of the residual model."""
         return self.state.residual
 

@@ -22,8 +22,6 @@ from ..base.errors import ParameterError
 from ..base.settings import check
 from ..base.signals import Array
 
-__all__ = ["PenalisedSolution", "RidgeRegression", "lags"]
-
 _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
 
@@ -54,20 +52,11 @@ def _folded(factor: Array, rows: Array, n_triangular: int = 0) -> Array:
 
 
 class PenalisedSolution(NamedTuple):
-    """Weights of some features under penalties of their own.
+    """Weights of some features under penalties of their own."""
 
-    Attributes
-    ----------
-    weights : (m,) array
-    triangle : (m, m) array
-        ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``.
-    residual_sum : float
-        ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, without the penalties.
-    """
-
-    weights: Array
-    triangle: Array
-    residual_sum: float
+    weights: Array  # (m,)
+    triangle: Array  # (m, m): ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``
+    residual_sum: float  # ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, without the penalties
 
     def leverage(self, rows: Array) -> Array:
         """Return ``φᵀ(RᵀR)⁻¹φ`` of rows φ, ``(k, m)``: the variance of ``wᵀφ`` relative to the noise's."""
@@ -77,18 +66,12 @@ class PenalisedSolution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RidgeRegression:
-    """Recursive ridge regression; eq. (6).
+    """Recursive ridge regression; eq. (6)."""
 
-    Attributes
-    ----------
-    factor : (n + 1, n + 1) array, column-major
-        Upper triangle ``[R z; 0 ρ]`` of the rows ``[Φ | target]``, with ``√λ·I`` as its first value.
-    n_rows : float
-        Rows so far, weighted.
-    """
-
+    # (n + 1, n + 1), column-major: upper triangle ``[R z; 0 ρ]`` of the rows ``[Φ | target]``, with ``√λ·I`` as its
+    # first value
     factor: Array
-    n_rows: float
+    n_rows: float  # rows so far, weighted
 
     @classmethod
     def init(cls, n_features: int, lam: float) -> RidgeRegression:

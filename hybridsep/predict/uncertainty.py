@@ -27,12 +27,10 @@ from scipy.signal import lfilter
 from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
 
-__all__ = ["N_COMPONENTS", "PredictedError", "Uncertainty", "first_variance"]
-
 _SHARES = (4.0, 2.0)
 """First variance of the error by each cause, relative to that cause: timing, variance of the experts."""
 
-N_COMPONENTS = 1 + len(_SHARES)
+_N_COMPONENTS = 1 + len(_SHARES)
 """Of the variance."""
 
 _UNKNOWN_NOISE = 25.0
@@ -75,51 +73,27 @@ errors, weighted by their distance from the middle, and bound."""
 
 
 class PredictedError(NamedTuple):
-    """What is known of the error of a window before it is measured.
+    """What is known of the error of a window before it is measured."""
 
-    Attributes
-    ----------
-    e_h : (n,) array, m
-        Published residual.
-    components : (n, N_COMPONENTS) array
-        ``f_i(k)``; m² but for the first, which is 1.
-    std : (n,) array, m
-        Standard deviation of the error.
-    """
-
-    e_h: Array
-    components: Array
-    std: Array
+    e_h: Array  # (n,), m: published residual
+    components: Array  # (n, _N_COMPONENTS): ``f_i(k)``; m² but for the first, which is 1
+    std: Array  # (n,), m: standard deviation of the error
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Standard deviation of prediction errors, calibrated online.
+    """Standard deviation of prediction errors, calibrated online."""
 
-    Attributes
-    ----------
-    theta : (N_COMPONENTS,) array
-        ``θ``: variance of the noise, m², and of the others relative to their causes.
-    evidence : (N_COMPONENTS,) array
-        Windows that each stands on, faded.
-    factor : float
-        ``c`` in the middle of a window.
-    ratio : float
-        ``c`` at its end relative to that at its beginning.
-    recent : float, m²
-        Recent mean square of the residual; 0 before the first window.
-    """
-
-    theta: Array
-    evidence: Array
-    factor: float
-    ratio: float
-    recent: float
+    theta: Array  # (_N_COMPONENTS,): ``θ``: variance of the noise, m², and of the others relative to their causes
+    evidence: Array  # (_N_COMPONENTS,): windows that each stands on, faded
+    factor: float  # ``c`` in the middle of a window
+    ratio: float  # ``c`` at its end relative to that at its beginning
+    recent: float  # m²: recent mean square of the residual; 0 before the first window
 
     @classmethod
     def init(cls, variance: float) -> Uncertainty:
         """Return what is assumed before the first window is measured, with the ``variance``, m², of the noise."""
-        return cls(np.array([variance, *_SHARES]), np.zeros(N_COMPONENTS), 1.0, 1.0, 0.0)
+        return cls(np.array([variance, *_SHARES]), np.zeros(_N_COMPONENTS), 1.0, 1.0, 0.0)
 
     def predict(self, x_pb: Array, e_h: Array, variance: Array | float, Np: int) -> PredictedError:
         """Return what is known of the error of the next window.
@@ -137,7 +111,7 @@ class Uncertainty:
         bounded = e_h
         if not np.abs(e_h).max() <= PREDICTION_MAX:  # a prediction that diverges is refused when it is published
             bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
-        components = np.empty((n, N_COMPONENTS))
+        components = np.empty((n, _N_COMPONENTS))
         components[:, 0] = 1.0
         _set_differences(components[:, 1], x_pb)
         components[:, 1] = np.minimum(np.abs(components[:, 1]), PREDICTION_MAX) ** 2
@@ -183,7 +157,7 @@ class Uncertainty:
         total = share.sum(axis=0)
         evidence = _MEMORY * self.evidence + total / Np
         seen = share.T @ np.minimum(error**2 / variance, _OUTLYING)
-        change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
+        change = np.maximum(np.divide(seen, total, out=np.ones(_N_COMPONENTS), where=total > 0.0), _VANISHING)
         step = np.minimum(_STEP * total / Np / (evidence + _FIRST_EVIDENCE), 1.0)
         least = np.array([_FLOOR * recent, *_THETA_LEAST[1:]])
         theta = np.minimum(np.maximum(theta * change**step, least), _THETA_MOST)

@@ -13,100 +13,51 @@ from scipy.signal import lfilter
 from ..base.signals import Array, as_published, as_samples
 from .uncertainty import PredictedError
 
-__all__ = [
-    "FeatureScales",
-    "Forecast",
-    "PredictedWindow",
-    "Prediction",
-    "ResidualWindow",
-    "WindowOperator",
-]
-
 
 class ResidualWindow(NamedTuple):
-    """What is known of a window before its residual is predicted.
+    """What is known of a window before its residual is predicted."""
 
-    Attributes
-    ----------
-    x_d, x_pb : (n,) array, m
-        Commands and physics-based prediction, relative to ``start``.
-    start : float, m
-        Initial position.
-    path : (m,) array, m
-        Commands as they came, as far as they are known, relative to ``start``: behind a compensator they are more than
-        the window's, and not modified but for those that are late.
-    """
-
+    # (n,), m: commands and physics-based prediction, relative to ``start``
     x_d: Array
     x_pb: Array
-    start: float
+    start: float  # m: initial position
+    # (m,), m: commands as they came, as far as they are known, relative to ``start``: behind a compensator they are
+    # more than the window's, and not modified but for those that are late
     path: Array
 
 
 class FeatureScales(NamedTuple):
-    """Scales that the features with averaging and their priors are relative to, from the commands ahead.
+    """Scales that the features with averaging and their priors are relative to, from the commands ahead."""
 
-    Attributes
-    ----------
-    velocity : float, m/s
-        Velocity scale of the friction features.
-    largest : (n_static,) array
-        Largest magnitudes of the static features, so far and ahead.
-    step : float, m
-        Largest change of the command from sample to sample, so far and ahead.
-    command_step, command_square : float, m and m²
-        That change, and the largest mean square of the command's residual, that priors of the command's expert come
-        from.
-    """
-
-    velocity: float
-    largest: Array
-    step: float
+    velocity: float  # m/s: velocity scale of the friction features
+    largest: Array  # (n_static,): largest magnitudes of the static features, so far and ahead
+    step: float  # m: largest change of the command from sample to sample, so far and ahead
+    # m and m²: that change, and the largest mean square of the command's residual, that priors of the command's expert
+    # come from
     command_step: float
     command_square: float
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """Residual of a window, predicted before it is measured.
-
-    Attributes
-    ----------
-    window : ResidualWindow
-    e_h : (n,) array, m
-        Predicted residual.
-    variance : (n,) array, m²
-        What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 without experts.
-    scales : FeatureScales, optional
-        With averaging.
-    """
+    """Residual of a window, predicted before it is measured."""
 
     window: ResidualWindow
-    e_h: Array
+    e_h: Array  # (n,), m: predicted residual
+    # (n,), m²: what the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 without
+    # experts
     variance: Array
-    scales: FeatureScales | None
+    scales: FeatureScales | None  # with averaging
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Prediction of one window.
+    """Prediction of one window."""
 
-    Attributes
-    ----------
-    x_pb : (n,) array, m
-        Physics-based prediction, eq. (2).
-    e_h : (n,) array, m
-        Predicted residual ``wᵀφ``, during the warm-up too.
-    x_h_std : (n,) array, m
-        Standard deviation of the error ``x − x_h`` against the measured position.
-    n_warm_up : int
-        Leading samples within the warm-up, where ``x_h = x_pb``.
-    """
-
-    x_pb: Array
-    e_h: Array
-    x_h_std: Array
-    n_warm_up: int
+    x_pb: Array  # (n,), m: physics-based prediction, eq. (2)
+    e_h: Array  # (n,), m: predicted residual ``wᵀφ``, during the warm-up too
+    x_h_std: Array  # (n,), m: standard deviation of the error ``x − x_h`` against the measured position
+    n_warm_up: int  # leading samples within the warm-up, where ``x_h = x_pb``
 
     @property
     def x_h(self) -> Array:
@@ -123,18 +74,10 @@ class Prediction:
 
 
 class PredictedWindow(NamedTuple):
-    """Predicted window pending measurement.
+    """Predicted window pending measurement."""
 
-    Attributes
-    ----------
-    forecast : Forecast
-        Prediction of the residual by its model.
-    error : PredictedError
-        Published residual, and what is known of its error.
-    """
-
-    forecast: Forecast
-    error: PredictedError
+    forecast: Forecast  # prediction of the residual by its model
+    error: PredictedError  # published residual, and what is known of its error
 
 
 @dataclass(frozen=True)
@@ -142,18 +85,11 @@ class WindowOperator:
     """The hybrid model over one window, affine in its commands; eq. (3).
 
     ``x_h = G_h x_d + free`` with ``G_h`` lower-triangular Toeplitz, and the same for the physics model alone.
-
-    Attributes
-    ----------
-    g_h, g_pb : (n,) array, m/m
-        First columns of ``G_h`` and ``G_pb``.
-    free, free_pb : (n,) array, m
-        Free responses, to zero commands over the window.
     """
 
-    g_h: Array
-    free: Array
-    g_pb: Array
+    g_h: Array  # (n,), m/m: first column of ``G_h``
+    free: Array  # (n,), m: free response, to zero commands over the window
+    g_pb: Array  # likewise of ``G_pb``
     free_pb: Array
 
     @property

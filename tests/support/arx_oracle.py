@@ -6,8 +6,6 @@ import numpy as np
 
 from hybridsep.base.signals import Array
 
-__all__ = ["arx_by_definition", "free_run_by_definition"]
-
 
 def arx_by_definition(x_d: Array, x: Array, n: int, n_fitted: int) -> Array:
     """Return the coefficients from the samples before ``n_fitted``, row by row."""

@@ -13,19 +13,6 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.model import AveragedModel
 from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = [
-    "FRICTION",
-    "PERIOD",
-    "TS",
-    "averaged",
-    "averaged_model",
-    "change_learned",
-    "cycles",
-    "friction",
-    "physics",
-    "run",
-]
-
 TS = 1e-3  # s
 PERIOD = 1000
 """Samples of a cycle."""

@@ -15,8 +15,6 @@ from staircase_data import commanded, measured
 
 from hybridsep.app import cli, console
 
-__all__ = ["Run", "run_line", "run_page", "write_log", "write_rows"]
-
 
 class Run:
     """Runs ``hybridsep`` with arguments in this process; returns exit status, stdout and stderr."""

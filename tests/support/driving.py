@@ -65,22 +65,13 @@ def steps(stream: Stream, first: int, last: int, shift: float = 0.0) -> list[lis
 
 @dataclass(frozen=True)
 class Loop:
-    """A closed loop of the library's look-ahead with a plant of the library.
+    """A closed loop of the library's look-ahead with a plant of the library."""
 
-    Attributes
-    ----------
-    values : dict
-        What the look-ahead was initialised with.
-    r, x : (n,) arrays, m
-        Its inputs.
-    outputs : (n + 1, n_outputs) array
-        Before each sample and after the last.
-    """
-
-    values: dict[str, Value]
+    values: dict[str, Value]  # what the look-ahead was initialised with
+    # (n,), m: its inputs
     r: Array
     x: Array
-    outputs: Array
+    outputs: Array  # (n + 1, n_outputs): before each sample and after the last
 
     def column(self, model: str, name: str) -> Array:
         """Return one of the model's outputs."""

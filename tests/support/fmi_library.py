@@ -13,11 +13,6 @@ from typing import Any, ClassVar
 import fmpy
 from fmpy import fmi2, fmi3
 
-__all__ = [
-    *("ABSENT", "DISCARD", "ERROR", "FATAL", "OK", "STATES", "Library", "Library3"),
-    *("library_of", "repair_checksum", "steps"),
-]
-
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 STATES = ("instantiated", "Initialization Mode", "stepping", "terminated")
 

@@ -17,8 +17,6 @@ from hybridsep import ModalModel, Mode
 from hybridsep.base.signals import Array
 from hybridsep.logs.log import Log
 
-__all__ = ["ACCUSED_BEFORE", "COMMANDS", "DRIVES", "GeneratedLog", "generated_log", "log_of"]
-
 _N = 3000
 """Samples of a log."""
 
@@ -168,15 +166,9 @@ DRIVES: dict[str, Callable[[Numbers, Array, float, float], Array]] = {
 
 @dataclass(frozen=True)
 class GeneratedLog:
-    """Log of a random axis.
+    """Log of a random axis."""
 
-    Attributes
-    ----------
-    command, drive : str
-        Their kinds.
-    log : Log
-    """
-
+    # their kinds
     command: str
     drive: str
     log: Log

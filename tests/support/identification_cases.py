@@ -8,8 +8,6 @@ from scipy.signal import lfilter
 from hybridsep import PAPER_LIMITS, ModalModel, rest_to_rest
 from hybridsep.base.signals import Array
 
-__all__ = ["T_S", "correlated", "measured", "moves"]
-
 T_S = 1e-3
 
 

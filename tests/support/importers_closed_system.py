@@ -47,38 +47,21 @@ MOVED = " moved"
 
 @dataclass(frozen=True)
 class ClosedSystem:
-    """A closed system of three FMUs: ``reference``, the look-ahead and ``drive``.
+    """A closed system of three FMUs: ``reference``, the look-ahead and ``drive``."""
 
-    Attributes
-    ----------
-    look_ahead, model : str
-        The look-ahead's name in the system, and its FMU.
-    command : str
-        Its output that goes to the drive.
-    delay : int
-        By how many samples it delays the trajectory; the trajectory is held at its end for as many more.
-    positions, reported : tuple of str
-        Its outputs that move with the trajectory, and its own figures, errors since ``t_init``.
-    figures : tuple of str
-        Figures of ``reported`` that the guide states.
-    errors : tuple of (str, str)
-        Minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states.
-    suffix : str
-        Ending of the FMUs' names: Fmi3 for FMI 3.0.
-    n_samples : int
-        Of the trajectory, as far as it is played.
-    """
-
+    # the look-ahead's name in the system, and its FMU
     look_ahead: str
     model: str
-    command: str
-    delay: int
+    command: str  # its output that goes to the drive
+    delay: int  # by how many samples it delays the trajectory; the trajectory is held at its end for as many more
+    # its outputs that move with the trajectory, and its own figures, errors since ``t_init``
     positions: tuple[str, ...]
     reported: tuple[str, ...]
-    figures: tuple[str, ...]
+    figures: tuple[str, ...]  # figures of ``reported`` that the guide states
+    # each (str, str): minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states
     errors: tuple[tuple[str, str], ...]
-    suffix: str = ""
-    n_samples: int = N_SAMPLES
+    suffix: str = ""  # ending of the FMUs' names: Fmi3 for FMI 3.0
+    n_samples: int = N_SAMPLES  # of the trajectory, as far as it is played
 
     @property
     def components(self) -> dict[str, str]:

@@ -13,8 +13,6 @@ import pytest
 from recorders import halscope_csv, trace_xml, twincat_csv, write_parquet
 from scipy import io
 
-__all__ = ["EVERY_FORMAT", "FORMATS", "Columns", "capture", "columns", "write", "write_csv"]
-
 Columns = dict[str, Any]
 
 

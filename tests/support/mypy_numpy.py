@@ -12,8 +12,6 @@ from mypy import errorcodes
 from mypy.options import Options
 from mypy.plugin import Plugin
 
-__all__ = ["plugin"]
-
 _KINDS = {
     errorcodes.ARG_TYPE,
     errorcodes.ASSIGNMENT,

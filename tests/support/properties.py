@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from hypothesis import HealthCheck, settings
 
-__all__ = ["LEFT_OUT", "examples", "share", "take_profile"]
-
 LEFT_OUT = ("nightly", "release")
 """Marks of tests that run where they are named in ``-m``, or by their own names."""
 

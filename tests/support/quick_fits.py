@@ -7,8 +7,6 @@ import pytest
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.identify.structure import STRUCTURES
 
-__all__ = ["without_larger_structures", "without_other_settings", "without_other_windows", "without_python_fmus"]
-
 
 def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try structures of a lag or one mode alone: half of its time."""

@@ -30,23 +30,12 @@ for _name in MACHINES:
 
 @dataclass(frozen=True)
 class Loop:
-    """One closed loop.
-
-    Attributes
-    ----------
-    machine : str
-    values : dict
-        FMI parameters of the compensator.
-    r : (n,) array, m
-        Commanded positions, as they enter the look-ahead; they begin at the position of rest.
-    noise_seed : int
-        Of the encoder.
-    """
+    """One closed loop."""
 
     machine: str
-    values: dict[str, Any]
-    r: Array
-    noise_seed: int
+    values: dict[str, Any]  # FMI parameters of the compensator
+    r: Array  # (n,), m: commanded positions, as they enter the look-ahead; they begin at the position of rest
+    noise_seed: int  # of the encoder
 
     @property
     def model(self) -> str:

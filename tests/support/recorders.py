@@ -14,8 +14,6 @@ import pyarrow.parquet as pq
 
 from hybridsep.base.signals import Array
 
-__all__ = ["halscope_csv", "trace_xml", "twincat_csv", "write_parquet"]
-
 Rated = Mapping[str, tuple[float, Array]]
 """Sampling interval, s, and values by column."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import struct
 import zlib
 
-__all__ = ["sealed", "spoiled"]
-
 _HEAD, _SETTING = 32, 32
 """Bytes of the head, and of a setting: its name in 24, its value."""
 

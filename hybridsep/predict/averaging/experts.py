@@ -20,28 +20,6 @@ from ..regression import PenalisedSolution, RidgeRegression, lags
 from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
 
-__all__ = [
-    "ARX_COMMAND",
-    "ARX_RESIDUAL",
-    "COMMAND_RESIDUAL",
-    "EXPERTS",
-    "FRESH_START",
-    "HOLD",
-    "MODEL_RESIDUAL",
-    "N_RESIDUALS",
-    "RECALL",
-    "REGRESSIONS",
-    "STATIC",
-    "Expert",
-    "ExpertErrors",
-    "ExpertPrediction",
-    "ExpertWindow",
-    "Regression",
-    "ResidualScale",
-    "SolvedExpert",
-    "solve",
-]
-
 MODEL_RESIDUAL, COMMAND_RESIDUAL, N_RESIDUALS = range(3)
 """Residuals that regressions predict, and the rows that they learn: of the physics model, of the command; their
 number."""
@@ -61,18 +39,10 @@ squares of the targets: the C core has it from a Gram matrix, which does not res
 
 @dataclass(frozen=True)
 class ResidualScale:
-    """Size of the residuals so far.
+    """Size of the residuals so far."""
 
-    Attributes
-    ----------
-    largest_square : float, m²
-        Largest mean square of a window.
-    largest : float, m
-        Largest magnitude.
-    """
-
-    largest_square: float = 0.0
-    largest: float = 0.0
+    largest_square: float = 0.0  # m²: largest mean square of a window
+    largest: float = 0.0  # m: largest magnitude
 
     def follow(self, residuals: Array) -> ResidualScale:
         """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1."""
@@ -81,41 +51,21 @@ class ResidualScale:
 
 
 class ExpertPrediction(NamedTuple):
-    """Residual predicted over a window by one expert.
+    """Residual predicted over a window by one expert."""
 
-    Attributes
-    ----------
-    e_h : (n,) array, m
-        Shrunk by its variance, and bounded.
-    unshrunk : (n,) array, m
-    shrinkage : (n,) array
-        What the variance leaves of it.
-    variance : (n,) array, m²
-        What is left of the variance of the residual, ``v·τ²/(v + τ²)``.
-    noise_variance : float, m²
-        Mean square of the rows so far about this expert.
-    """
-
-    e_h: Array
-    unshrunk: Array
-    shrinkage: Array
-    variance: Array
-    noise_variance: float
+    e_h: Array  # (n,), m: shrunk by its variance, and bounded
+    unshrunk: Array  # (n,), m
+    shrinkage: Array  # (n,): what the variance leaves of it
+    variance: Array  # (n,), m²: what is left of the variance of the residual, ``v·τ²/(v + τ²)``
+    noise_variance: float  # m²: mean square of the rows so far about this expert
 
 
 @dataclass(frozen=True)
 class ExpertErrors:
-    """What is known of the errors of an expert.
+    """What is known of the errors of an expert."""
 
-    Attributes
-    ----------
-    noise_variance : float, m²
-        Of a row about the model; 0 until it is known.
-    correlation : float
-        Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
-    """
-
-    noise_variance: float = 0.0
+    noise_variance: float = 0.0  # m²: of a row about the model; 0 until it is known
+    # rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike
     correlation: float = 1.0
 
     def variance(self, target_square: float, first: float, least: float) -> float:
@@ -153,20 +103,11 @@ class ExpertErrors:
 
 
 class SolvedExpert(NamedTuple):
-    """Expert with weights.
+    """Expert with weights."""
 
-    Attributes
-    ----------
-    n_static : int
-        Features without lags, the first ones of a row.
-    solution : PenalisedSolution
-        Weights of these and of the lags.
-    variance, noise_variance : float, m²
-        Of the noise that the penalties come from, and mean square of the rows about the weights.
-    """
-
-    n_static: int
-    solution: PenalisedSolution
+    n_static: int  # features without lags, the first ones of a row
+    solution: PenalisedSolution  # weights of these and of the lags
+    # m²: of the noise that the penalties come from, and mean square of the rows about the weights
     variance: float
     noise_variance: float
 
@@ -271,30 +212,15 @@ _LEAST = 1e-150
 
 @dataclass(frozen=True)
 class ExpertWindow:
-    """Window as experts predict it.
-
-    Attributes
-    ----------
-    model : AveragedModel
-    window : ResidualWindow
-    solved : mapping
-        Regressions that know something, with their weights.
-    scales : FeatureScales
-    rows : (n, n_static) array
-        Static features.
-    predictions : mapping
-        Of these, of their residuals.
-    recalled : tuple
-        By Memory.recalled.
-    """
+    """Window as experts predict it."""
 
     model: Any
     window: ResidualWindow
-    solved: Mapping[Regression, SolvedExpert]
+    solved: Mapping[Regression, SolvedExpert]  # regressions that know something, with their weights
     scales: FeatureScales
-    rows: Array
-    predictions: Mapping[Regression, ExpertPrediction]
-    recalled: tuple[Array, float, float]
+    rows: Array  # (n, n_static): static features
+    predictions: Mapping[Regression, ExpertPrediction]  # of these, of their residuals
+    recalled: tuple[Array, float, float]  # by Memory.recalled
 
     @property
     def bound(self) -> float:
@@ -314,17 +240,10 @@ class ExpertWindow:
 
 @dataclass(frozen=True)
 class Expert(ABC):
-    """Entry of :data:`EXPERTS`.
-
-    Attributes
-    ----------
-    name : str
-    first_weight : float
-        In the stack, without evidence.
-    """
+    """Entry of :data:`EXPERTS`."""
 
     name: str
-    first_weight: float = 0.0
+    first_weight: float = 0.0  # in the stack, without evidence
 
     @property
     def place(self) -> int:
@@ -348,21 +267,13 @@ class Hold(Expert):
 
 @dataclass(frozen=True)
 class Regression(Expert):
-    """Expert by features of a residual.
+    """Expert by features of a residual."""
 
-    Attributes
-    ----------
-    target : int
-        MODEL_RESIDUAL, with static features, or COMMAND_RESIDUAL, with increments of the command.
-    has_lags : bool
-        Whether lags of the residual are among its features.
-    is_fresh : bool
-        Whether it gives earlier runs little weight: a counterpart of the one that led when they ended, whose target it
-        has.
-    """
-
+    # MODEL_RESIDUAL, with static features, or COMMAND_RESIDUAL, with increments of the command
     target: int = MODEL_RESIDUAL
-    has_lags: bool = True
+    has_lags: bool = True  # whether lags of the residual are among its features
+    # whether it gives earlier runs little weight: a counterpart of the one that led when they ended, whose target it
+    # has
     is_fresh: bool = False
 
     def like(self, model: Any) -> Regression:

@@ -29,29 +29,12 @@ from ..regression import lags
 from ..window import ResidualWindow
 from .constants import CONSTANTS
 
-__all__ = [
-    "LEAST_VELOCITY",
-    "N_FRICTION",
-    "N_LASTING",
-    "N_STOPS",
-    "CommandFeatures",
-    "Disturbance",
-    "StaticFeatures",
-    "StaticState",
-]
-
 
 @dataclass(frozen=True)
 class CommandFeatures:
-    """Features of the command, over consecutive windows.
+    """Features of the command, over consecutive windows."""
 
-    Attributes
-    ----------
-    dead_time : int
-        ``d``: samples before the command may act, fewer than the physics model's.
-    """
-
-    dead_time: int
+    dead_time: int  # ``d``: samples before the command may act, fewer than the physics model's
 
     @property
     def p(self) -> int:
@@ -111,52 +94,25 @@ _DIFFERENCES = 3
 
 @dataclass(frozen=True, eq=False)
 class StaticState:
-    """State of the features between two windows; positions relative to the start.
+    """State of the features between two windows; positions relative to the start."""
 
-    Attributes
-    ----------
-    filters : (n_state, n_disturbances) array
-        State of ``G_pb`` for each disturbance.
-    filtered : (n_disturbances,) array
-        Last filtered disturbances.
-    x_d : float, m
-        Last command.
-    x_pb : (4,) array, m
-        Last physics-based predictions, oldest first.
-    stops : (N_STOPS,) array, m
-        Of the stop operators.
-    """
-
-    filters: Array
-    filtered: Array
-    x_d: float
-    x_pb: Array
-    stops: Array
+    filters: Array  # (n_state, n_disturbances): state of ``G_pb`` for each disturbance
+    filtered: Array  # (n_disturbances,): last filtered disturbances
+    x_d: float  # m: last command
+    x_pb: Array  # (4,), m: last physics-based predictions, oldest first
+    stops: Array  # (N_STOPS,), m: of the stop operators
 
 
 @dataclass(frozen=True)
 class StaticFeatures:
-    """Features without lags, over consecutive windows.
+    """Features without lags, over consecutive windows."""
 
-    Attributes
-    ----------
-    discrete : DiscreteModel
-        ``G_pb``.
-    q : int
-        Largest lag of ``x_pb``, as that many differences, at most three.
-    period : float, m
-        Of a disturbance that repeats with the position; 0: none.
-    own : tuple of Disturbance
-        The user's own.
-    is_planned : bool
-        Whether a compensator decides the commands: then the position's own velocity is damped, as ``x_pb`` turns with
-        every change of the command, and is far from the motion; else the velocity of ``x_pb``.
-    """
-
-    discrete: DiscreteModel
-    q: int
-    period: float = 0.0
-    own: tuple[Disturbance, ...] = ()
+    discrete: DiscreteModel  # ``G_pb``
+    q: int  # largest lag of ``x_pb``, as that many differences, at most three
+    period: float = 0.0  # m: of a disturbance that repeats with the position; 0: none
+    own: tuple[Disturbance, ...] = ()  # the user's own
+    # whether a compensator decides the commands: then the position's own velocity is damped, as ``x_pb`` turns with
+    # every change of the command, and is far from the motion; else the velocity of ``x_pb``
     is_planned: bool = False
 
     @property

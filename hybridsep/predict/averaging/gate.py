@@ -17,26 +17,14 @@ from numpy.typing import NDArray
 from ...base.signals import PREDICTION_MAX, Array
 from .constants import CONSTANTS
 
-__all__ = ["InnovationGate", "gated"]
-
 
 @dataclass(frozen=True)
 class InnovationGate:
-    """What is known of the samples before a window.
+    """What is known of the samples before a window."""
 
-    Attributes
-    ----------
-    n_missing : int
-        Samples since the last one that was believed.
-    n_beyond : int
-        Of these, values beyond the gate, less the values within it that followed.
-    farthest : float, m
-        Largest residual out of reach among them.
-    """
-
-    n_missing: int = 0
-    n_beyond: int = 0
-    farthest: float = 0.0
+    n_missing: int = 0  # samples since the last one that was believed
+    n_beyond: int = 0  # of these, values beyond the gate, less the values within it that followed
+    farthest: float = 0.0  # m: largest residual out of reach among them
 
 
 def gated(

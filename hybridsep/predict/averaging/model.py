@@ -47,8 +47,6 @@ from .recall import Memory
 from .stacking import Stack
 from .warm_start import WarmStartRows
 
-__all__ = ["AveragedForecast", "AveragedModel", "Learned", "RunState"]
-
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
 penalties come from: a controller factors most of that solution in them."""
@@ -56,31 +54,17 @@ penalties come from: a controller factors most of that solution in them."""
 
 @dataclass(frozen=True, eq=False)
 class RunState:
-    """What a run has been before the next window; positions relative to the start.
-
-    Attributes
-    ----------
-    static : StaticState
-    commands : (d + p_A + 1,) array, m
-        Last commands, oldest first, for the ``p_A`` lags of the command's expert.
-    past : pair of (p,) and (p_A,) array, m
-        Last residuals of the physics model, and of the command; newest first.
-    bridged : (max(p, p_A),) array of bool
-        Whether the last ones stand for samples without a measurement, oldest first.
-    gate : InnovationGate
-    n_rejected : int
-        Measurements that were missing or not plausible.
-    memory : Memory
-        Of this run and earlier ones.
-    """
+    """What a run has been before the next window; positions relative to the start."""
 
     static: StaticState
-    commands: Array
+    commands: Array  # (d + p_A + 1,), m: last commands, oldest first, for the ``p_A`` lags of the command's expert
+    # pair of (p,) and (p_A,), m: last residuals of the physics model, and of the command; newest first
     past: tuple[Array, Array]
+    # (max(p, p_A),): whether the last ones stand for samples without a measurement, oldest first
     bridged: NDArray[np.bool_]
     gate: InnovationGate
-    n_rejected: int
-    memory: Memory
+    n_rejected: int  # measurements that were missing or not plausible
+    memory: Memory  # of this run and earlier ones
 
     @classmethod
     def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
@@ -91,30 +75,17 @@ class RunState:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What has been learned besides the rows: the numbers of a weights file, in this order, in the C core, too.
+    """What has been learned besides the rows: the numbers of a weights file, in this order, in the C core, too."""
 
-    Attributes
-    ----------
-    velocity_scale : float, m/s
-        Of the friction features; 0 before any motion.
-    largest_step, fastest : float, m
-        Largest change from sample to sample, of the command and of the physics model.
-    scales : pair of ResidualScale
-        Sizes of the residuals, of the physics model and of the command.
-    errors : tuple of ExpertErrors
-        Of the regressions.
-    stack : Stack
-    largest : (n_static,) array
-        Largest magnitudes of the static features.
-    """
-
-    velocity_scale: float
+    velocity_scale: float  # m/s: of the friction features; 0 before any motion
+    # m: largest change from sample to sample, of the command and of the physics model
     largest_step: float
     fastest: float
+    # pair of ResidualScale: sizes of the residuals, of the physics model and of the command
     scales: tuple[ResidualScale, ResidualScale]
-    errors: tuple[ExpertErrors, ...]
+    errors: tuple[ExpertErrors, ...]  # of the regressions
     stack: Stack
-    largest: Array
+    largest: Array  # (n_static,): largest magnitudes of the static features
 
     @classmethod
     def init(cls, n_static: int) -> Learned:
@@ -134,61 +105,33 @@ class Learned:
 
 @dataclass(frozen=True)
 class AveragedForecast(Forecast):
-    """Window predicted by the averaged model.
-
-    Attributes
-    ----------
-    scales : FeatureScales
-    x : (n,) array, m
-        Position that the stiffness acts at.
-    stacked : (n_experts, n) array, m
-        Predictions that are stacked; 0 where an expert knows nothing.
-    predictions : mapping
-        Of the regressions that know something.
-    shares : (n_experts,) array
-        Weights of the experts: RECALL counts as far as the commands are alike, the others for the rest.
-    memory : Memory
-        With the commands ahead.
-    """
+    """Window predicted by the averaged model."""
 
     scales: FeatureScales
-    x: Array
-    stacked: Array
-    predictions: Mapping[Regression, ExpertPrediction]
+    x: Array  # (n,), m: position that the stiffness acts at
+    stacked: Array  # (n_experts, n), m: predictions that are stacked; 0 where an expert knows nothing
+    predictions: Mapping[Regression, ExpertPrediction]  # of the regressions that know something
+    # (n_experts,): weights of the experts: RECALL counts as far as the commands are alike, the others for the rest
     shares: Array
-    memory: Memory
+    memory: Memory  # with the commands ahead
 
 
 @dataclass(frozen=True, eq=False)
 class AveragedModel:
-    """State of the model: what it has learned, and its run. It stays the physics model where it does not know better.
+    """State of the model: what it has learned, and its run; the physics model where it does not know better."""
 
-    Attributes
-    ----------
-    settings : PredictorSettings
-        ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
-    static : StaticFeatures
-    command : CommandFeatures
-    learned : Learned
-    evidence : pair of WarmStartRows
-        Rows of the residuals of the physics model, and of the command.
-    noise : tuple of float, m²
-        Of the regressions, variances that the penalties of the next solution come from; 0: none yet.
-    command_square : float, m²
-        Largest mean square of the command's residual, before the last sample of the last window; 0: none yet.
-    leader : int
-        Place of the expert that led when earlier runs ended.
-    run : RunState
-    """
-
+    # ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise
     settings: PredictorSettings = field(metadata=FIXED)
     static: StaticFeatures = field(metadata=FIXED)
     command: CommandFeatures = field(metadata=FIXED)
     learned: Learned
+    # pair of WarmStartRows: rows of the residuals of the physics model, and of the command
     evidence: tuple[WarmStartRows, WarmStartRows]
+    # m²: of the regressions, variances that the penalties of the next solution come from; 0: none yet
     noise: tuple[float, ...]
+    # m²: largest mean square of the command's residual, before the last sample of the last window; 0: none yet
     command_square: float
-    leader: int
+    leader: int  # place of the expert that led when earlier runs ended
     run: RunState
 
     @classmethod

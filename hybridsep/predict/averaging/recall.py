@@ -17,8 +17,6 @@ import numpy as np
 from ...base.signals import Array
 from .constants import CONSTANTS
 
-__all__ = ["Memory"]
-
 _UPDATES = 25
 """Samples of a window, at most, at which all lags are compared: a controller does it in the samples between them."""
 
@@ -28,27 +26,13 @@ _ALIKE = 1e-100
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """Commands and residuals, oldest first; zeros before the first ones.
+    """Commands and residuals, oldest first; zeros before the first ones."""
 
-    Attributes
-    ----------
-    commands : (n + stride,) array, m
-        As they came, as far as they are known, relative to the start.
-    residuals : (n,) array, m
-        Of the physics model, as far as they are measured.
-    distances : (n,) array, m²
-        ``D_τ`` of the lags n … 1.
-    moved : float, m²
-        ``S``.
-    n_ahead : int
-        Commands that are known ahead of those that were predicted.
-    """
-
-    commands: Array
-    residuals: Array
-    distances: Array
-    moved: float
-    n_ahead: int
+    commands: Array  # (n + stride,), m: as they came, as far as they are known, relative to the start
+    residuals: Array  # (n,), m: of the physics model, as far as they are measured
+    distances: Array  # (n,), m²: ``D_τ`` of the lags n … 1
+    moved: float  # m²: ``S``
+    n_ahead: int  # commands that are known ahead of those that were predicted
 
     @classmethod
     def init(cls, n: int, Np: int) -> Memory:

@@ -11,13 +11,11 @@ from ...base.signals import Array
 from .constants import CONSTANTS
 from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert, Regression
 
-__all__ = ["ROUNDING", "Stack", "simplex_minimum"]
-
 _LEAST_SQUARE = 1e-300
 """Mean square, m², that counts as 0."""
 
 
-ROUNDING = 1e-6
+_ROUNDING = 1e-6
 """What rounding may have added to the sum of the weights."""
 
 
@@ -27,21 +25,13 @@ class Stack:
 
     ``π = argmin ‖e − F π‖² + κ s² n ‖π − π₀‖²`` over the windows so far, their evidence fading by ``γ`` a window, with
     the mean square ``s²`` of the best expert and ``n`` samples of a window: without evidence ``π = π₀``.
-
-    Attributes
-    ----------
-    weights : (n_experts,) array
-        ``π``.
-    gram, cross : (n_experts, n_experts) and (n_experts,) array, m²
-        ``FᵀF`` and ``Fᵀe`` so far.
-    evidence : (2,) array
-        ``eᵀe`` so far, m², and samples.
     """
 
-    weights: Array
+    weights: Array  # (n_experts,): ``π``
+    # (n_experts, n_experts) and (n_experts,), m²: ``FᵀF`` and ``Fᵀe`` so far
     gram: Array
     cross: Array
-    evidence: Array
+    evidence: Array  # (2,): ``eᵀe`` so far, m², and samples
 
     @classmethod
     def init(cls) -> Stack:
@@ -74,7 +64,7 @@ class Stack:
     def others(self) -> Array:
         """Return the weights of all experts but RECALL, with its weight shared among them and physics."""
         left = 1.0 - self.weights[RECALL.place]
-        others = self.weights / left if left > ROUNDING else _first_weights()
+        others = self.weights / left if left > _ROUNDING else _first_weights()
         others[RECALL.place] = 0.0
         return others
 

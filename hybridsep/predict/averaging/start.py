@@ -16,8 +16,6 @@ from ...model.discrete import DiscreteModel
 from ...model.physics import ModalModel
 from ..regression import RidgeRegression
 
-__all__ = ["MotionBefore", "motion_before"]
-
 _MOVING = 0.05
 """Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
 motion: from rest a jerk-limited command needs time."""
@@ -31,21 +29,11 @@ determined."""
 
 
 class MotionBefore(NamedTuple):
-    """Motion before a run, relative to rest.
+    """Motion before a run, relative to rest."""
 
-    Attributes
-    ----------
-    state : (n_state,) array, m
-        Of ``G_pb`` at the beginning of the first window.
-    x_d : (n,) array, m
-        Commands of the window: 0, except the late ones at its beginning, which came before the run.
-    x_pb : (n,) array, m
-        Response to both.
-    """
-
-    state: Array
-    x_d: Array
-    x_pb: Array
+    state: Array  # (n_state,), m: of ``G_pb`` at the beginning of the first window
+    x_d: Array  # (n,), m: commands of the window: 0, except the late ones at its beginning, which came before the run
+    x_pb: Array  # (n,), m: response to both
 
 
 def motion_before(

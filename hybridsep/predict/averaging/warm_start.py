@@ -9,25 +9,16 @@ import numpy as np
 from ...base.signals import Array
 from ..regression import RidgeRegression
 
-__all__ = ["WarmStartRows"]
-
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
 
 
 @dataclass(frozen=True, eq=False)
 class WarmStartRows:
-    """Rows of this run and of earlier ones, by their factors.
-
-    Attributes
-    ----------
-    this : RidgeRegression
-    earlier : RidgeRegression
-        Without rows unless earlier runs are doubted.
-    """
+    """Rows of this run and of earlier ones, by their factors."""
 
     this: RidgeRegression
-    earlier: RidgeRegression
+    earlier: RidgeRegression  # without rows unless earlier runs are doubted
 
     @classmethod
     def init(cls, n_features: int) -> WarmStartRows:

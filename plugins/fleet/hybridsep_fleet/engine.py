@@ -23,8 +23,6 @@ from distributed import Client, KilledWorker, LocalCluster, Security, as_complet
 
 from hybridsep.base.errors import HybridSepError, ParameterError, first_line
 
-__all__ = ["Done", "Engine", "attempt", "cluster"]
-
 T = TypeVar("T")
 
 _CONFIG: dict[str, Any] = {
@@ -72,32 +70,17 @@ def _ignoring_ctrl_c() -> Iterator[None]:
 
 
 class Done(NamedTuple):
-    """Task that is over.
-
-    Attributes
-    ----------
-    task : object
-    result : object
-        None where it failed.
-    failure : str
-        Why it failed; empty if it did not.
-    """
+    """Task that is over."""
 
     task: Any
-    result: Any
-    failure: str = ""
+    result: Any  # None where it failed
+    failure: str = ""  # why it failed; empty if it did not
 
 
 class Engine(Protocol):
-    """What works on tasks.
+    """What works on tasks."""
 
-    Attributes
-    ----------
-    words : str
-        What it is, for messages.
-    """
-
-    words: str
+    words: str  # what it is, for messages
 
     def run(self, work: Callable[[T], Any], tasks: Iterable[T]) -> Iterator[Done]:
         """Work on all tasks; yield each once, as it is over, in any order."""

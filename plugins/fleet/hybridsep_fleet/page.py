@@ -17,8 +17,6 @@ from typing import Any
 from hybridsep.base.errors import LogError
 from hybridsep.base.files import written_text
 
-__all__ = ["Course", "courses", "write_page"]
-
 _WORSE, _SHIFT, _FRICTION, _RESIDUAL = 1.03, 0.05, 0.3, 0.5
 """From which on an axis is looked at: error relative to the best baseline; relative changes of the first mode's
 frequency, of friction and of the error since the logs before. Two fits of one axis on recordings of different motions
@@ -35,18 +33,11 @@ _BINS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 
 
 @dataclass(frozen=True)
 class Course:
-    """Logs of an axis in the order of their days.
-
-    Attributes
-    ----------
-    machine, axis : str
-    rows : list of dict
-        The latest row of each log.
-    """
+    """Logs of an axis in the order of their days."""
 
     machine: str
     axis: str
-    rows: list[dict[str, Any]]
+    rows: list[dict[str, Any]]  # the latest row of each log
 
     @property
     def done(self) -> list[dict[str, Any]]:

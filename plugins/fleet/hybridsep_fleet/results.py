@@ -17,8 +17,6 @@ from hybridsep.base.files import written_whole
 
 from .sources import LogFile
 
-__all__ = ["COLUMNS", "Results", "key_of"]
-
 _FOLDER, _ENDING = "rows", ".parquet"
 
 COLUMNS: Mapping[str, str] = {

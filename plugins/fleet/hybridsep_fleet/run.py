@@ -15,8 +15,6 @@ from .results import Results
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import find_logs
 
-__all__ = ["FleetRun", "run_fleet"]
-
 _EVERY = 5.0
 """Time after which the rows that are there are written, s: as much work as is lost if the run is killed."""
 
@@ -28,19 +26,12 @@ Progress = Callable[[str, float], object]
 
 @dataclass(frozen=True)
 class FleetRun:
-    """Outcome of a run.
+    """Outcome of a run."""
 
-    Attributes
-    ----------
-    n_logs, n_unchanged : int
-        Number of logs, and of logs that were not read, as nothing has changed.
-    rows : list of dict
-        Rows that are new.
-    """
-
+    # number of logs, and of logs that were not read, as nothing has changed
     n_logs: int
     n_unchanged: int
-    rows: list[dict[str, Any]]
+    rows: list[dict[str, Any]]  # rows that are new
 
     @property
     def failed(self) -> list[dict[str, Any]]:

@@ -14,33 +14,21 @@ from hybridsep.logs.log import Log, read_log
 from .results import key_of
 from .sources import LogFile
 
-__all__ = ["AxisTask", "FleetSettings", "Looked"]
-
 
 @dataclass(frozen=True)
 class FleetSettings:
-    """How every log is read and fitted, or replayed.
-
-    Attributes
-    ----------
-    Np : int, optional
-    unit, T_s, columns : optional
-        As of :func:`~hybridsep.logs.log.read_log`.
-    axes : tuple of str
-        Axes that are read of a log with several; all if empty.
-    machines : str
-        Folder of machine files, ``MACHINE.toml`` or ``MACHINE/machine.toml``, or with ``_AXIS``, with which logs are
-        replayed; empty to fit.
-    fmus, reports : bool
-        Whether FMUs are built and reports written.
-    """
+    """How every log is read and fitted, or replayed."""
 
     Np: int | None = None
+    # as of :func:`~hybridsep.logs.log.read_log`
     unit: str | None = None
     T_s: float | None = None
     columns: tuple[tuple[str, str], ...] = ()
-    axes: tuple[str, ...] = ()
+    axes: tuple[str, ...] = ()  # axes that are read of a log with several; all if empty
+    # folder of machine files, ``MACHINE.toml`` or ``MACHINE/machine.toml``, or with ``_AXIS``, with which logs are
+    # replayed; empty to fit
     machines: str = ""
+    # whether FMUs are built and reports written
     fmus: bool = True
     reports: bool = True
 
@@ -67,44 +55,23 @@ class FleetSettings:
 
 @dataclass(frozen=True)
 class Looked:
-    """Log that has been looked at.
-
-    Attributes
-    ----------
-    log : LogFile
-    content : str
-        Hash of its content.
-    axes : tuple of str
-        The axes that are wanted; one without a name where the format names none.
-    """
+    """Log that has been looked at."""
 
     log: LogFile
-    content: str
-    axes: tuple[str, ...]
+    content: str  # hash of its content
+    axes: tuple[str, ...]  # the axes that are wanted; one without a name where the format names none
 
 
 @dataclass(frozen=True)
 class AxisTask:
-    """Axis of a log.
-
-    Attributes
-    ----------
-    looked : Looked
-    axis : str
-    settings : FleetSettings
-    settings_key : str
-    out : str
-        Folder of the results.
-    run : str
-        When the run began, ISO.
-    """
+    """Axis of a log."""
 
     looked: Looked
     axis: str
     settings: FleetSettings
     settings_key: str
-    out: str
-    run: str
+    out: str  # folder of the results
+    run: str  # when the run began, ISO
 
     @property
     def key(self) -> str:

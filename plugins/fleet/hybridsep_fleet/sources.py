@@ -18,8 +18,6 @@ import fsspec
 from hybridsep.base.errors import LogError, first_line
 from hybridsep.logs.formats import READERS
 
-__all__ = ["LogFile", "find_logs", "local_copy"]
-
 _ENDINGS = tuple(sorted({ending for reader in READERS for ending in reader.endings}))
 """Endings of the names by which logs in a folder are told from other files; a pattern takes any."""
 
@@ -29,27 +27,13 @@ _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[
 
 @dataclass(frozen=True)
 class LogFile:
-    """Log as a store lists it, without reading it.
+    """Log as a store lists it, without reading it."""
 
-    Attributes
-    ----------
-    url : str
-        Path, or address of an object.
-    machine : str
-        The first folder below the source that is no date, or the name without its date where there is none.
-    size : int
-        Bytes.
-    stamp : str
-        Changes with the content: time of the last change, or an object's ETag.
-    recorded : str
-        Day, ISO: the date in the path, else the day of the last change; empty if the store knows none.
-    """
-
-    url: str
-    machine: str
-    size: int
-    stamp: str
-    recorded: str
+    url: str  # path, or address of an object
+    machine: str  # the first folder below the source that is no date, or the name without its date where there is none
+    size: int  # bytes
+    stamp: str  # changes with the content: time of the last change, or an object's ETag
+    recorded: str  # day, ISO: the date in the path, else the day of the last change; empty if the store knows none
 
 
 def find_logs(sources: Iterable[str]) -> list[LogFile]:

@@ -30,8 +30,6 @@ from hybridsep.predict.predictor import HybridPredictor
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 
-__all__ = ["look", "work"]
-
 _FAST = 0.1
 """Share of the largest velocity from which on an axis counts as moving, for the estimate of friction."""
 

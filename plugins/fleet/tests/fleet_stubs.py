@@ -11,8 +11,6 @@ from typing import Any
 from hybridsep.base.errors import LogError
 from hybridsep_fleet.engine import Done, attempt
 
-__all__ = ["Here", "row", "squared"]
-
 
 class Here:
     """Engine that works in this process."""

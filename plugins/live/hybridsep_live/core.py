@@ -19,8 +19,6 @@ from hybridsep.cosim.adapters import FmuController
 
 from .sample import Sample
 
-__all__ = ["LiveCore", "Row", "StepTimes"]
-
 _FIGURES = ("rms_pb", "rms_hold", "rms_h")
 
 _SHORTEST, _WIDTH, _BINS = 1e-7, math.log(1.02), 1000
@@ -58,34 +56,20 @@ class StepTimes:
 
 
 class Row(NamedTuple):
-    """Sample with what was predicted for it.
+    """Sample with what was predicted for it."""
 
-    Attributes
-    ----------
-    k : int
-        Its number.
-    t : float
-        Its time, s: the sender's, or ``k·T_s``.
-    x_d, x_meas : float
-        Commanded and measured position, m; ``x_meas`` is NaN where it is missing.
-    x_pb, x_h, x_h_std : float
-        Physics-based and hybrid prediction, made when the window began, m, and the standard deviation of
-        ``x_meas − x_h``, 0 where it is not known.
-    active : int
-        Whether ``x_h`` is the hybrid prediction.
-    step : float
-        Time of the FMU's step with this sample's inputs, s.
-    """
-
-    k: int
-    t: float
+    k: int  # its number
+    t: float  # its time, s: the sender's, or ``k·T_s``
+    # commanded and measured position, m; ``x_meas`` is NaN where it is missing
     x_d: float
     x_meas: float
+    # physics-based and hybrid prediction, made when the window began, m, and the standard deviation of ``x_meas −
+    # x_h``, 0 where it is not known
     x_pb: float
     x_h: float
     x_h_std: float
-    active: int
-    step: float
+    active: int  # whether ``x_h`` is the hybrid prediction
+    step: float  # time of the FMU's step with this sample's inputs, s
 
 
 class _Published(NamedTuple):

@@ -14,8 +14,6 @@ from hybridsep.logs.log import Log
 
 from .sample import Sample
 
-__all__ = ["FirstSeconds"]
-
 _SECONDS, _SAMPLES = 3.0, (500, 5000)
 """Time from the first motion on that is checked, and its least and most samples: the checks need a few moves."""
 

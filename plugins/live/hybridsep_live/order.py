@@ -10,8 +10,6 @@ from hybridsep.base.errors import SignalError
 
 from .sample import Sample
 
-__all__ = ["HELD_MAX", "Order"]
-
 HELD_MAX = 64
 """Most samples that wait for one that is late; a network that reorders more would be slower than any window."""
 

@@ -22,8 +22,6 @@ from .state import State, table
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-__all__ = ["Page"]
-
 _FOREIGN = "BOKEH_"
 """Begin of variables that would let a page load its scripts from elsewhere, or take sessions from other origins."""
 

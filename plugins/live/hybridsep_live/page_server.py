@@ -29,8 +29,6 @@ from tornado.web import HTTPError
 
 from .state import State
 
-__all__ = ["HOST", "PageServer", "fill"]
-
 HOST = "127.0.0.1"
 
 _FAREWELL = 0.3

@@ -15,8 +15,6 @@ from hybridsep.base.errors import ParameterError
 from .core import Row
 from .sources import check_port
 
-__all__ = ["PlotJuggler"]
-
 _ADDRESS = re.compile(r"(?P<host>[^:\s]+|\[[^\]\s]+\]):(?P<port>\d+)", re.ASCII)
 
 

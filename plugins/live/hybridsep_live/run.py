@@ -15,8 +15,6 @@ from .order import Order
 from .sample import Sample
 from .sources import LiveSource
 
-__all__ = ["LiveRun", "Sink", "run_live"]
-
 _PUBLISHED = 0.03
 """Time between two batches of rows, s: shorter than a frame of the page."""
 
@@ -39,21 +37,11 @@ class Sink(Protocol):
 
 @dataclass(frozen=True)
 class LiveRun:
-    """Run that is over.
+    """Run that is over."""
 
-    Attributes
-    ----------
-    status : mapping
-        Counts, RMS errors in m, quantiles of the step time in s, as the sinks got them last.
-    n_rows : int
-        Rows that went to the sinks.
-    interrupted : bool
-        Whether it was ended before its source was.
-    """
-
-    status: Mapping[str, Any]
-    n_rows: int
-    interrupted: bool = False
+    status: Mapping[str, Any]  # counts, RMS errors in m, quantiles of the step time in s, as the sinks got them last
+    n_rows: int  # rows that went to the sinks
+    interrupted: bool = False  # whether it was ended before its source was
 
 
 def run_live(

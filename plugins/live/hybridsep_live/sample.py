@@ -14,8 +14,6 @@ from hybridsep.logs.source import Block, Source
 from hybridsep.logs.text import is_number, split
 from hybridsep.logs.units import stated_unit
 
-__all__ = ["AHEAD", "AS_NAMED", "NUMBER", "MessageReader", "Reading", "RowReader", "Sample"]
-
 NUMBER, AHEAD = "k", "x_d_ahead"
 """Names of the sample number, and of a command that the drive gets a look-ahead later."""
 
@@ -24,43 +22,22 @@ _MESSAGE_MAX = 1_000_000
 
 
 class Sample(NamedTuple):
-    """Sample as it came.
+    """Sample as it came."""
 
-    Attributes
-    ----------
-    x_d, x_meas : float
-        Commanded and measured position, m; ``x_meas`` is NaN where it is missing.
-    k : int, optional
-        Number of the sample.
-    t : float, optional
-        Time of the sample by the sender's clock, s.
-    ahead : bool
-        Whether the drive gets ``x_d`` a look-ahead later, and not now.
-    """
-
+    # commanded and measured position, m; ``x_meas`` is NaN where it is missing
     x_d: float
     x_meas: float
-    k: int | None = None
-    t: float | None = None
-    ahead: bool = False
+    k: int | None = None  # number of the sample
+    t: float | None = None  # time of the sample by the sender's clock, s
+    ahead: bool = False  # whether the drive gets ``x_d`` a look-ahead later, and not now
 
 
 class Reading(NamedTuple):
-    """How the names of a stream are read.
+    """How the names of a stream are read."""
 
-    Attributes
-    ----------
-    columns : mapping
-        The stream's names of ``"t"``, ``"x_d"`` and ``"x"``, where they are others.
-    unit : str, optional
-        Unit of the positions; from the names, or SI, if left out.
-    si : {"m", "rad"}
-        Unit of the machine.
-    """
-
-    columns: Mapping[str, str] = {}
-    unit: str | None = None
-    si: str = "m"
+    columns: Mapping[str, str] = {}  # the stream's names of ``"t"``, ``"x_d"`` and ``"x"``, where they are others
+    unit: str | None = None  # unit of the positions; from the names, or SI, if left out
+    si: str = "m"  # {"m", "rad"}: unit of the machine
 
 
 AS_NAMED = Reading()

@@ -22,8 +22,6 @@ from hybridsep.machines.machine import Machine, check_interval
 
 from .sample import AS_NAMED, MessageReader, Reading, RowReader, Sample
 
-__all__ = ["Given", "LinesSource", "LiveSource", "RecordedSource", "UdpSource", "check_port", "open_source"]
-
 FORMS = "a log, udp:[HOST:]PORT, or - (lines of CSV or JSON on standard input)"
 
 _UDP = re.compile(r"udp:(?:(?P<host>[^:\s]+|\[[^\]\s]+\]):)?(?P<port>\d+)", re.ASCII)
@@ -49,21 +47,11 @@ Opened = TypeVar("Opened", bound="LiveSource")
 
 
 class LiveSource(ABC):
-    """Source of samples, open as long as the context.
+    """Source of samples, open as long as the context."""
 
-    Attributes
-    ----------
-    name : str
-        What it is, for messages.
-    file_unit : str
-        Unit in which positions are shown, empty for the machine's.
-    n_malformed : int
-        Messages that were dropped, as they were no samples.
-    """
-
-    name: str
-    file_unit: str = ""
-    n_malformed: int = 0
+    name: str  # what it is, for messages
+    file_unit: str = ""  # unit in which positions are shown, empty for the machine's
+    n_malformed: int = 0  # messages that were dropped, as they were no samples
 
     def _of_message(self, reader: MessageReader, message: bytes, say: Callable[[str], object]) -> list[Sample]:
         """Return the samples of a message; none of one that is dropped."""
@@ -251,18 +239,12 @@ class LinesSource(LiveSource):
 
 @dataclass(frozen=True)
 class Given:
-    """What the command line says of a source.
+    """What the command line says of a source."""
 
-    Attributes
-    ----------
-    columns : mapping
-        Names of ``"t"``, ``"x_d"`` and ``"x"``; the machine file's where they are left out, as its unit and axis.
-    unit, T_s, axis, speed : optional
-        Unit of the positions, sampling interval, s, axis of a file with several, and speed of a log, times the
-        recorded one; 0: as fast as possible.
-    """
-
+    # names of ``"t"``, ``"x_d"`` and ``"x"``; the machine file's where they are left out, as its unit and axis
     columns: dict[str, str] = field(default_factory=dict)
+    # unit of the positions, sampling interval, s, axis of a file with several, and speed of a log, times the recorded
+    # one; 0: as fast as possible
     unit: str | None = None
     T_s: float | None = None
     axis: str | None = None

@@ -13,8 +13,6 @@ from hybridsep.logs.units import DisplayUnits
 
 from .core import Row
 
-__all__ = ["COLUMNS", "DRAWN", "History", "State", "drawn", "signals", "table"]
-
 COLUMNS = ("t", "x_d", "x_meas", "x_pb", "x_h", "x_h_std", "active", "step", "k")
 """Columns of a row as the page gets it."""
 
@@ -143,31 +141,15 @@ def signals(rows: Array, shown: DisplayUnits) -> Array:
 
 @dataclass
 class State:
-    """State of a run as it is shown.
-
-    Attributes
-    ----------
-    title : str
-    shown : DisplayUnits
-        Units.
-    T_s : float
-        Sampling interval, s; 0 before the first sample.
-    delay : float
-        Time by which rows are late, s.
-    status : dict
-        As of :class:`~hybridsep_live.run.LiveRun`.
-    phase : {"waiting", "running", "ended", "failed"}
-    message : str
-        Why it has failed.
-    """
+    """State of a run as it is shown."""
 
     title: str
-    shown: DisplayUnits
-    T_s: float = 0.0
-    delay: float = 0.0
-    status: dict[str, Any] = field(default_factory=dict)
-    phase: str = "waiting"
-    message: str = ""
+    shown: DisplayUnits  # units
+    T_s: float = 0.0  # sampling interval, s; 0 before the first sample
+    delay: float = 0.0  # time by which rows are late, s
+    status: dict[str, Any] = field(default_factory=dict)  # as of :class:`~hybridsep_live.run.LiveRun`
+    phase: str = "waiting"  # {"waiting", "running", "ended", "failed"}
+    message: str = ""  # why it has failed
     _history: History | None = None
 
     @property

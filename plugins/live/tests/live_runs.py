@@ -9,8 +9,6 @@ from hybridsep_live.core import Row
 from hybridsep_live.sample import Sample
 from hybridsep_live.sources import LiveSource
 
-__all__ = ["Kept", "Listed"]
-
 
 class Kept:
     """Sink that keeps all it gets."""

@@ -11,8 +11,6 @@ from hybridsep.base.files import written_whole
 
 from .frequency_response import IdentifiedResponse
 
-__all__ = ["response_figure"]
-
 _MEASURED, _FITTED = {"color": "#7f7f7f", "linewidth": 4.0, "alpha": 0.6}, {"color": "#d95f02", "linewidth": 1.2}
 
 

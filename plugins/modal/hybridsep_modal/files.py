@@ -14,8 +14,6 @@ from hybridsep.base.errors import LogError, brief, listed
 from hybridsep.base.signals import Array
 from hybridsep.logs.formats import open_source
 
-__all__ = ["ResponseFile", "has_response", "read_response"]
-
 ROLES: Mapping[str, tuple[str, ...]] = {
     "frequency": ("frequency", "freq", "f", "hz", "omega", "w"),
     "real": ("real", "re"),
@@ -30,19 +28,11 @@ _WORD = re.compile(r"[a-z]+")
 
 
 class ResponseFile(NamedTuple):
-    """Frequency response of a file.
+    """Frequency response of a file."""
 
-    Attributes
-    ----------
-    frequency : (n,) array, Hz
-    response : (n,) array of complex
-    std : (n,) array or None
-        Standard deviation of each line's complex error.
-    """
-
-    frequency: Array
-    response: NDArray[np.complex128]
-    std: Array | None
+    frequency: Array  # (n,), Hz
+    response: NDArray[np.complex128]  # (n,)
+    std: Array | None  # (n,): standard deviation of each line's complex error
 
 
 def has_response(path: Path) -> bool:

@@ -18,8 +18,6 @@ from hybridsep.model.physics import ModalModel, Mode
 
 from .vector_fitting import starting_poles, vector_fit
 
-__all__ = ["MODES_MAX", "Complex", "Lines", "ModalFit", "fits_by_size", "polish", "quadratics_of"]
-
 Complex = NDArray[np.complex128]
 
 MODES_MAX = 10
@@ -52,24 +50,14 @@ _FAST = 10.0
 
 @dataclass(frozen=True)
 class ModalFit:
-    """Modes fitted to a frequency response.
+    """Modes fitted to a frequency response."""
 
-    Attributes
-    ----------
-    parameters : (n_modes, 4) array
-        ``log ω, log ζ, g, h`` of each mode, ω in rad/s, by ascending ω.
-    covariance : (4 n_modes, 4 n_modes) array
-        Inverse of the Fisher information for errors of unit variance of each weighted line's real and imaginary part.
-    residual : (n,) array of complex
-        Weighted error of each line.
-    fitted : (n,) array of complex
-        Response of the modes.
-    """
-
-    parameters: Array
+    parameters: Array  # (n_modes, 4): ``log ω, log ζ, g, h`` of each mode, ω in rad/s, by ascending ω
+    # (4 n_modes, 4 n_modes): inverse of the Fisher information for errors of unit variance of each weighted line's real
+    # and imaginary part
     covariance: Array
-    residual: Complex
-    fitted: Complex
+    residual: Complex  # (n,): weighted error of each line
+    fitted: Complex  # (n,): response of the modes
 
     @property
     def n_free(self) -> int:
@@ -224,27 +212,14 @@ def _stacked(values: Complex) -> Array:
 
 @dataclass(frozen=True)
 class Lines:
-    """Frequency response to fit to.
+    """Frequency response to fit to."""
 
-    Attributes
-    ----------
-    omega : (n,) array, rad/s
-    response : (n,) array of complex
-        Without the dead time.
-    sigma : (n,) array
-        Standard deviations up to a factor.
-    relative : bool
-        Whether they are proportional to the magnitude; the fitted magnitude is then the better weight.
-    unit_gain : bool
-    sampling : (float, str) or None
-        Sampling interval and hold, where the response was measured on sampled signals.
-    """
-
-    omega: Array
-    response: Complex
-    sigma: Array
-    relative: bool
+    omega: Array  # (n,), rad/s
+    response: Complex  # (n,): without the dead time
+    sigma: Array  # (n,): standard deviations up to a factor
+    relative: bool  # whether they are proportional to the magnitude; the fitted magnitude is then the better weight
     unit_gain: bool
+    # sampling interval and hold, where the response was measured on sampled signals
     sampling: tuple[float, str] | None
 
     def fit(self, start: Complex) -> ModalFit:

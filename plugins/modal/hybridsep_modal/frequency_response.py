@@ -25,8 +25,6 @@ from hybridsep.model.physics import ModalModel
 
 from .fit import MODES_MAX, Complex, Lines, ModalFit, fits_by_size
 
-__all__ = ["IdentifiedResponse", "identify_frequency_response"]
-
 LINES_MIN = 8
 """Lines below which nothing is fitted."""
 
@@ -45,43 +43,23 @@ all but cancel, are taken beside others: modes that fit friction in a swept sine
 
 @dataclass(frozen=True)
 class IdentifiedResponse:
-    """Model identified from a frequency response.
+    """Model identified from a frequency response."""
 
-    Attributes
-    ----------
-    model : ModalModel
-        ``G_pb`` of eq. (15), with the dead time that was given.
-    input_hold : {"zoh", "foh"}
-        Hold for the machine file.
-    T_s : float
-        Sampling interval for the machine file, s.
-    parameters : tuple of Estimate
-        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode and the static gain, with Cramér–Rao standard deviations.
-    frequency : (n,) array, Hz
-        Lines that were used.
-    response, fitted : (n,) array of complex
-        Measured response, and the model's.
-    noise : float
-        Standard deviation of a line's error in multiples of its given one, or of its magnitude if none was given.
-    criteria : tuple of (int, float, float)
-        Number of modes, RMS of the relative error, Bayesian information criterion.
-    findings : tuple of str
-        What a user should know, in words.
-    phase_measured : bool
-        Whether the response has the phase that was measured; else it is the magnitude alone.
-    """
-
-    model: ModalModel
-    input_hold: str
-    T_s: float
+    model: ModalModel  # ``G_pb`` of eq. (15), with the dead time that was given
+    input_hold: str  # {"zoh", "foh"}: hold for the machine file
+    T_s: float  # sampling interval for the machine file, s
+    # ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode and the static gain, with Cramér–Rao standard deviations
     parameters: tuple[Estimate, ...]
-    frequency: Array
+    frequency: Array  # (n,), Hz: lines that were used
+    # (n,): measured response, and the model's
     response: Complex
     fitted: Complex
+    # standard deviation of a line's error in multiples of its given one, or of its magnitude if none was given
     noise: float
+    # each (int, float, float): number of modes, RMS of the relative error, Bayesian information criterion
     criteria: tuple[tuple[int, float, float], ...]
-    findings: tuple[str, ...]
-    phase_measured: bool = True
+    findings: tuple[str, ...]  # what a user should know, in words
+    phase_measured: bool = True  # whether the response has the phase that was measured; else it is the magnitude alone
 
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
         """Return the machine with this model, as :meth:`IdentifiedModel.machine` does."""

@@ -22,8 +22,6 @@ from hybridsep.model.physics import ModalModel, Mode
 
 from .frequency_response import IdentifiedResponse
 
-__all__ = ["Acceleration", "identify_resonance", "is_klipper", "read_klipper"]
-
 HEADER = "time,accel_x,accel_y,accel_z"
 
 BAND = (5.0, 135.0)
@@ -37,20 +35,11 @@ WINDOW = 0.5
 
 
 class Acceleration(NamedTuple):
-    """Recorded acceleration.
+    """Recorded acceleration."""
 
-    Attributes
-    ----------
-    t : (n,) array, s
-    axes : mapping of (n,) arrays, m/s²
-        ``x``, ``y``, ``z``.
-    T_s : float
-        Mean sampling interval, s.
-    """
-
-    t: Array
-    axes: dict[str, Array]
-    T_s: float
+    t: Array  # (n,), s
+    axes: dict[str, Array]  # each (n,), m/s²: ``x``, ``y``, ``z``
+    T_s: float  # mean sampling interval, s
 
 
 def is_klipper(path: str | Path) -> bool:

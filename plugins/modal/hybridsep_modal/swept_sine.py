@@ -17,8 +17,6 @@ from hybridsep.base.errors import IdentificationError
 from hybridsep.base.settings import check
 from hybridsep.base.signals import Array, as_samples
 
-__all__ = ["Response", "h1"]
-
 COHERENCE_MIN = 0.8
 """Squared coherence below which a line is left out: it would tell little, and its deviation is not well known."""
 
@@ -37,22 +35,12 @@ _CORRECTION = SMOOTHED / (SMOOTHED - 1)
 
 
 class Response(NamedTuple):
-    """Frequency response with its uncertainty.
+    """Frequency response with its uncertainty."""
 
-    Attributes
-    ----------
-    frequency : (n,) array, Hz
-    response : (n,) array of complex, m/m
-    std : (n,) array
-        Standard deviation of each line's complex error.
-    coherence : (n,) array
-        Squared coherence.
-    """
-
-    frequency: Array
-    response: NDArray[np.complex128]
-    std: Array
-    coherence: Array
+    frequency: Array  # (n,), Hz
+    response: NDArray[np.complex128]  # (n,), m/m
+    std: Array  # (n,): standard deviation of each line's complex error
+    coherence: Array  # (n,): squared coherence
 
 
 def h1(x_d: ArrayLike, x: ArrayLike, T_s: float, f_min: float = 0.0, f_max: float | None = None) -> Response:

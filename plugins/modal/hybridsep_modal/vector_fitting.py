@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from hybridsep.base.signals import Array
 
-__all__ = ["starting_poles", "vector_fit"]
-
 Complex = NDArray[np.complex128]
 
 ITERATIONS_MAX = 25

@@ -12,8 +12,6 @@ from hybridsep.base.signals import Array
 from hybridsep.plants.trajectory import along_path, archimedean_spiral, rest_to_rest
 from random_drives.drive import Draws
 
-__all__ = ["KINDS", "T_S", "random_command"]
-
 T_S = 1e-3
 """Sampling interval, s."""
 

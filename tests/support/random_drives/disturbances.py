@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from random_drives.drive import Draws
 
-__all__ = ["Disturbances", "random_disturbances"]
-
 PRESLIDING_SLOPE = 2.0
 """Largest stiffness of the presliding friction relative to the drive's: rolling guides are below 1."""
 
@@ -20,54 +18,29 @@ COGGING_SLOPE = 0.05
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Nonlinearities as equivalent offsets of the command, m; zero where there is none.
+    """Nonlinearities as equivalent offsets of the command, m; zero where there is none."""
 
-    Attributes
-    ----------
-    at_command : bool
-        Whether they offset the command, and so pass through its zeros, or act as a force on the modes.
-    coulomb : float, m
-        Sliding friction.
-    static : float
-        Friction at low velocity (Stribeck), relative to the sliding friction.
-    v_stribeck : float, m/s
-    presliding : float, m
-        Distance over which friction builds up (Dahl).
-    bristle : float
-        Deflection at the start, relative to its limit.
-    cubic, range, centre : float, m
-        Offset at ``range`` from ``centre``; positions relative to the start.
-    cogging, pitch : float, m
-        Amplitude and period.
-    phase : float
-        Of the cogging at the start, periods.
-    drift : float, m
-        Final drift of the position.
-    time_constant : float, s
-        Of the drift.
-    play, command_play : float, m
-        Backlash behind the drive and before it.
-    play_start : float
-        Place within the backlash at the start, −1 to 1.
-    """
-
+    # whether they offset the command, and so pass through its zeros, or act as a force on the modes
     at_command: bool = False
-    coulomb: float = 0.0
-    static: float = 1.0
-    v_stribeck: float = 1e-3
-    presliding: float = 1e-5
-    bristle: float = 0.0
+    coulomb: float = 0.0  # m: sliding friction
+    static: float = 1.0  # friction at low velocity (Stribeck), relative to the sliding friction
+    v_stribeck: float = 1e-3  # m/s
+    presliding: float = 1e-5  # m: distance over which friction builds up (Dahl)
+    bristle: float = 0.0  # deflection at the start, relative to its limit
+    # m: offset at ``range`` from ``centre``; positions relative to the start
     cubic: float = 0.0
     range: float = 1e-3
     centre: float = 0.0
+    # m: amplitude and period
     cogging: float = 0.0
     pitch: float = 1e-2
-    phase: float = 0.0
-    drift: float = 0.0
-    time_constant: float = 1.0
+    phase: float = 0.0  # of the cogging at the start, periods
+    drift: float = 0.0  # m: final drift of the position
+    time_constant: float = 1.0  # s: of the drift
+    # m: backlash behind the drive and before it
     play: float = 0.0
     command_play: float = 0.0
-    play_start: float = 0.0
+    play_start: float = 0.0  # place within the backlash at the start, −1 to 1
 
     @property
     def kinds(self) -> tuple[str, ...]:

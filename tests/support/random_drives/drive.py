@@ -13,8 +13,6 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["Draws", "Drive"]
-
 Choice = TypeVar("Choice")
 
 
@@ -55,28 +53,14 @@ class Draws:
 
 @dataclass(frozen=True)
 class Drive:
-    """A drive, what it was commanded and what was measured.
-
-    Attributes
-    ----------
-    index : int
-    kind : str
-        Of the command.
-    x_d, x, x_meas : (n,) array, m
-        Commanded, true and measured positions, at rest at first; ``x(k)`` before ``x_d(k)`` acts.
-    model : ModalModel
-        ``G_pb``, which is wrong.
-    settings : PredictorSettings
-        Sampling interval and window of the predictor.
-    text : str
-        Description.
-    """
+    """A drive, what it was commanded and what was measured."""
 
     index: int
-    kind: str
+    kind: str  # of the command
+    # (n,), m: commanded, true and measured positions, at rest at first; ``x(k)`` before ``x_d(k)`` acts
     x_d: Array
     x: Array
     x_meas: Array
-    model: ModalModel
-    settings: PredictorSettings
-    text: str
+    model: ModalModel  # ``G_pb``, which is wrong
+    settings: PredictorSettings  # sampling interval and window of the predictor
+    text: str  # description

@@ -8,8 +8,6 @@ import numpy as np
 
 from hybridsep.base.signals import Array
 
-__all__ = ["FAULTS", "JITTER", "OFFSET_STEP", "Fault"]
-
 Fault = Callable[[Array, float, np.random.Generator], tuple[Array, int]]
 """From measured positions, (n,), m, the sampling interval, s, and random numbers, to faulty positions and the index of
 the last faulty sample; for an offset step the index of the first shifted sample, as the shifted position is true from

@@ -15,19 +15,6 @@ from random_drives.disturbances import Disturbances, random_disturbances
 from random_drives.drive import Draws, Drive
 from random_drives.simulation import simulate
 
-__all__ = [
-    "CHUNK",
-    "SEED",
-    "ModalDrive",
-    "RandomDrive",
-    "drives_at",
-    "nominal_drive",
-    "random_drive",
-    "random_drives",
-    "random_modes",
-    "true_positions",
-]
-
 MODEL_ERROR = 0.2
 """Largest relative error of each parameter of the physics model."""
 
@@ -50,17 +37,10 @@ class ModalMode:
 
 @dataclass(frozen=True)
 class ModalDrive:
-    """Linear part of a drive: modes, the first with most of the static gain.
-
-    Attributes
-    ----------
-    modes : tuple of ModalMode
-    text : str
-        How the model errs, of a physics model.
-    """
+    """Linear part of a drive: modes, the first with most of the static gain."""
 
     modes: tuple[ModalMode, ...]
-    text: str = ""
+    text: str = ""  # how the model errs, of a physics model
 
     @property
     def model(self) -> ModalModel:
@@ -135,19 +115,11 @@ CHUNK = 125
 
 @dataclass(frozen=True)
 class RandomDrive(Drive):
-    """A drive of modes.
+    """A drive of modes."""
 
-    Attributes
-    ----------
-    true_model : ModalModel
-        The drive's linear part; ``model`` is up to 20 % wrong.
-    disturbances : Disturbances
-    noise_std, quantum : float, m
-        Of the encoder: white noise, and resolution (0: none).
-    """
-
-    true_model: ModalModel
+    true_model: ModalModel  # the drive's linear part; ``model`` is up to 20 % wrong
     disturbances: Disturbances
+    # m: of the encoder: white noise, and resolution (0: none)
     noise_std: float
     quantum: float
 

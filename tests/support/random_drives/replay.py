@@ -19,18 +19,6 @@ from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from random_drives.drive import Drive
 
-__all__ = [
-    "DIVERGED",
-    "PREDICTORS",
-    "Replay",
-    "Replayed",
-    "core_outputs",
-    "core_replay",
-    "library_replay",
-    "physics_alone",
-    "replay",
-]
-
 DIVERGED = 1.0
 """Largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes."""
 
@@ -53,29 +41,19 @@ def library_replay(predictor: str, model: ModalModel, settings: PredictorSetting
 
 @dataclass(frozen=True)
 class Replay:
-    """Result of one drive.
-
-    Attributes
-    ----------
-    index : int
-    kind, text : str
-        Kind of the trajectory; description of the drive.
-    rms_pb, rms_hold, rms_h : float
-        RMS errors against the measured position over the whole run, m; ``rms_h`` is infinite where the replay ended
-        with an error.
-    largest : float
-        Largest error of ``x_h``, m.
-    rms_arx : tuple of float
-        RMS errors of the refitted ARX peers, m, if they were asked for; infinite where one diverged.
-    """
+    """Result of one drive."""
 
     index: int
+    # kind of the trajectory; description of the drive
     kind: str
     text: str
+    # RMS errors against the measured position over the whole run, m; ``rms_h`` is infinite where the replay ended with
+    # an error
     rms_pb: float
     rms_hold: float
     rms_h: float
-    largest: float
+    largest: float  # largest error of ``x_h``, m
+    # RMS errors of the refitted ARX peers, m, if they were asked for; infinite where one diverged
     rms_arx: tuple[float, ...] = ()
 
     @property

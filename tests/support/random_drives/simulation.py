@@ -17,8 +17,6 @@ from hybridsep.model.physics import ModalModel
 from random_drives.commands import T_S
 from random_drives.disturbances import Disturbances
 
-__all__ = ["SUB_STEPS", "simulate"]
-
 SUB_STEPS = 8
 """Internal steps in a sampling interval."""
 

@@ -10,18 +10,6 @@ from random_drives.drive import Draws
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = [
-    "LEAST_DAMPING",
-    "RATES",
-    "Axis",
-    "Encoder",
-    "Friction",
-    "LinearLoop",
-    "Machine",
-    "random_axis",
-    "random_machine",
-]
-
 
 @dataclass(frozen=True)
 class LinearLoop:
@@ -29,43 +17,22 @@ class LinearLoop:
 
     ``F_demand = K_p (K_v (x_d − x) + ff ẋ_d − v_motor) + I``, ``İ = F_demand's bracket · K_p / T_i``,
     ``τ Ḟ = F_demand − F``.
-
-    Attributes
-    ----------
-    load : float
-        Share of the mass beyond the belt or screw.
-    added : float
-        Mass that the load has more than that, relative to the whole drive.
-    stiffness, damping : float, 1/s² and 1/s
-        Of the belt or screw.
-    viscous : float, 1/s
-        Friction of each body, linear in its velocity.
-    k_v, k_p : float, 1/s
-        Gains of the position and of the velocity loop.
-    t_i : float, s
-        Integral time of the velocity loop; 0: none.
-    feedforward : float
-        Of the velocity, 0 … 1.
-    tau : float, s
-        Lag of the motor's force.
-    at_load : bool
-        Whether the encoder is at the load.
-    closed_at_load : bool
-        Whether the position loop is closed there.
     """
 
-    load: float
+    load: float  # share of the mass beyond the belt or screw
+    # 1/s² and 1/s: of the belt or screw
     stiffness: float
     damping: float
-    viscous: float
+    viscous: float  # 1/s: friction of each body, linear in its velocity
+    # 1/s: gains of the position and of the velocity loop
     k_v: float
     k_p: float
-    t_i: float
-    feedforward: float
-    tau: float
-    at_load: bool
-    closed_at_load: bool
-    added: float = 0.0
+    t_i: float  # s: integral time of the velocity loop; 0: none
+    feedforward: float  # of the velocity, 0 … 1
+    tau: float  # s: lag of the motor's force
+    at_load: bool  # whether the encoder is at the load
+    closed_at_load: bool  # whether the position loop is closed there
+    added: float = 0.0  # mass that the load has more than that, relative to the whole drive
 
     @property
     def demand(self) -> Array:
@@ -131,26 +98,13 @@ class LinearLoop:
 
 @dataclass(frozen=True)
 class Friction:
-    """LuGre friction of a body.
+    """LuGre friction of a body."""
 
-    Attributes
-    ----------
-    coulomb : float, m/s²
-        Sliding friction, per kg of the drive; 0: none.
-    stribeck : float
-        Static friction relative to it.
-    v_stribeck : float, m/s
-    presliding : float, m
-        Deflection of the bristles when sliding.
-    micro_damping : float, 1/s
-        Damping of the bristles at rest.
-    """
-
-    coulomb: float = 0.0
-    stribeck: float = 1.0
-    v_stribeck: float = 1e-3
-    presliding: float = 1e-5
-    micro_damping: float = 0.0
+    coulomb: float = 0.0  # m/s²: sliding friction, per kg of the drive; 0: none
+    stribeck: float = 1.0  # static friction relative to it
+    v_stribeck: float = 1e-3  # m/s
+    presliding: float = 1e-5  # m: deflection of the bristles when sliding
+    micro_damping: float = 0.0  # 1/s: damping of the bristles at rest
 
     @property
     def bristle(self) -> float:
@@ -160,48 +114,27 @@ class Friction:
 
 @dataclass(frozen=True)
 class Axis:
-    """A drive with its nonlinearities.
-
-    Attributes
-    ----------
-    loop : LinearLoop
-    changed : LinearLoop
-        From sample ``change_at`` on.
-    change_at : int
-    motor, bearing : Friction
-        Of the motor and of the load.
-    play : float, m
-        Backlash of belt or screw.
-    cogging, cogging_period, cogging_phase : float; m/s², m, rad
-        Ripple of the motor's force.
-    lead, lead_period, lead_phase : float; m, m, rad
-        Amplitude, period and phase of the screw's or pulley's error at the encoder.
-    force_max : float, m/s²
-        Largest motor force.
-    dead_time : int
-        Samples until a command arrives.
-    interpolates : bool
-        Whether the drive runs in a straight line from one command to the next, a sample late.
-    T_s : float, s
-        Sampling interval.
-    """
+    """A drive with its nonlinearities."""
 
     loop: LinearLoop
-    changed: LinearLoop
+    changed: LinearLoop  # from sample ``change_at`` on
     change_at: int
-    T_s: float
+    T_s: float  # s: sampling interval
+    # of the motor and of the load
     motor: Friction = Friction()
     bearing: Friction = Friction()
-    play: float = 0.0
+    play: float = 0.0  # m: backlash of belt or screw
+    # m/s², m, rad: ripple of the motor's force
     cogging: float = 0.0
     cogging_period: float = 1.0
     cogging_phase: float = 0.0
+    # m, m, rad: amplitude, period and phase of the screw's or pulley's error at the encoder
     lead: float = 0.0
     lead_period: float = 1.0
     lead_phase: float = 0.0
-    force_max: float = 1e9
-    dead_time: int = 0
-    interpolates: bool = False
+    force_max: float = 1e9  # m/s²: largest motor force
+    dead_time: int = 0  # samples until a command arrives
+    interpolates: bool = False  # whether the drive runs in a straight line from one command to the next, a sample late
 
     def linear(self) -> Axis:
         """Return the drive without its nonlinearities."""

@@ -15,8 +15,6 @@ from scipy.signal import lfilter
 
 from hybridsep.base.signals import Array
 
-__all__ = ["KINDS", "Dynamics", "random_command"]
-
 
 @dataclass(frozen=True)
 class Dynamics:

@@ -16,8 +16,6 @@ from two_mass.commands import random_command
 from two_mass.nominal import nominal_model
 from two_mass.plant import TwoMassDrive
 
-__all__ = ["CHUNK", "SEED", "Recipe", "drives_at", "random_drives", "true_positions"]
-
 SEED = 2
 """Seed of the 250 drives that figures are given for."""
 
@@ -33,33 +31,18 @@ LOOK_AHEAD, NP_RANGE = (0.02, 0.1), (10, 400)
 
 @dataclass(frozen=True)
 class Recipe:
-    """Everything random about a drive.
-
-    Attributes
-    ----------
-    index : int
-    kind : str
-        Of the command.
-    x_d, noise : (n,) array, m
-        Commanded positions, and the noise of the measured ones.
-    axis : Axis
-    encoder : Encoder
-    model : ModalModel
-        ``G_pb``.
-    settings : PredictorSettings
-    text : str
-        How the model errs.
-    """
+    """Everything random about a drive."""
 
     index: int
-    kind: str
+    kind: str  # of the command
+    # (n,), m: commanded positions, and the noise of the measured ones
     x_d: Array
     noise: Array
     axis: Axis
     encoder: Encoder
-    model: ModalModel
+    model: ModalModel  # ``G_pb``
     settings: PredictorSettings
-    text: str
+    text: str  # how the model errs
 
     @classmethod
     def draw(cls, index: int, seed: int) -> Recipe:

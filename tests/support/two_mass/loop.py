@@ -19,8 +19,6 @@ from two_mass.axis import Axis, LinearLoop
 from two_mass.generator import Recipe
 from two_mass.plant import TwoMassDrive
 
-__all__ = ["CONDITIONS", "SOUND", "Condition", "Loop", "Sensor", "closed_loop", "settings_of"]
-
 DURATION = 2.5
 """Longest run, s."""
 
@@ -128,21 +126,13 @@ CHANGE = 0.4
 
 @dataclass(frozen=True)
 class Condition:
-    """What is not as it should be.
+    """What is not as it should be."""
 
-    Attributes
-    ----------
-    axis : callable
-        Returns the drive under it, from the sound one and the trajectory, (n,), m.
-    fault : callable, optional
-        Called as ``fault(k, first, end, x_meas, held)`` while the measurement fails; returns what is measured.
-    duration : float, s
-        Of the fault.
-    """
-
+    # returns the drive under it, from the sound one and the trajectory, (n,), m
     axis: Callable[[Axis, Array], Axis] = lambda axis, _: axis
+    # called as ``fault(k, first, end, x_meas, held)`` while the measurement fails; returns what is measured
     fault: Callable[[float], float] | None = None
-    duration: float = 0.0
+    duration: float = 0.0  # s: of the fault
 
     def sensor(self, x_d: Array, T_s: float) -> Sensor:
         """Return the sensor of a run over a trajectory, (n,), m; it fails while the axis moves."""

@@ -11,8 +11,6 @@ from random_drives.drive import Draws
 from hybridsep.model.physics import ModalModel, Mode
 from two_mass.axis import LinearLoop
 
-__all__ = ["MODEL_ERROR", "nominal_model"]
-
 MODEL_ERROR = 0.4
 """Largest relative error of a parameter."""
 

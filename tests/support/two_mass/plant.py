@@ -14,8 +14,6 @@ from scipy.linalg import expm
 from hybridsep.base.signals import Array
 from two_mass.axis import Axis, LinearLoop
 
-__all__ = ["INTERNAL_STEP", "TwoMassDrive"]
-
 INTERNAL_STEP = 4e-5
 """Longest internal step, s; the bristles of the stiffest friction drawn vibrate at 25 rad in a millisecond."""
 
