@@ -21,6 +21,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from hybridsep.cosim.compensated import COMPENSATED
+
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures"
 RECORD = FOLDER / "pictures.json"
@@ -70,8 +72,8 @@ def demonstration(folder: Path, chromium: str) -> Made:
 
 
 def demonstrated(summary: dict[str, Any]) -> Figures:
-    """Return the tracking errors of the staircase, RMS and largest, µm, from the demonstration's ``summary.json``."""
-    cases = summary["staircase"]["compensation"]
+    """Return the RMS and largest tracking errors, µm, on the staircase's picture, from ``summary.json``."""
+    cases = {key: case for key, case in summary["staircase"]["compensation"].items() if key in COMPENSATED}
     sizes = {"": "tracking_rms_um", ", largest": "tracking_max_um"}
     return {key + of: rounded(case[size]) for key, case in cases.items() for of, size in sizes.items()}
 

@@ -144,7 +144,7 @@ def _two_axes(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Co-simulate the compensators of X and Y along a path: off, physics, hybrid cold and warm."""
+    """Co-simulate the compensators of X and Y along a path: off, physics, hybrid cold and warm, and a rival."""
     from ..cosim.compensated import COMPENSATED, compensate
     from ..cosim.contour import contours_of
     from ..cosim.run import save_columns
@@ -175,7 +175,7 @@ def _two_axes(
     with tempfile.TemporaryDirectory() as temporary, progress_bar(as_json) as advance:
 
         def say(what: str) -> None:
-            advance(what, next(steps) / (2 + 2 * len(COMPENSATED)))
+            advance(what, next(steps) / (2 * (2 + len(COMPENSATED))))
 
         for name, axis, command in zip("XY", machines, meant.axes, strict=True):
             folder = Path(temporary, name)

@@ -1,4 +1,4 @@
-"""Runs of a machine's compensator against its plant, FMU against FMU: none, physics, hybrid cold and warm."""
+"""Runs of a machine's compensator against its plant, FMU against FMU: none, physics, hybrid cold and warm, a rival."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..base.signals import Array
 from ..fmi.archive import build_here, default_flavour
 from ..machines.machine import Machine
 from ..plants.plant import Encoder
+from .inverse import FirInverse, PlayedCommand
 from .loop import cosimulate
 from .run import Run
 
@@ -21,6 +22,9 @@ _TRAINING_SEED = 1000
 
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
+
+RIVAL = "fir_inverse"
+"""Key of the rival of :class:`~hybridsep.cosim.inverse.FirInverse`, fitted to the first run of ``off``."""
 
 Runs = dict[str, Run]
 
@@ -39,7 +43,7 @@ def compensate(
     Returns
     -------
     runs : dict
-        The first seed's, by the keys of :data:`COMPENSATED`.
+        The first seed's, by the keys of :data:`COMPENSATED` and :data:`RIVAL`.
     summary : dict
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
@@ -53,15 +57,23 @@ def compensate(
     warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
-    for key, choice in COMPENSATED.items():
+
+    def run(key: str, controller: Path | PlayedCommand, values: dict[str, Any] | None = None) -> None:
         advance(f"{label}, {key.replace('_', ' ')}")
-        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
-        fmu = warm if key == "hybrid_warm" else cold
         of_seeds = [
-            cosimulate(fmu, plant, command, controller_values=values, plant_values={"seed": seed}) for seed in seeds
+            cosimulate(controller, plant, command, controller_values=values, plant_values={"seed": seed})
+            for seed in seeds
         ]
         runs[key] = of_seeds[0]
         summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
+
+    for key, choice in COMPENSATED.items():
+        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
+        run(key, warm if key == "hybrid_warm" else cold, values)
+    off = runs["off"]
+    rival = FirInverse.fitted([(off.x_d, off.x_meas)], machine.compensator_predictor.Np)
+    if rival is not None:
+        run(RIVAL, PlayedCommand(rival.command(command), machine.T_s))
     return runs, summary
 
 

@@ -142,13 +142,13 @@ def demo(
     dict
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
-        ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
+        ``off``, ``physics``, ``hybrid_cold``, ``hybrid_warm`` and ``fir_inverse`` what
         :func:`hybridsep.cosim.compensated.compensate` found, for the spiral's axes with the contour error of both
         together, :meth:`hybridsep.cosim.contour.Contour.figures`.
     """
     out = Path(out)
     seeds = SEEDS if full else 1
-    total, done = seeds + 6 * full + (len(MACHINES) if full else 1) * (1 + len(COMPENSATED)), 0
+    total, done = seeds + 6 * full + (len(MACHINES) if full else 1) * (2 + len(COMPENSATED)), 0
 
     def advance(message: str) -> None:
         nonlocal done

@@ -137,10 +137,10 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
 def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:
     """Draw command, tracking error and change of the command of runs over the same command to a PNG.
 
-    They are by the keys of :data:`CASES`. Of one run alone, the spans are shaded that a lesser model planned. Positions
-    are in the units ``shown``, mm and µm if left out.
+    They are by the keys of :data:`CASES`; others are left out. Of one run alone, the spans are shaded that a lesser
+    model planned. Positions are in the units ``shown``, mm and µm if left out.
     """
-    shown = shown or shown_in("m")
+    shown, runs = shown or shown_in("m"), {key: run for key, run in runs.items() if key in CASES}
     (factor, position), (scale, unit) = shown.position, shown.small
     compensated = {key: run for key, run in runs.items() if key != "off"}
     enlarged = 0 < len(compensated) < len(runs)
@@ -200,8 +200,9 @@ def contour_figure(contours: Mapping[str, Contour], title: str, path: str | Path
     """Draw runs along a planar path to a PNG: the path with the error magnified, and the error over time.
 
     Where the path has full circles it is their radial error over the angle, as a ballbar draws it. The motions along
-    one path, four at most, are by the keys of :data:`CASES`.
+    one path, four at most, are by the keys of :data:`CASES`; others are left out.
     """
+    contours = {key: contour for key, contour in contours.items() if key in CASES}
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     figure.suptitle(title)
     grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 1.1))

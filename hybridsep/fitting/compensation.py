@@ -14,6 +14,8 @@ from ..base.metrics import ErrorSize, peak_derivatives
 from ..base.settings import DRIVE_LIMIT_ENTRIES, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
+from ..cosim.inverse import FirInverse
+from ..identify.output_error import in_time
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from .replay import Recording, beginnings
@@ -152,6 +154,7 @@ class Tracking:
     none: ErrorSize
     physics: ErrorSize
     hybrid: ErrorSize
+    inverse: ErrorSize  # estimate with the rival, fitted to the training samples; NaN without motion there
     # model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`
     limits: Mapping[str, Mapping[str, float]]
     costs: LimitCosts | None  # with the hybrid, over the first samples of each log; None where no limit binds it
@@ -172,6 +175,8 @@ class Tracking:
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
             f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
             "(compensate = physics).",
+            f"A finite impulse response with friction's sign, fitted to the first half and inverted, would leave about "
+            f"{_words(self.inverse, shown)}, without limits and without learning on.{self._rival_words()}",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
         if self.change_max is not None and self.change_max < self.largest:
@@ -194,6 +199,15 @@ class Tracking:
             "change of the command fades until reset.",
             _HOW,
         ]
+
+    def _rival_words(self) -> str:
+        """Return in what the rival is better than the hybrid, as a sentence; empty where it is not."""
+        sizes = (
+            ("RMS", self.inverse.rms, self.hybrid.rms),
+            ("largest error", self.inverse.largest, self.hybrid.largest),
+        )
+        better = " and ".join(name for name, rival, hybrid in sizes if rival < hybrid)
+        return f" That is better than the hybrid in {better}: such a filter of the command may do." if better else ""
 
 
 def _words(error: ErrorSize, shown: DisplayUnits) -> str:
@@ -235,9 +249,11 @@ def expected_tracking(
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
-    limits = allowed.change_max, allowed.following_error_max
+    inverse, limits = _inverted(machine, recordings), (allowed.change_max, allowed.following_error_max)
     v_max = math.inf if allowed.limits is None else allowed.limits.velocity
-    return Tracking(none, physics, hybrid, bound, costs, *limits, len(without) * machine.T_s, largest, fastest, v_max)
+    return Tracking(
+        none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s, largest, fastest, v_max
+    )
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
@@ -250,6 +266,20 @@ def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Se
         return None
     parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(found, firsts, strict=True)]
     return Expected(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _inverted(machine: Machine, recordings: Sequence[Recording]) -> ErrorSize:
+    """Return the errors to be expected of the rival over the test samples, on the same drive."""
+    settings = machine.compensator_predictor
+    late, Np = settings.n_late, settings.Np
+    rival = FirInverse.fitted([in_time(*one.training, late) for one in recordings], Np)
+    discrete, errors = machine.model.discretise(settings.T_s, settings.input_hold), []
+    for one in recordings if rival else ():
+        x_d, x = in_time(one.x_d, one.x, late)
+        if len(x) > 0 and rival is not None:
+            change = rival.command(x_d) - x_d
+            errors.append((x_d - x - discrete.forced_response(discrete.rest(), change)[0])[one.first_judged(Np) :])
+    return ErrorSize.of(np.concatenate(errors) if errors else np.empty(0))
 
 
 def _size(found: Expected | None) -> ErrorSize:

@@ -19,7 +19,7 @@ from rich.console import Console
 from benchmarks.pictures import RECORD, demonstrated
 from hybridsep.app import console, start
 from hybridsep.base.metrics import shown_figure
-from hybridsep.cosim.compensated import COMPENSATED
+from hybridsep.cosim.compensated import COMPENSATED, RIVAL
 from hybridsep.demo import cases
 from hybridsep.demo.cases import demo, demo_files
 from hybridsep.plants.trajectory import spiral
@@ -129,10 +129,10 @@ def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.Mo
     said: list[str] = []
     summary = cases.spiral_case(tmp_path, said.append)
     assert list(summary) == ["spiral_x", "spiral_y"]
-    assert len(said) == len(set(said)) == 2 * (1 + 2 + 1 + len(COMPENSATED))
+    assert len(said) == len(set(said)) == 2 * (1 + 2 + 1 + len([*COMPENSATED, RIVAL]))
     for case in summary.values():
         assert case["stiffness_alone"]["rms_pb_um"] < case["rms_pb_um"]
-        assert set(case["compensation"]) == set(COMPENSATED)
+        assert list(case["compensation"]) == [*COMPENSATED, RIVAL]
     contours = [[case["compensation"][kind]["contour_rms_um"] for kind in COMPENSATED] for case in summary.values()]
     assert contours[0] == contours[1]
     assert contours[0][1] < contours[0][0]

@@ -18,6 +18,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import read_description
+from hybridsep.cosim.inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import FACTORS, binding_words, drive_limits, expected_tracking
 from hybridsep.fitting.replay import Recording
@@ -80,6 +81,13 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
         # The same axis, whose friction does change with the command.
         assert tracking[model]["rms"] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
         assert tracking[model]["rms"] < 0.6 * tracking["none"]["rms"]
+    half = len(x) // 2
+    rival = FirInverse.fitted([(x_d[:half], x[:half])], 50)
+    assert rival is not None
+    run = cosimulate(PlayedCommand(rival.command(x_d), T_S), stage(), x_d, encoder=Encoder(5e-7, seed=2))
+    assert tracking["inverse"]["rms"] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
+    wins = tracking["inverse"]["rms"] < tracking["hybrid"]["rms"]
+    assert ("That is better than the hybrid in RMS" in words) == wins
 
 
 @pytest.mark.slow
