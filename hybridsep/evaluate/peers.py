@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy.interpolate import Akima1DInterpolator
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dtrcon
 from scipy.optimize import minimize_scalar
@@ -55,6 +56,9 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     best, late = min(fits, key=lambda fit: float(fit[0].fun))
     return FirstOrderLag(math.exp(best.x), late)
 
+
+_BRIDGED = 0.5
+"""Share of a row's lags that may be interpolated, as they were not measured."""
 
 _BLOCK = 4096
 """Rows that are factorised at once."""
@@ -110,12 +114,15 @@ class ArxRun:
         self._delay = delay
         late = np.concatenate((x[delay:], np.full(min(delay, len(x)), np.nan)))
         self._y = late - x_d
+        self._lagged = _interpolated(self._y)
         self._steps = np.diff(x_d, prepend=x_d[0])
         self._filled = np.concatenate((np.zeros(n), self._y))  # at rest before the first sample
         self._n_filled = 0
 
     def rows(self, first: int, last: int) -> Array:
-        """Return the rows of samples ``first`` to ``last``, the last one not included, all of whose lags are known.
+        """Return the rows of measured samples ``first`` to ``last``, the last one not included.
+
+        At most half of a row's lags are interpolated.
 
         Returns
         -------
@@ -125,9 +132,11 @@ class ArxRun:
         n, first, last = self.n, max(first, self.n + 1), min(last, len(self._y))
         if last <= first:
             return np.empty((0, 2 * n + 3))
-        y, steps = (sliding_window_view(one, n + 1)[first - n : last - n, ::-1] for one in (self._y, self._steps))
-        found = np.column_stack((y[:, 1:], steps, np.ones(last - first), y[:, 0]))
-        return np.asarray(found[~np.isnan(found).any(axis=1)])
+        y, lagged, steps = (
+            sliding_window_view(one, n + 1)[first - n : last - n, ::-1] for one in (self._y, self._lagged, self._steps)
+        )
+        found = np.column_stack((lagged[:, 1:], steps, np.ones(last - first), y[:, 0]))
+        return np.asarray(found[~np.isnan(found).any(axis=1) & (np.isnan(y).sum(axis=1) <= _BRIDGED * n)])
 
     def predict(self, w: Array, begin: int, end: int) -> Array:
         """Return the prediction of ``x − x_d`` at samples ``begin`` to ``end``, made when ``begin`` is commanded.
@@ -162,6 +171,14 @@ class ArxRun:
             denominator = np.concatenate(([1.0], -a))
             before = lfiltic([1.0], denominator, self._filled[begin : begin + n][::-1])
             return np.asarray(lfilter([1.0], denominator, forced, zi=before)[0])
+
+
+def _interpolated(y: Array) -> Array:
+    """Return a signal, ``(n,)``, with what is missing between measured samples: lines double the error of an ARX."""
+    measured, k = np.flatnonzero(~np.isnan(y)), np.arange(len(y))
+    if len(measured) in (len(y), 0, 1):
+        return y
+    return np.where(np.isnan(y), np.asarray(Akima1DInterpolator(measured, y[measured])(k)), y)
 
 
 ARX_LAGS = (20, 40)

@@ -7,6 +7,7 @@ import pytest
 from arx_oracle import arx_by_definition, free_run_by_definition
 from scipy.signal import lfilter
 
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import (
     FROZEN,
@@ -65,6 +66,19 @@ def test_windows_are_free_runs_from_what_was_measured_before(missing: range) -> 
         for k in range(300, 600, NP):
             expected = free_run_by_definition(arx_by_definition(x_d, x, 20, k), x_d, x, 20, k, k + NP)
             np.testing.assert_allclose(refitted[k : k + NP], expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("every", [5, 7, 15])
+def test_missing_measurements_cost_an_arx_little(every: int) -> None:
+    x_d, x = axis()
+    missing = x.copy()
+    missing[::every] = np.nan
+    for name in ("ARX20", "ARX40"):
+        errors = [
+            rms((x - peer(predict_peers([Piece(x_d, one, 300, 300)], NP), name, REFITTED).predictions[0])[300:])
+            for one in (missing, x)
+        ]
+        assert errors[0] < 1.3 * errors[1]
 
 
 @pytest.mark.parametrize("delay", [3, 30])

@@ -11,7 +11,6 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.averaging.constants import CONSTANTS
 from hybridsep.predict.averaging.experts import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.averaging.gate import InnovationGate, gated
 from hybridsep.predict.predictor import HybridPredictor
@@ -135,14 +134,30 @@ def test_missing_samples_are_counted_and_bridged() -> None:
     assert rms(np.concatenate(errors[10:])) < 0.05 * rms(e_pb[1000:])
 
 
-def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags() -> None:
+def test_each_measured_sample_is_learned_whatever_is_missing_before_it() -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     predictor = HybridPredictor(model, PredictorSettings(averaging=True, p=10))
     x = staircase()[: 2 * NP]
     for i in range(0, 2 * NP, NP):
         predictor.predict(x[i : i + NP])
-        predictor.update(np.where(np.arange(NP) // 8 == 11, np.nan, x[i : i + NP]))  # 8 missing, 4 more before the end
+        predictor.update(np.where(np.arange(NP) // 8 % 2 == 1, np.nan, x[i : i + NP]))
     learned = averaged_model(predictor)
-    # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
-    assert learned.evidence[MODEL_RESIDUAL].n_rows == 2 * (NP - 8) - (10 - 3 + 4)
-    assert learned.evidence[COMMAND_RESIDUAL].n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
+    assert learned.evidence[MODEL_RESIDUAL].n_rows == learned.evidence[COMMAND_RESIDUAL].n_rows == 2 * (NP - 48)
+
+
+def test_what_is_missing_is_predicted_and_shifted_as_its_neighbours_are_off() -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    predictor = HybridPredictor(model, PredictorSettings(averaging=True, Np=10, p=10))
+    x_d = staircase()[:20]
+    measured = x_d + 1e-6
+    predictor.predict(x_d[:10])
+    predictor.update(measured[:10])
+    e_h = predictor.predict(x_d[10:]).e_h
+    e = measured[10:] - predictor.predict(x_d[10:]).x_pb
+    measured[[10, 11, 15, 18, 19]] = np.nan
+    predictor.update(measured[10:])
+    off = e - e_h
+    bridged = np.concatenate((off[2] / 3.0 * np.array([1, 2]), [(off[4] + off[6]) / 2.0], off[[7, 7]]))
+    expected = e.copy()
+    expected[[0, 1, 5, 8, 9]] = e_h[[0, 1, 5, 8, 9]] + bridged
+    np.testing.assert_allclose(averaged_model(predictor).run.past[MODEL_RESIDUAL], expected[::-1], rtol=0, atol=1e-15)

@@ -60,8 +60,6 @@ class RunState:
     commands: Array  # (d + p_A + 1,), m: last commands, oldest first, for the ``p_A`` lags of the command's expert
     # pair of (p,) and (p_A,), m: last residuals of the physics model, and of the command; newest first
     past: tuple[Array, Array]
-    # (max(p, p_A),): whether the last ones stand for samples without a measurement, oldest first
-    bridged: NDArray[np.bool_]
     gate: InnovationGate
     n_rejected: int  # measurements that were missing or not plausible
     memory: Memory  # of this run and earlier ones
@@ -69,8 +67,8 @@ class RunState:
     @classmethod
     def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
         """Return the beginning of a run, at rest."""
-        past, bridged = (np.zeros(p), np.zeros(command.p)), np.zeros(max(p, command.p), dtype=np.bool_)
-        return cls(static.rest(), np.zeros(command.n_before), past, bridged, InnovationGate(), 0, memory)
+        past = np.zeros(p), np.zeros(command.p)
+        return cls(static.rest(), np.zeros(command.n_before), past, InnovationGate(), 0, memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,24 +362,19 @@ class AveragedModel:
         learned, measured = state.learned, x - window.x_pb
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
-        e = _bridged(self.last, measured, accepted)
+        e = _bridged(forecast.e_h[:m], measured, accepted)
         e_0 = e + window.x_pb - self.command.late(run.commands, window.x_d)
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
-        bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
         if fold:
             of_command = self.command.rows(run.commands, window.x_d)
-            state = _folded(state, forecast, (rows, of_command), (e, e_0), bridged)
+            state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
             state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
         memory = forecast.memory.remember(e)
-        run = RunState(static, commands, (past[0], past[1]), bridged[m:], gate, n_rejected, memory)
+        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory)
         return replace(state, run=run), accepted
-
-
-_BRIDGED = 3
-"""Lags of a row that may stand for samples without a measurement."""
 
 
 def _with_scales(state: AveragedModel, forecast: AveragedForecast, fastest: float) -> AveragedModel:
@@ -400,7 +393,7 @@ def _folded(
     forecast: AveragedForecast,
     rows: tuple[Array, Array],
     e: tuple[Array, Array],
-    bridged: NDArray[np.bool_],
+    accepted: NDArray[np.bool_],
 ) -> AveragedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
 
@@ -409,23 +402,18 @@ def _folded(
     """
     settings, n = state.settings, len(e[MODEL_RESIDUAL])
     early = settings.Np - min(settings.Np // 2, _AHEAD)
-    accepted = ~bridged[-n:]
     forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
-    def taken(kind: int) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    def taken(kind: int) -> tuple[Array, Array, Array]:
         past = state.run.past[kind]
-        p = len(past)
-        # Measured samples, as were all but a few of their lags
-        n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
-        lagged = lags(np.concatenate((past[::-1], e[kind][:-1])), p)
-        return rows[kind], lagged, e[kind], accepted & (n_bridged <= _BRIDGED)
+        return rows[kind], lags(np.concatenate((past[::-1], e[kind][:-1])), len(past)), e[kind]
 
     of_kind = taken(MODEL_RESIDUAL), taken(COMMAND_RESIDUAL)
 
     def learned(evidence: Iterable[WarmStartRows], part: slice) -> tuple[WarmStartRows, WarmStartRows]:
         of_physics, of_command = (
-            one.learn(features[part][counts[part]], lagged[part][counts[part]], target[part][counts[part]])
-            for one, (features, lagged, target, counts) in zip(evidence, of_kind, strict=True)
+            one.learn(*(signal[part][accepted[part]] for signal in row))
+            for one, row in zip(evidence, of_kind, strict=True)
         )
         return of_physics, of_command
 
@@ -453,11 +441,14 @@ def _judged_experts(
     return replace(learned.with_errors(errors), scales=(of_physics, of_command))
 
 
-def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
-    """Return residuals, interpolated where they are not accepted; ``last`` is before the first."""
+def _bridged(e_h: Array, measured: Array, accepted: NDArray[np.bool_]) -> Array:
+    """Return residuals; where they are not accepted the predicted ones, with the error of those beside them.
+
+    It is interpolated, 0 before the first one.
+    """
     known = np.flatnonzero(accepted)
-    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
-    return np.asarray(np.interp(np.arange(len(measured)), places, values))
+    places, errors = np.concatenate(([-1], known)), np.concatenate(([0.0], (measured - e_h)[known]))
+    return np.where(accepted, measured, e_h + np.interp(np.arange(len(measured)), places, errors))
 
 
 def _judged(

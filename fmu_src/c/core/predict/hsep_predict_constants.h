@@ -71,7 +71,6 @@
 
 /* hybridsep/predict/averaging/model.py */
 #define HSEP_AVERAGING_AHEAD 20
-#define HSEP_AVERAGING_BRIDGED 3
 
 /* hybridsep/predict/averaging/constants.py */
 #define HSEP_AVERAGING_KAPPA 1.0

@@ -186,7 +186,7 @@ static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, h
             sum += weights[i] * predicted;
             square += weights[i] * (predicted * predicted + left);
         }
-        e[j] = sum;
+        e[j] = hsep_at(self, self->e_h)[j] = sum;
         variance[j] = hsep_fmax(square - sum * sum, 0.0);
     }
 }

@@ -74,21 +74,14 @@ static void averaged_take_rows(hsep_averaged *self, const hsep_real x_pb[], cons
     self->known = last;
 }
 
-/* Learn the row [features without lags | lags | residual] of sample k. A row with many lags that stand for samples
- * without a measurement is not learned. rows: (Np, n_static); e: (Np + lags,), m. */
+/* Learn the row [features without lags | lags | residual] of sample k. rows: (Np, n_static); e: (Np + lags,), m. */
 static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const hsep_real rows[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
     const hsep_int p = kind == HSEP_COMMAND_RESIDUAL ? HSEP_AVERAGING_LAGS_OF_COMMAND : self->p;
     const hsep_int n_static = gram->n - p;
-    const hsep_real *bridged = hsep_at(self, self->bridged) + (self->Np - k), *lags = e + (self->Np - k);
-    hsep_real n_bridged = 0.0, *to = hsep_gram_row(gram);
-    for (hsep_int i = 0; i < p; i++) {
-        n_bridged += bridged[i];
-    }
-    if (n_bridged > HSEP_AVERAGING_BRIDGED) {
-        return;
-    }
+    const hsep_real *lags = e + (self->Np - k);
+    hsep_real *to = hsep_gram_row(gram);
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
@@ -186,17 +179,30 @@ static void averaged_advance(hsep_averaged *self, hsep_int last)
     }
 }
 
-/* Take in sample k, which is believed, and the samples since the last believed one: their residuals are linear in time
- * between both. fold: whether it is learned. */
+/* Bridge the residuals from the last believed one to place begin, before which is the next one, if it is not 0: they
+ * are off from the predicted ones as both are, linearly in time, or as the last one is; by nothing if it is before the
+ * window. */
+static void averaged_bridge(const hsep_averaged *self, hsep_real e[], hsep_int begin)
+{
+    const hsep_int known = self->Np - self->known;
+    const hsep_real *e_h = hsep_at_const(self, self->e_h) + (self->n - self->Np);
+    const hsep_real off = self->known > 0 ? e[known] - e_h[known] : 0.0;
+    hsep_real slope = 0.0;
+    if (begin > 0) {
+        slope = (e[begin - 1] - e_h[begin - 1] - off) / (hsep_real)(known - begin + 1);
+    }
+    for (hsep_int i = known; i-- > begin;) {
+        e[i] = e_h[i] + (slope * (hsep_real)(known - i) + off);
+    }
+}
+
+/* Take in sample k, which is believed, and the samples since the last believed one. fold: whether it is learned. */
 static void averaged_believe(
     hsep_averaged *self, hsep_int k, const hsep_real x_pb[], hsep_real e[], hsep_real measured, int fold)
 {
-    const hsep_int j = self->Np - 1 - k, known = self->Np - self->known;
+    const hsep_int j = self->Np - 1 - k;
     e[j] = measured;
-    const hsep_real slope = (e[j] - e[known]) / (hsep_real)(known - j);
-    for (hsep_int i = known - 1; i > j; i--) {
-        e[i] = slope * (hsep_real)(known - i) + e[known];
-    }
+    averaged_bridge(self, e, j + 1);
     averaged_take_rows(self, x_pb, e, k + 1);
     for (hsep_int i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
         const hsep_command *command = hsep_averaged_command(self);
@@ -216,7 +222,6 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
     const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
     const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
-    hsep_at(self, self->bridged)[j] = accepted ? 0.0 : 1.0;
     if (accepted) {
         averaged_believe(self, k, x_pb, e, measured, fold);
     }
@@ -315,19 +320,15 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
 HSEP_API void hsep_averaged_learn(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
 {
-    const hsep_int p = self->p, of_command = HSEP_AVERAGING_LAGS_OF_COMMAND;
-    hsep_real *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
+    hsep_real *e_0 = hsep_at(self, self->e_0);
     if (self->followed == 0) {
         averaged_begin_window(self, x_d, x_pb, fold);
     }
     while (self->followed < self->Np) {
         averaged_follow_sample(self, x_pb, e, fold);
     }
-    if (self->known < self->Np) { /* none is believed behind it: its residual stays */
-        const hsep_int known = self->Np - self->known;
-        for (hsep_int j = 0; j < known; j++) {
-            e[j] = e[known];
-        }
+    if (self->known < self->Np) { /* none is believed behind it */
+        averaged_bridge(self, e, 0);
         averaged_take_rows(self, x_pb, e, self->Np);
     }
     self->n_rejected += self->Np - (hsep_int)self->n_accepted;
@@ -337,7 +338,6 @@ HSEP_API void hsep_averaged_learn(
         averaged_judge(self, e);
     }
     hsep_command_end(hsep_averaged_command(self), self->Np);
-    memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(hsep_real));
-    memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(hsep_real));
+    memmove(e_0 + self->Np, e_0, HSEP_AVERAGING_LAGS_OF_COMMAND * sizeof(hsep_real));
     self->followed = self->known = 0;
 }

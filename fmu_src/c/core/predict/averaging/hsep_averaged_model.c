@@ -39,7 +39,7 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_averaging_settings *averaging = parameters->averaging;
-    const hsep_real Np = (hsep_real)settings->Np, n = (hsep_real)parameters->n, p = (hsep_real)settings->p;
+    const hsep_real Np = (hsep_real)settings->Np, n = (hsep_real)parameters->n;
     const hsep_real p_of_command = (hsep_real)HSEP_AVERAGING_LAGS_OF_COMMAND;
     hsep_real end = HSEP_WORDS(hsep_averaged);
     self->Np = settings->Np;
@@ -59,10 +59,10 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
-    self->bridged = hsep_take(&end, Np + hsep_fmax(p, p_of_command));
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, HSEP_N_EXPERTS * n);
     self->recalled = hsep_take(&end, n);
+    self->e_h = hsep_take(&end, n);
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(parameters));

@@ -74,10 +74,10 @@ typedef struct {
     hsep_int x;                /* (n,) m, position */
     hsep_int measured;         /* (Np,) m, measured position, relative to the start, NaN where missing */
     hsep_int accepted;         /* (Np,) whether it is believed */
-    hsep_int bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
     hsep_int stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
     hsep_int recalled; /* (n,) m, what HSEP_RECALL predicts */
+    hsep_int e_h;      /* (n,) m, residual that is predicted */
     hsep_int variance; /* (n,) m2, of the mixture of the experts */
     hsep_int rows;     /* (n, n_static) features without lags, sample after sample */
     hsep_int disturbances, command, recall;
@@ -169,7 +169,8 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
 
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
- * residuals; where a measurement is not believed, between the believed ones beside it; behind it those before. A
+ * residuals; where a measurement is not believed, the predicted one, shifted as the believed ones beside it are off;
+ * behind it those before. A
  * sample costs a hsep_gram_fold for each residual, and behind early samples a share of the next window's solutions. */
 HSEP_API void hsep_averaged_follow(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);
