@@ -11,7 +11,7 @@ os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 import pytest
 from built_once import BuiltFmus
 from command_line import Run
-from quick_fits import without_other_settings, without_other_windows, without_python_fmus
+from quick_fits import without_other_settings, without_python_fmus
 
 
 @pytest.fixture
@@ -21,9 +21,8 @@ def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` judge one look-ahead, with the default settings alone, and write the native FMUs alone."""
+    """Let ``fit`` with the default settings alone, and write the native FMUs alone."""
     without_python_fmus(monkeypatch)
-    without_other_windows(monkeypatch)
     without_other_settings(monkeypatch)
 
 

@@ -34,7 +34,6 @@ from properties import LEFT_OUT, take_profile
 from quick_fits import (
     without_larger_structures,
     without_other_settings,
-    without_other_windows,
     without_python_fmus,
 )
 
@@ -86,10 +85,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` try small structures and the default settings, judge one look-ahead, and write native FMUs alone."""
+    """Let ``fit`` try small structures and the default settings, and write native FMUs alone."""
     without_larger_structures(monkeypatch)
     without_python_fmus(monkeypatch)
-    without_other_windows(monkeypatch)
     without_other_settings(monkeypatch)
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .errors import SignalError
+from .errors import SignalError, brief, first_line
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -23,20 +25,125 @@ PREDICTION_MAX = 1e100
 squares of smaller values cannot overflow."""
 
 
-def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
+_SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")
+"""Spellings of the units in which a quantity is taken as it is."""
+
+_GAP = 1.5
+"""Usual steps of an index from which on samples are missing in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Column as somebody hands it over."""
+
+    values: NDArray[Any]  # numbers, NaN where they are missing, or times
+    index: Any = None  # labels of its samples, as pandas and xarray have them; None without
+    unit: str = ""  # that it states; empty without
+
+
+def given_column(values: Any) -> Given:
+    """Return what somebody hands over as a column: any array or sequence, masked, labelled, with a unit or without.
+
+    What is masked, None or NA is NaN; Decimals are floats, and times with a zone durations since the first one.
+
+    Raises
+    ------
+    TypeError
+        If they are not all numbers or times; or something else that NumPy raises.
+    """
+    index = getattr(values, "index", None)
+    dims: Any = getattr(values, "dims", ())
+    if len(dims) == 1 and hasattr(values, "indexes"):  # xarray
+        index = values.indexes.get(dims[0])
+    index = None if callable(index) else index
+    unit = str((getattr(values, "attrs", None) or {}).get("units", ""))
+    if isinstance(values, list | tuple) and values and (hasattr(values[0], "units") or hasattr(values[0], "unit")):
+        raise TypeError("a list of quantities; make one quantity of it")
+    for size, of in (("magnitude", "units"), ("value", "unit"), ("value", "units")):  # pint, astropy, unyt
+        if hasattr(values, size) and hasattr(values, of):
+            values, unit = getattr(values, size), str(getattr(values, of))
+    plain: NDArray[Any] = np.asarray(values)
+    if plain.dtype == np.object_:
+        plain = _of_objects(plain)
+    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else np.zeros(1, np.bool_)
+    if masked.any():
+        plain = np.where(masked, np.timedelta64("NaT") if plain.dtype.kind in "mM" else np.nan, plain)
+    return Given(plain, index, unit)
+
+
+def _of_objects(values: NDArray[Any]) -> NDArray[Any]:
+    """Return what Python's or pandas' objects hold."""
+    found: list[Any] = [None if type(one).__name__ in ("NAType", "NaTType") else one for one in values.ravel()]
+    first = next((one for one in found if one is not None), None)
+    if hasattr(first, "utcoffset") or hasattr(first, "total_seconds"):
+        since = [math.nan if one is None else (one - first).total_seconds() for one in found]
+        return np.asarray((1e9 * np.array(since)).round().astype("m8[ns]"))
+    for other in {type(one) for one in found} & {str, bytes, bool}:
+        raise TypeError(f"values of type {other.__name__}")
+    return np.array([math.nan if one is None else float(one) for one in found]).reshape(values.shape)
+
+
+def check_same_index(**columns: Any) -> None:
+    """Raise SignalError if columns have indexes that differ; samples without an index are by their place."""
+    indexes = {name: getattr(one, "index", None) for name, one in columns.items()}
+    indexed = {name: np.asarray(one) for name, one in indexes.items() if one is not None and not callable(one)}
+    for name, index in indexed.items():
+        first, labels = next(iter(indexed.items()))
+        if len(index) == len(labels) and not np.array_equal(index, labels):
+            i = int(np.argmax(index != labels))
+            raise SignalError(
+                f"{first} and {name} must have the same index, got {labels[i]} and {index[i]} at sample {i}; align "
+                "them, or give arrays, which are paired by place"
+            )
+
+
+def index_values(index: Any) -> NDArray[Any]:
+    """Return the numbers or times of an index, empty if it is none or holds something else."""
+    with suppress(TypeError, ValueError, OverflowError):
+        if index is not None and (values := given_column(index).values).dtype.kind in "iufmM":
+            return values
+    return np.empty(0)
+
+
+def _as_array(values: Any, name: str, factor: Callable[[str], float] | None = None) -> Array:
+    """Return numbers, NaN where they are missing; SignalError if they are none, in another unit, or have a gap."""
+    if factor is None and type(values) is np.ndarray and values.dtype == np.float64 and values.flags.c_contiguous:
+        return values
+    if hasattr(values, "columns") or isinstance(values, Mapping):
+        raise SignalError(f"{name} must be one column, got a table ({type(values).__name__}); read_log reads tables")
+    try:
+        given = given_column(values)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SignalError(f"{name} must be numbers, got {type(values).__name__}: {first_line(error)}") from None
+    if given.values.dtype.kind not in "fiu":
+        raise SignalError(f"{name} must be numbers, got {given.values.dtype}")
+    if factor is None and given.unit.lower() not in _SI:
+        raise SignalError(f"{name} must be in m or rad, got {brief(given.unit)}; convert it, or read_log does")
+    labels = index_values(given.index)
+    if len(labels) > 1:
+        steps = np.diff(labels) / np.median(np.diff(labels))
+        if not (even := (steps > 0.0) & (steps < _GAP)).all():
+            i = int(np.argmin(even))
+            raise SignalError(
+                f"the index of {name} must be even, it goes from {labels[i]} to {labels[i + 1]} at sample {i + 1}; "
+                "read_log makes another segment of what follows a gap"
+            )
+    return np.asarray((factor(given.unit) if factor else 1.0) * given.values, dtype=np.float64, order="C")
+
+
+def as_samples(
+    values: Any, name: str, length: int | None = None, *, factor: Callable[[str], float] | None = None
+) -> Array:
     """Return ``(n,)`` samples as a contiguous float64 vector of ``length``, validated; ``name`` is for messages.
+
+    They are in m or rad, or times the ``factor`` of the unit that they state, empty without.
 
     Raises
     ------
     SignalError
         If they are not one-dimensional, of the wrong length, not all finite, or no positions in metres or radians.
     """
-    samples: Any = np.asarray(values)
-    if samples.dtype != np.float64 or not samples.flags.c_contiguous:
-        try:
-            samples = np.ascontiguousarray(samples, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise SignalError(f"{name} must be numbers, got {samples.dtype}") from None
+    samples = _as_array(values, name, factor)
     if samples.ndim != 1:
         raise SignalError(f"{name} must be one-dimensional, got shape {samples.shape}")
     if length is not None and len(samples) != length:
@@ -48,13 +155,13 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     if len(samples) and np.abs(samples).max() > most:
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{most:g} m or rad, got {samples[i]:g} at sample {i}")
-    return samples  # type: ignore[no-any-return]
+    return samples
 
 
-def as_measured(values: ArrayLike, name: str, length: int | None = None) -> Array:
+def as_measured(values: Any, name: str, length: int | None = None) -> Array:
     """Return measured positions as :func:`as_samples` does, NaN where they are missing."""
-    samples: Any = np.asarray(values)
-    missing = np.isnan(samples) if samples.dtype.kind == "f" else np.zeros(samples.shape, dtype=np.bool_)
+    samples = _as_array(values, name)
+    missing = np.isnan(samples)
     return np.where(missing, np.nan, as_samples(np.where(missing, 0.0, samples), name, length))
 
 

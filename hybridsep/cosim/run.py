@@ -63,7 +63,7 @@ COMPENSATOR = Kind(
 """The loop is closed: the drive gets the modified command."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Run:
     """Signals of a run, without the first fill of the look-ahead.
 

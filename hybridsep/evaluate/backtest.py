@@ -7,19 +7,19 @@ this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three pub
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
 from ..base.metrics import Score, batch_rms, hold, html_table, line_plot, one_line
-from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
+from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples, check_same_index
 from ..base.threads import one_blas_thread
 from ..cosim.run import PREDICTOR, Run
-from ..logs.log import Log
+from ..logs.log import Log, Table, is_table, read_log
 from ..online.look_ahead import SepState
 from ..predict.predictor import HybridPredictor
 from .verdict import Tally, Verdict
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Backtest:
     """Result of a replay: scores and predictions.
 
@@ -81,7 +81,7 @@ class Backtest:
 @one_blas_thread
 def backtest(
     predictor: HybridPredictor,
-    x_d: ArrayLike | Log,
+    x_d: ArrayLike | Log | Mapping[str, ArrayLike] | Table,
     x_meas: ArrayLike = (),
     *,
     starts: Sequence[int] = (0,),
@@ -97,7 +97,7 @@ def backtest(
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
         Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
-        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments.
+        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one.
     starts : sequence of int
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     progress : callable, optional
@@ -109,10 +109,13 @@ def backtest(
         If the samples are empty, of different lengths or not finite; the predictor is unchanged then. If the prediction
         diverges.
     """
+    if is_table(x_d):
+        x_d = read_log(cast("Table", x_d), T_s=predictor.T_s)
     if isinstance(x_d, Log):
         if abs(x_d.T_s - predictor.T_s) > 0.01 * predictor.T_s:
             raise SignalError(f"the log has T_s = {x_d.T_s:g} s, the predictor {predictor.T_s:g} s; they must agree")
         x_meas, starts, x_d = x_d.x_meas, x_d.starts, x_d.x_d
+    check_same_index(x_d=x_d, x_meas=x_meas)
     command = as_samples(x_d, "x_d")
     predictor.settings.check_replay()
     measured = as_measured(x_meas, "x_meas", len(command))

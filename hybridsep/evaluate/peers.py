@@ -1,4 +1,4 @@
-"""Peers that a hybrid model is judged by, on the columns ``x_d`` and ``x`` of its log alone: lag + hold, ARX models.
+"""Peers that a hybrid model is judged by, on the columns ``x_d`` and ``x`` of its log alone: lag + hold, ARX, N4SID.
 
 None of them shares code with what it judges. Each window is predicted from what was measured before it.
 """
@@ -20,6 +20,7 @@ from scipy.signal import lfilter, lfiltic
 
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
+from .state_space import identified, inputs_of
 
 _LATE_MAX, _TIME_CONSTANTS = 21, (0.05, 1e4)
 """Most samples that a command is tried to be late by; least and largest time constant that are tried, samples."""
@@ -184,9 +185,9 @@ def _interpolated(y: Array) -> Array:
 ARX_LAGS = (20, 40)
 """Lags of the ARX models."""
 
-LAG_HOLD, FROZEN, REFITTED = "lag + hold", "frozen", "refitted"
-"""Name of the lag whose last residual is held; ways to fit ARX: to the training samples, or again before each
-window."""
+LAG_HOLD, STATE_SPACE, FROZEN, REFITTED = "lag + hold", "N4SID", "frozen", "refitted"
+"""Names of the lag whose last residual is held, and of the state-space model; ways to fit ARX: to the training samples,
+or again before each window."""
 
 _FAR = 10.0
 """Distance of a prediction from its command, in largest commanded or measured distances from the start, beyond which it
@@ -229,14 +230,15 @@ def predict_peers(
 ) -> tuple[Peer, ...]:
     """Return the peers' predictions of all windows from each piece's ``first`` on; the pieces are in the order of time.
 
-    The lag and a frozen ARX are fitted to the leading training samples; without any there are none of them, and no lag
-    without motion there. A refitted ARX is fitted before each window to all samples so far. Measurements are late by
-    ``delay`` samples; a prediction stands where its measurement does.
+    The lag, N4SID and a frozen ARX are fitted to the leading training samples; without any there are none of them, and
+    no lag without motion there. A refitted ARX is fitted before each window to all samples so far. Measurements are
+    late by ``delay`` samples; a prediction stands where its measurement does.
     """
     training = [(one.x_d[: one.n_train], one.x[: one.n_train]) for one in pieces if one.n_train > delay]
     trains = any((~np.isnan(x[delay:])).any() for _, x in training)
     moves = any(np.ptp(x_d) > 0.0 for x_d, _ in training)
     found = [_lag_hold(pieces, training, Np, delay)] if trains and moves else []
+    found += _state_space(pieces, Np, delay) if trains else []
     ways = (FROZEN, REFITTED) if trains else (REFITTED,)
     for i, n in enumerate(ARX_LAGS):
         found += [_arx(n, way, pieces, Np, delay) for way in ways]
@@ -261,9 +263,33 @@ def _lag_hold(pieces: Sequence[Piece], training: Sequence[tuple[Array, Array]], 
     return Peer(LAG_HOLD, "", tuple(predictions))
 
 
+def _state_space(pieces: Sequence[Piece], Np: int, delay: int) -> list[Peer]:
+    """Return N4SID's model of the training samples, whose filter knows what was measured before each window."""
+    late = [np.concatenate((one.x[delay:], np.full(min(delay, len(one.x)), np.nan))) - one.x_d for one in pieces]
+    runs = [(inputs_of(one.x_d), y) for one, y in zip(pieces, late, strict=True)]
+    trained = [max(one.n_train - delay, 0) for one in pieces]
+    model = identified([(u[:n], y[:n]) for (u, y), n in zip(runs, trained, strict=True)], Np)
+    if model is None:
+        return []
+    far, diverged, predictions = _far(pieces), False, []
+    for (u, y), piece in zip(runs, pieces, strict=True):
+        states, predicted = model.states(u, y), np.full(len(y), np.nan)
+        for begin in range(_first_window(piece, Np, delay), len(y), Np):
+            known, end = max(begin - delay, 0), min(begin + Np, len(y))
+            run = model.free_run(states[known], u[known:end])[begin - known :]
+            diverged = diverged or not np.all(np.abs(run) <= far)
+            predicted[begin:end] = np.nan if diverged else piece.x_d[begin:end] + run
+        predictions.append(_late(predicted, delay))
+    return [Peer(STATE_SPACE, "", tuple(predictions), diverged)]
+
+
+def _far(pieces: Sequence[Piece]) -> float:
+    distances = (np.abs(np.stack((one.x_d, one.x)) - one.x_d[0]) for one in pieces)
+    return _FAR * max((float(np.nanmax(distance)) for distance in distances), default=math.inf)
+
+
 def _arx(n: int, way: str, pieces: Sequence[Piece], Np: int, delay: int) -> Peer:
-    name, distances = f"ARX{n}", (np.abs(np.stack((one.x_d, one.x)) - one.x_d[0]) for one in pieces)
-    far = _FAR * max((float(np.nanmax(distance)) for distance in distances), default=math.inf)
+    name, far = f"ARX{n}", _far(pieces)
     least_squares = MinimumNorm(2 * n + 2)
     runs = [ArxRun(one.x_d, one.x, n, delay) for one in pieces]
     if way == FROZEN:

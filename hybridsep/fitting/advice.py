@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.metrics import rms_ratio
-from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD
+from ..evaluate.peers import ARX_LAGS, FROZEN, LAG_HOLD, STATE_SPACE
 from ..evaluate.verdict import ALIKE, STANDSTILL, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
 from ..logs.controller import Controller
@@ -171,6 +171,8 @@ def peers_in_words(judged: Judged) -> str:
     words = ["Hold: physics model plus its residual at the last sample measured before the window"]
     if LAG_HOLD in names:
         words.append(f"{LAG_HOLD}: the same on a first-order lag with dead time fitted to the first half")
+    if STATE_SPACE in names:
+        words.append(f"{STATE_SPACE}: subspace identification of the first half, order 1 to 8, and its Kalman filter")
     frozen = any(peer.way == FROZEN for peer in judged.replay.peers)
     ways = "frozen after the first half or " if frozen else ""
     words.append(

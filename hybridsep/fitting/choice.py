@@ -29,9 +29,6 @@ _SHARES = (0.1, 0.25, 1.0)
 _Q = (1,)
 """Numbers of lags ``q`` of the physics-based position that are tried besides the default."""
 
-_WINDOWS = (0.2, 0.5, 1.0, 2.0)
-"""Lengths of window over which the error is shown, relative to the controller's."""
-
 _GAIN = 0.9
 """Ratio of the errors with and without a period below which it is worth a hint."""
 
@@ -44,16 +41,6 @@ class Tried:
     q: int
     rms_h: float
     chosen: bool
-
-
-@dataclass(frozen=True)
-class WindowErrors:
-    """RMS of physics model, hold and hybrid with windows of ``Np`` samples over the test samples, m."""
-
-    Np: int
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
 
 
 def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
@@ -102,27 +89,6 @@ def _trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Seq
     training = [Recording(*one.training, 0) for one in recordings if one.n_train]
     errors = replay(HybridPredictor(model, settings), training).errors()[2]
     return known_rms(errors[len(errors) // 2 :])
-
-
-def window_scores(
-    model: ModalModel,
-    recordings: Sequence[Recording],
-    settings: PredictorSettings,
-    offset: float = 0.0,
-    progress: Callable[[float], object] = lambda _done: None,
-) -> tuple[WindowErrors, ...]:
-    """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
-
-    The ``offset``, m, is as of :class:`~hybridsep.fitting.replay.Replay`.
-    """
-    most = max(min(len(recording.x) for recording in recordings), settings.Np)
-    sizes = dict.fromkeys(max(1, round(share * settings.Np)) for share in _WINDOWS)
-    scores = []
-    for i, Np in enumerate(size for size in sizes if size <= most):
-        found = replay(HybridPredictor(model, with_window(settings, Np)), recordings)
-        scores.append(WindowErrors(Np, *replace(found, offset=offset).rms()))
-        progress((i + 1) / len(sizes))
-    return tuple(scores)
 
 
 def period_finding(

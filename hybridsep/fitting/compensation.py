@@ -63,7 +63,7 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     ParameterError
         If some of the three limits are missing.
     """
-    found = {entry: given[one.name] for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
+    found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]
     if found and (missing := [name for name in names if name not in given]):
         verb = "is" if len(missing) == 1 else "are"

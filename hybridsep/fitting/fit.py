@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from ..base.errors import IdentificationError, ParameterError, listed
 from ..base.files import plain, written_text, written_whole
 from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, PredictorSettings
-from ..base.signals import Array
+from ..base.signals import Array, as_samples
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
@@ -26,14 +27,15 @@ from ..identify.output_error import in_time
 from ..logs.checks import Finding, checked
 from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
-from ..machines.machine import Machine
+from ..logs.units import si_factor
+from ..machines.machine import Machine, checked_name
 from ..machines.text import machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, recommendation
 from .build import fit_files, sha256_of, write_commands
-from .choice import Tried, WindowErrors, choose_settings, period_finding, window_scores, with_window
+from .choice import Tried, choose_settings, period_finding, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, largest_motion
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
@@ -41,7 +43,6 @@ from .report import (
     begun_report,
     write_findings,
     write_identification,
-    write_other_windows,
     write_settings,
     write_use,
     write_validation,
@@ -57,7 +58,7 @@ _SHARE = 0.5
 """Share of each log's samples for training; the rest is held out for the test."""
 
 _TRIED_MAX = 20_000
-"""Leading samples on which settings and look-aheads are tried and a plant is fitted, 20 s at 1 kHz, and a compensator
+"""Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz, and a compensator
 on half of them: a fit of a minute's log took twice as long without."""
 
 _SETTLING = (
@@ -67,9 +68,11 @@ _SETTLING = (
 Progress = Callable[[str, float], object]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Fit:
-    """What was found of an axis; it prints as one line, and as a table in a notebook. Positions are in m, or rad.
+    """What was found of an axis; it prints as one line, and as a table in a notebook.
+
+    Positions are in m, or rad, but in :meth:`predict`, which takes and gives the unit of the log, :attr:`unit`.
 
     Attributes
     ----------
@@ -83,8 +86,6 @@ class Fit:
         Settings that were tried, the default first.
     judged : Judged
         Replay of the logs; its test samples are held out from the physics model and from the choice.
-    windows : tuple of WindowErrors
-        Errors with other look-aheads.
     plant : IdentifiedPlant
     tracking : Tracking, optional
         Tracking errors to be expected; None without limits of the drive.
@@ -98,7 +99,6 @@ class Fit:
     identification: IdentifiedModel
     choice: tuple[Tried, ...]
     judged: Judged
-    windows: tuple[WindowErrors, ...]
     plant: IdentifiedPlant
     tracking: Tracking | None
     trained: bytes
@@ -107,12 +107,17 @@ class Fit:
         (scale, unit), best = self.judged.unit, self.judged.replay.best()
         hybrid = self.judged.replay.scored()[-1]
         errors = f"hybrid {scale * hybrid.rms:.3g} {unit} RMS, {best.name} {scale * best.rms:.3g} {unit}"
-        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, {errors})"
+        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, positions in {self.unit}, {errors})"
 
     def _repr_html_(self) -> str:
         scale, unit = self.judged.unit
         errors = {f"{one.name}, RMS [{unit}]": scale * one.rms for one in self.judged.replay.scored()}
         return html_table(f"{self.machine.name}, {self.identification.structure}: {self.advice}", errors)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the positions that :meth:`predict` takes and gives, that of the first log, such as ``"mm"``."""
+        return self.logs[0].file_unit or self.machine.unit
 
     @property
     def advice(self) -> str:
@@ -133,11 +138,13 @@ class Fit:
         return SepCompensator(self.predictor(), replace(self.machine.compensator_settings, compensate=compensate))
 
     def predict(self, x_d: ArrayLike) -> Prediction:
-        """Return what is predicted, with what was learned, of a window ``(n,)``, m, from rest at its first command.
+        """Return what is predicted, with what was learned, of a window ``(n,)`` from rest at its first command.
 
-        It has at most ``Np`` commanded positions.
+        It has at most ``Np`` commanded positions, in :attr:`unit`, as what is predicted; a quantity may have another.
         """
-        return self.predictor().predict(x_d)
+        factor = si_factor(self.unit)
+        found, scale = self.predictor().predict(as_samples(x_d, "x_d", factor=factor)), 1.0 / factor("")
+        return replace(found, x_pb=scale * found.x_pb, e_h=scale * found.e_h, x_h_std=scale * found.x_h_std)
 
     def plot(self) -> Figure:
         """Return a matplotlib figure of the errors over the held-out samples."""
@@ -148,15 +155,22 @@ class Fit:
         return line_plot(t, lines, "t [s]", f"error x − x̂ [{unit}]")
 
     def report(self, path: str | Path, fmus: Sequence[str] = ()) -> None:
-        """Write the report, one HTML file that needs nothing else, also about FMUs with these names of files."""
-        judged = self.judged
+        """Write the report, one HTML file that needs nothing else, also about FMUs with these names of files.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written, or ``path`` is a folder.
+        """
+        if Path(path).is_dir():
+            raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
+        fmus, judged = [fmus] if isinstance(fmus, str) else fmus, self.judged
         settled = any(one.judges_from > one.n_train for one in judged.replay.recordings)
         report = begun_report(
             *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
             "second half." + (_SETTLING if settled else ""),
         )
-        write_other_windows(report, self.windows, judged)
         write_findings(report, self.logs, self.findings)
         write_identification(report, self.identification, judged)
         write_validation(report, self.identification, judged)
@@ -176,12 +190,15 @@ class Fit:
         *,
         fmus: bool = True,
         report: bool = True,
-        progress: Progress = lambda _message, _done: None,
+        progress: Progress | None = None,
     ) -> dict[str, Path]:
         """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
 
         ``fmus`` and ``report`` say whether they are among them; ``progress`` is told a message and the fraction done.
         """
+        progress = progress or (lambda _message, _done: None)
+        if Path(out).exists() and not Path(out).is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "out must be a folder", str(out))
         files = fit_files(Path(out), self.machine.name, compensator=self.tracking is not None)
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
         for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
@@ -209,7 +226,6 @@ class Fit:
         return {
             "identification": self.identification.summary(),
             "choice": plain(self.choice),
-            "windows": plain(self.windows),
             "plant": plain(self.plant),
             "tracking": plain(self.tracking) or {},
             "judged": plain(self.judged.replay.judgement()),
@@ -234,9 +250,10 @@ def fit(
     T_s: float | None = None,
     unit: str | None = None,
     columns: Mapping[str, str] | None = None,
+    axis: str | None = None,
     Np: int | None = None,
     name: str = "axis",
-    progress: Progress = lambda _message, _done: None,
+    progress: Progress | None = None,
     **known: float,
 ) -> Fit:
     """Identify an axis from what was recorded of it, choose settings, and judge them on samples that were held out.
@@ -250,9 +267,10 @@ def fit(
     x_d, x : (n,) array_like
         Commanded and measured positions; ``x`` is NaN where it is missing. Or alone: a table with these columns, or
         with others that ``columns`` names; a :class:`~hybridsep.logs.log.Log`, or several of one axis.
-    T_s, unit, columns
+    T_s, unit, columns, axis
         Of arrays and of a table, as of :func:`~hybridsep.logs.log.read_log`: sampling interval, s, unit of the
-        positions, m if left out, and names. From here on positions are in m, of a rotary axis in rad.
+        positions, m if left out, names, and one of several axes. What is returned has positions in m, of a rotary axis
+        in rad; its ``predict`` alone takes and gives the unit.
     Np : int, optional
         Samples of the controller's look-ahead; 0.1 s of them if left out.
     name : str
@@ -274,23 +292,30 @@ def fit(
     SignalError
         If a log is too short to be split.
     """
-    logs = _logs(x_d, x, {"T_s": T_s, "unit": unit, "columns": columns})
-    T_s, shown = _common(logs), logs[0].shown
+    checked_name(name)
+    progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
     entries: dict[str, Any] = {name: known[name] for name in PredictorSettings.KNOWN if name in known}
     if unknown := known.keys() - set(names):
         raise ParameterError(f"what is known of an axis must be of {', '.join(names)}, got {listed(sorted(unknown))}")
+    Np = None if Np is None else PARAMETERS["Np"].checked(Np)
+    logs = _logs(x_d, x, {"T_s": T_s, "unit": unit, "columns": columns, "axis": axis})
+    T_s, shown = _common(logs), logs[0].shown
     findings = {log.path.name: checked(log) for log in logs}
-    window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else PARAMETERS["Np"].checked(Np)
+    window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
     recordings = [
         piece for log in logs for piece in split_log([(s.x_d, s.x_meas) for s in log.segments()], _SHARE, window)
     ]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if Np is not None and Np > judging:
+        n_pieces = sum(len(log.starts) for log in logs)
+        way = f"a log of {2 * Np} samples or more"
+        if n_pieces > len(logs):
+            way = f"read the log with resample=True (--resample): its times cut it into {n_pieces} pieces"
         raise ParameterError(
             f"Np must be at most {judging}, got {Np}: the first half of each log trains, and the longest stretch for "
-            f"the test has {judging} samples; give a smaller Np, or a log of {2 * Np} samples or more"
+            f"the test has {judging} samples; give a smaller Np, or {way}"
         )
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
@@ -307,9 +332,8 @@ def fit(
     tried = beginnings(recordings, _TRIED_MAX)
     settings, choice = choose_settings(model, tried, default, within(0.4, 0.7, "choose p and q"))
     predictor = HybridPredictor(model, settings)
-    replayed = replay(predictor, recordings, progress=within(0.7, 0.75, "judge on the second half"))
-    replayed = replace(replayed, offset=found.offset).with_peers(within(0.75, 0.78, "peers on the second half"))
-    windows = window_scores(model, tried, settings, found.offset, within(0.78, 0.9, "error over Np"))
+    replayed = replay(predictor, recordings, progress=within(0.7, 0.8, "judge on the second half"))
+    replayed = replace(replayed, offset=found.offset).with_peers(within(0.8, 0.9, "peers on the second half"))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
@@ -329,7 +353,7 @@ def fit(
         unidentified=not found.parameters or any(one.startswith(TOO_LITTLE) for one in found.findings),
     )
     progress("fitted", 1.0)
-    return Fit(logs, findings, machine, found, choice, judged, windows, plant, tracking, predictor.to_bytes())
+    return Fit(logs, findings, machine, found, choice, judged, plant, tracking, predictor.to_bytes())
 
 
 def _logs(x_d: Any, x: ArrayLike | None, reading: Mapping[str, Any]) -> tuple[Log, ...]:

@@ -19,7 +19,7 @@ from ..identify.validation import FrequencyResponse, ResidualTest, frequency_res
 from ..logs.checks import Finding
 from ..logs.log import Log
 from .advice import OF_ITSELF, Judged, extent, peers_in_words, recommendation
-from .choice import WORTH, Tried, WindowErrors
+from .choice import WORTH, Tried
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")
 """Names of what a replay predicts by."""
@@ -46,25 +46,6 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
         _write_spectra(report, judged)
     _write_reversals(report, judged)
     return report
-
-
-def write_other_windows(report: Report, windows: Sequence[WindowErrors], judged: Judged) -> None:
-    """Write the errors with shorter and longer windows than the controller's."""
-    report.heading("Errors with other look-aheads")
-    scale, unit = judged.unit
-    lengths = 1e3 * judged.T_s * np.array([one.Np for one in windows])
-    errors = scale * np.array([(one.rms_pb, one.rms_hold, one.rms_h) for one in windows])
-    lines = [Line(name, lengths, errors[:, i], _COLOURS[i]) for i, name in enumerate(_NAMES)]
-    lines += [Line("", lengths, errors[:, 2], HYBRID, points=True)]
-    report.chart(
-        Chart(
-            "look-ahead Np·T_s [ms]",
-            (f"RMS error [{unit}]",),
-            lines,
-            "The look-ahead is the controller's; it is not chosen, as a shorter one always looks better. Of a long "
-            "log the beginning alone.",
-        )
-    )
 
 
 def write_identification(report: Report, found: IdentifiedModel, judged: Judged) -> None:

@@ -248,7 +248,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
                 raise FmuError(f"{name} is an {causality} variable and cannot be set")
             if causality == "parameter" and variable.variability == "fixed" and self.running:
                 raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
-            if causality == "parameter" and self.running:
+            if name in PARAMETERS and self.running:
                 parameter = PARAMETERS[name]
                 parameter.checked(parameter.from_fmi(value))
             self.values[name] = value

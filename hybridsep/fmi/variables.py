@@ -37,6 +37,7 @@ _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
 _ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
+_RESET = "a rising edge ends a trip; what was learned stays"  # no input: several masters set all inputs by setReal
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
     "input": "Inputs",
@@ -205,7 +206,6 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),
-        Variable("reset", "Boolean", "input", "discrete", "a rising edge ends a trip; what was learned stays", False),
         _position("x_dm", "output", "modified command now; wire it to the drive", initially_from=ahead),
         _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
         _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
@@ -247,6 +247,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         Variable("alarm", "Boolean", "output", "discrete", _ALARM),
         *_look_ahead_parameters(parameters),
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
+        Variable("reset", "Boolean", "parameter", "tunable", _RESET, False, group="Compensation"),
         *_modes(modes),
     ]
 

@@ -100,6 +100,8 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     if learned.keys() != settings.keys() or n_learned != ends[0] or len(body) - start != 8 * ends[-1]:
         raise StateError(_DAMAGED)
     numbers, *factors = np.split(np.frombuffer(body, "<f8", offset=start), ends[:-1])
+    if not all(np.isfinite(one).all() for one in (numbers, *factors)):
+        raise StateError(_DAMAGED)
     regressions = tuple(_regression(one, size) for one, size in zip(factors, sizes, strict=True))
     predictor.take_over(*with_numbers(like, numbers), regressions)
 

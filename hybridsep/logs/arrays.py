@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import LogError, brief, first_line
-from ..base.signals import Array
+from ..base.errors import LogError, SignalError, brief, first_line
+from ..base.signals import Array, Given, check_same_index, given_column, index_values
+from .names import known_names
 from .source import ArraysSource, past_midnights
+from .text import with_own_names
 
 _UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Durations, s, of the units of Arrow's times."""
@@ -46,63 +48,145 @@ def _check(path: Path, name: str, values: NDArray[Any]) -> None:
     if dtype.kind == "c":
         raise LogError(f"{path}: column {brief(name)} must be real, got complex numbers ({dtype})")
     if dtype.kind not in "fiu":
-        hint = "; save (t - t[0]) / numpy.timedelta64(1, 's') in its place" if dtype.kind == "M" else ""
-        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}{hint}")
+        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}")
     if len(shape) != 1 and not (len(shape) == 2 and {0, 1}.intersection(shape)):
         raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
 
 
-class TableSource(ArraysSource):
-    """Columns in memory: a mapping of arrays, or a table with ``columns``, as pandas and polars have it."""
+def _by_columns(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arrays with the columns of a matrix, whose longer side are samples, as ``name[0]``, ``name[1]``."""
+    found: dict[str, Any] = {}
+    for name, values in arrays.items():
+        is_array = (isinstance(values, np.ndarray) and values.dtype.names is None) or hasattr(values, "dims")
+        if is_array and values.ndim == 2 and min(values.shape) > 1:
+            columns = values.T if values.shape[0] >= values.shape[1] else values
+            found |= {f"{name}[{j}]": columns[j] for j in range(len(columns))}
+        else:
+            found[name] = values
+    return found
 
-    format = "columns in memory"
-    endings = ()
 
-    def __init__(self, table: Any) -> None:
-        super().__init__(Path("arrays"))
-        names = getattr(table, "columns", table)
-        self._arrays = {str(name): np.asarray(table[name]) for name in names}
-        self.names = list(self._arrays)
-        self.stamps = frozenset(name for name, values in self._arrays.items() if values.dtype.kind in "Mm")
+class _GivenSource(ArraysSource):
+    """Columns in memory; of times the seconds since the first one."""
 
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return False: it is no file."""
-        return False
+    def __init__(self, path: Path, arrays: Mapping[str, Any]) -> None:
+        super().__init__(path)
+        self._given: dict[str, Given] = {}
+        self._refused: dict[str, LogError] = {}  # said where it is read
+        for name, values in _by_columns(arrays).items():
+            try:
+                if isinstance(values, LogError):
+                    raise values
+                self._given[name] = given_column(values)
+            except LogError as error:
+                self._refused[name] = error
+            except (TypeError, ValueError, OverflowError) as error:
+                self._refused[name] = LogError(f"{path}: column {brief(name)} must be numbers: {first_line(error)}")
+        self.names = [*self._given, *self._refused]
+        self.units = {name: one.unit for name, one in self._given.items() if one.unit}
+        self._find_stamps()
+
+    def _find_stamps(self) -> None:
+        self.stamps = frozenset(name for name, one in self._given.items() if one.values.dtype.kind in "mM")
 
     def column(self, name: str) -> Array:
-        """Return a column's values, of times the seconds since the first one."""
-        values = self._arrays[name]
+        """Return a column's values."""
+        if name in self._refused:
+            raise self._refused[name]
+        values = self._given[name].values
         if name in self.stamps:
             values = (values - values[:1]) / np.timedelta64(1, "s")
         _check(self.path, name, values)
         return values.astype(np.float64).ravel()
 
 
-class NpzSource(ArraysSource):
-    """The arrays of an ``.npz`` file, compressed or not."""
+class TableSource(_GivenSource):
+    """A mapping of arrays, a structured array, or a table of pandas, polars, Arrow or xarray.
+
+    An index of times is the time, unless a column is called so; one of numbers tells where rows are missing.
+    """
+
+    format = "columns in memory"
+    endings = ()
+
+    def __init__(self, table: Any) -> None:
+        if callable(getattr(type(table), "collect", None)):  # polars' LazyFrame
+            table = table.collect()
+        super().__init__(Path("arrays"), _columns_of(table))
+        if hasattr(type(table), "column_names"):  # Arrow
+            self.units = {**self.units, **_field_units(table.schema)}
+            self.twins = with_own_names(table.column_names)[1]
+        try:
+            check_same_index(**self._given)
+        except SignalError as error:
+            raise LogError(f"{self.path}: {error}") from None
+        own = getattr(table, "index", None)
+        index = next((one.index for one in self._given.values() if one.index is not None), own)
+        if index is not None and not callable(index) and not known_names("t", self.names):
+            self._add_time(index)
+
+    def _add_time(self, index: Any) -> None:
+        """Take an index for the time: of times or fractions, called so, or numbers some of which are left out."""
+        name, labels = str(getattr(index, "name", None) or "index"), index_values(index)
+        if getattr(index, "nlevels", 1) > 1:
+            raise LogError(f"{self.path}: an index of several levels is not read; reset_index() makes columns of them")
+        if len(labels) < 2 or name in self.names:
+            return
+        if labels.dtype.kind in "iu" and not known_names("t", [name]):
+            steps = np.diff(labels.astype(np.int64))
+            usual = float(np.median(steps))
+            if usual == 0.0 or (steps == usual).all():
+                return
+            labels = (labels - labels[0]) / usual
+        self._given[name] = Given(labels)
+        self.names, self.roles = [*self.names, name], {"t": name}
+        self._find_stamps()
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return False: it is no file."""
+        return False
+
+
+def _columns_of(table: Any) -> dict[str, Any]:
+    """Return the columns of a table, by name."""
+    if hasattr(type(table), "column_names"):  # Arrow
+        return dict(zip(with_own_names(table.column_names)[0], table.columns, strict=True))
+    fields = getattr(getattr(table, "dtype", None), "names", None)
+    if fields is None and hasattr(type(table), "data_vars"):  # xarray
+        fields = [*table.data_vars, *table.coords]
+    return {str(name): table[name] for name in (fields or getattr(table, "columns", table))}
+
+
+def _field_units(schema: Any) -> dict[str, str]:
+    """Return the units that Arrow's fields state, by their names."""
+    stated = {one.name: next(filter(None, map((one.metadata or {}).get, (b"unit", b"units"))), b"") for one in schema}
+    return {name: unit.decode(errors="replace") for name, unit in stated.items() if unit}
+
+
+class NpzSource(_GivenSource):
+    """The arrays of an ``.npz`` file, compressed or not; a column of a matrix is ``name[0]``."""
 
     format = "NumPy .npz"
     endings = (".npz",)
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
+        arrays: dict[str, Any] = {}
         with _reading(path, "an .npz file"), path.open("rb") as file, np.load(file) as archive:
-            self.names = list(archive.files)
+            for name in archive.files:
+                try:
+                    with _reading(path, "an array", f"column {brief(name)}"):
+                        arrays[name] = archive[name]
+                except LogError as error:
+                    arrays[name] = error
+        super().__init__(path, arrays)
+        self.names += [name for i, name in enumerate(archive.files) if name in archive.files[:i]]
 
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is a zip archive whose first member is an array, as far as that can be seen."""
         name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
         return head.startswith(b"PK\x03\x04") and name.endswith(b".npy")
-
-    def column(self, name: str) -> Array:
-        """Return an array's values."""
-        what = f"column {brief(name)}"
-        with _reading(self.path, "an array", what), self.path.open("rb") as file, np.load(file) as archive:
-            values = archive[name]
-        _check(self.path, name, values)
-        return np.asarray(values, dtype=np.float64).ravel()
 
 
 class MatSource(ArraysSource):
@@ -121,7 +205,7 @@ class MatSource(ArraysSource):
         with _reading(path, "a MATLAB file"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of names that occur twice: the last one counts, as in MATLAB
             variables = [item for item in io.loadmat(path).items() if not item[0].startswith("__")]
-            self._variables = {name: value for one in variables for name, value in _fields(*one)}
+            self._variables = _by_columns({name: value for one in variables for name, value in _fields(*one)})
         self.names = list(self._variables)
 
     @staticmethod
@@ -171,12 +255,11 @@ class ParquetSource(ArraysSource):
             ) from error
         with _reading(path, "a Parquet file"), self._parquet.ParquetFile(path) as file:
             schema = self._flat(file.schema_arrow.empty_table()).schema
-        types, key = self._arrow.types, (b"unit", b"units")
+        types = self._arrow.types
         temporal = (types.is_timestamp, types.is_time, types.is_duration)
         self.names = list(schema.names)
         self.stamps = frozenset(field.name for field in schema if any(is_one(field.type) for is_one in temporal))
-        stated = {field.name: next(filter(None, map((field.metadata or {}).get, key)), b"") for field in schema}
-        self.units = {name: unit.decode(errors="replace") for name, unit in stated.items() if unit}
+        self.units = _field_units(schema)
 
     @staticmethod
     def recognises(head: bytes) -> bool:

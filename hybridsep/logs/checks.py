@@ -373,7 +373,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
     picture = _over_time(log, "Command and measurement")
-    if found.lag * log.T_s > _LATE:
+    if found.lag * log.T_s > _LATE and found.lag < 1.5 * found.lag_of_one:  # noise spreads a mixture over lags
         words = (
             f"the measured position lags its command by {found.lag:.3g} samples ({found.lag * log.T_s:.3g} s), drive, "
             "dead time and recorder together"

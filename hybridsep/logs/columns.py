@@ -123,8 +123,9 @@ def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tu
 
 def _of_axis(source: Source, axes: Mapping[str, tuple[str, str]], axis: str) -> tuple[str, str]:
     """Return the positions of an axis by its name in any case, the end of it, or its number in the columns' names."""
+    axis = str(axis)
     for name, pair in axes.items():
-        ends = (re.split(r"[._ ]", name)[-1], pair[0].partition("|")[2])
+        ends = (re.split(r"[._ /]", name)[-1], pair[0].partition("|")[2])
         if axis.lower() in (name.lower(), *(end.lower() for end in ends if end)):
             return pair
     there = f"there are {listed(list(axes), str)}" if axes else "no names tell axes: name the columns, --x_d and --x"

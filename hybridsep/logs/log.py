@@ -36,7 +36,7 @@ class Table(Protocol):
         """Return a column, of which NumPy makes an array."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Log:
     """A recorded log.
 
@@ -121,7 +121,9 @@ def read_log(
     ----------
     recording : str, Path, mapping or table
         A file in a format of :mod:`hybridsep.logs.formats`; what it is, its content tells. Or columns in memory:
-        ``{"x_d": x_d, "x": x}``, or a table such as pandas' DataFrame.
+        ``{"x_d": x_d, "x": x}``, a structured array, or a table of pandas, polars, Arrow or xarray. What is masked,
+        None or NA is missing; an index of times is the time, and one of numbers tells which rows were left out; a
+        quantity has its unit.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
@@ -135,7 +137,7 @@ def read_log(
         Sampling interval, s; needed if the file has no time column, or one that counts samples, is rounded too
         coarsely or in an unknown unit; otherwise it is checked against the times.
     axis : str, optional
-        Axis of a file that holds several, such as ``"X1"``.
+        Axis of a file that holds several, such as ``"X1"``; of a matrix the column, ``"0"``.
     delay : int
         Samples by which the measured position is recorded too late, negative: too early; it is shifted back.
     resample : bool
@@ -197,11 +199,20 @@ def read_log(
     )
 
 
+def is_table(given: Any) -> bool:
+    """Return whether it is a mapping of columns, or a table of pandas, polars, Arrow, xarray or NumPy's fields."""
+    marks = ("collect", "columns", "column_names", "data_vars")  # in order: polars warns of a LazyFrame's columns
+    fields = getattr(getattr(given, "dtype", None), "names", None)
+    return not isinstance(given, Log) and (
+        isinstance(given, Mapping) or bool(fields) or any(hasattr(given, mark) for mark in marks)
+    )
+
+
 def _opened(recording: Any) -> Source:
     """Return the columns of a file, or of what is in memory."""
     if isinstance(recording, str | Path):
         return open_source(Path(recording))
-    if isinstance(recording, Mapping) or hasattr(recording, "columns"):
+    if is_table(recording):
         return TableSource(recording)
     raise LogError(f"a log is a file, a mapping of columns or a table, got {type(recording).__name__}; x beside x_d?")
 
@@ -275,7 +286,7 @@ def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
 
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
-    if unit is not None and position_unit(unit) is None:
+    if unit is not None and (not isinstance(unit, str) or position_unit(unit) is None):
         raise LogError(
             f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
         )

@@ -23,27 +23,29 @@ its deviation from the contour."""
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
     "x_d": (
-        "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
-        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos", "des_pos",
-        "q_d", "sollposition", "lagesollwert",
+        "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "set_point", "command",
+        "commanded", "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos",
+        "des_pos", "q_d", "sollposition", "lagesollwert",
     ),
     "x": (
         "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
         "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
-        "istposition", "lageistwert",
+        "process_value", "istposition", "lageistwert",
     ),
 }  # fmt: skip
 """Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
 
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "des", "desired", "target"}
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder"}
-_POSITION = {"pos", "position"}
+_POSITION = {"pos", "position", "positions"}
 """Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
-_AXIS = re.compile(r"[xyzabcq]?\d*", re.IGNORECASE)
-"""Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity."""
+_AXIS = re.compile(r"[xyzabcq]?_?\d*", re.IGNORECASE)
+_COLUMN = re.compile(r"\[(\d+)\]$")
+"""Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's
+first column."""
 
 
 def known_names(role: str, names: Sequence[str]) -> list[str]:
@@ -67,6 +69,11 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
     whole: dict[str, list[str]] = {"x_d": [], "x": []}
     for name in names:
+        if column := _COLUMN.search(stated_unit(name)[0]):  # of a matrix that is called x_d
+            known = [_spelling(name[: column.start()]) in _NAMES[role] for role in ("x_d", "x")]
+            if any(known):
+                (commanded if known[0] else measured).setdefault(column[1], name)
+                continue
         words = [token.lower() for token in _tokens(name)]
         axis = _axis(name)
         is_position = any(word in _POSITION for word in words)
@@ -89,8 +96,8 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:
     """Return the columns of :data:`SIGNALS` of the axis of a measured position: ``CTRL_DIFF|1`` of ``ENC_POS|1``."""
     _, mark, axis = stated_unit(measured)[0].partition("|")
-    plain = {stated_unit(name)[0]: name for name in names}
-    return {what: plain[own] for what, word in SIGNALS.items() if (own := f"{word}{mark}{axis}") in plain}
+    plain = {stated_unit(name)[0].upper(): name for name in names}
+    return {what: plain[own] for what, word in SIGNALS.items() if (own := f"{word}{mark}{axis}".upper()) in plain}
 
 
 def _axis(name: str) -> str:
@@ -106,7 +113,7 @@ def _axis(name: str) -> str:
 
 def _tokens(name: str) -> list[str]:
     """Return words, numbers and signs of a name without its unit; ``_`` is a blank, ``XPOS`` two words."""
-    return _TOKEN.findall(_POS.sub(r" \1", stated_unit(name)[0].replace("_", " ")))
+    return _TOKEN.findall(_POS.sub(r" \1", _COLUMN.sub(r" \1", stated_unit(name)[0]).replace("_", " ")))
 
 
 def _spelling(name: str) -> str:

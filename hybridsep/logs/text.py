@@ -51,6 +51,9 @@ _BLANK = -math.inf
 _MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|null|none", re.IGNORECASE)
 """Spellings of a missing number: of C libraries, R, databases and Excel."""
 
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
+_NOT_THOUSANDS = re.compile(r",(?!\d{3}(?!\d))")
+
 _GZIP = b"\x1f\x8b"
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
@@ -63,7 +66,7 @@ class _Table:
     names: list[str]  # column names, one empty where rows have names of their own
     units: dict[str, str]  # name → unit, from a row of units below the names
     delimiter: str | None  # between columns; None is blanks
-    decimal_comma: bool  # whether numbers have a decimal comma
+    comma: str | None  # what a comma in a number stands for: ".", nothing between thousands; None where it is an error
     header: int  # line number of the names, from 1
     first: int  # line number from which numbers are read
     clocks: set[int]  # indices of columns of timestamps with a time of day
@@ -178,10 +181,12 @@ class TextSource(Source):
     def _rows(self, numbered: list[tuple[int, str]], use: list[int]) -> Array:
         """Return the columns ``use`` of some lines, ``(n_lines, n_use)``, timestamps as times of day, ns."""
         mark, expected = self._table.delimiter, len(self._table.names)
-        lines = [decimal_points(text) if self._table.decimal_comma else text for _, text in numbered]
+        comma = self._table.comma if mark != "," else None
+        whole = comma is not None and not (comma == "" and any(_NOT_THOUSANDS.search(text) for _, text in numbered))
+        lines = [text.replace(",", comma or "") if whole else text for _, text in numbered]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
         if min(widths) != expected or max(widths) != expected:
-            for (number, _), text in zip(numbered, lines, strict=True):
+            for number, text in numbered:
                 fields = split(text.strip(" \r\n"), mark)  # without delimiters between quotation marks
                 if len(fields) < expected or any(fields[expected:]):
                     self._row(text, number, use)  # a decimal comma is the likelier fault
@@ -194,7 +199,7 @@ class TextSource(Source):
             how: Any = {"converters": stamps, "comments": None, "quotechar": '"', "ndmin": 2, "encoding": None}
             return np.loadtxt(lines, np.float64, delimiter=mark, usecols=use, **how)
         except ValueError:  # what is no number, or one that only Python's float() accepts
-            return np.array([self._row(text, number, use) for (number, _), text in zip(numbered, lines, strict=True)])
+            return np.array([self._row(text, number, use) for number, text in numbered])
 
     def _row(self, text: str, number: int, use: list[int]) -> list[float]:
         """Return the numbers of one line in the columns ``use``, as far as it has them."""
@@ -213,7 +218,7 @@ class TextSource(Source):
                 elif not field and name == self.commanded:
                     row.append(_BLANK)
                 else:
-                    row.append(_number(decimal_points(field)))
+                    row.append(self._number(field))
             except ValueError:
                 stamp = i in self._table.clocks
                 what = "a time of day such as 10:20:30.001 (up to 9 decimals)" if stamp else "a number"
@@ -222,6 +227,13 @@ class TextSource(Source):
                     f"{brief(field) if field else 'nothing'}{'' if stamp else _hint(field)}"
                 ) from None
         return row
+
+    def _number(self, field: str) -> float:
+        """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
+        comma = self._table.comma
+        if "," in field and (comma is None or (comma == "" and not _THOUSANDS.fullmatch(field))):
+            raise ValueError(field)
+        return _number(field.replace(",", comma or ""))
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
@@ -313,8 +325,8 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    numbers = sum(is_number(decimal_points(text)) for text in fields)
-    others = [text for text in fields if text and not is_number(decimal_points(text)) and not _MISSING.fullmatch(text)]
+    numbers = sum(map(_is_written, fields))
+    others = [text for text in fields if text and not _is_written(text) and not _MISSING.fullmatch(text)]
     return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
 
 
@@ -347,10 +359,24 @@ def _with_names(
     has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
     header, names = _best_names(above[has_units:])
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
-    comma = delimiter != "," and any("," in text for row in fields for text in row if is_number(decimal_points(text)))
+    written = [text for row in fields for text, kind in zip(row, kinds, strict=False) if not kind and _is_written(text)]
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, delimiter, comma, header, rows[start][0], clocks)
+    return _Table(names, stated, delimiter, _comma(written), header, rows[start][0], clocks)
+
+
+def _is_written(text: str) -> bool:
+    """Return whether a field is a number, with a decimal comma or commas between thousands too."""
+    return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
+
+
+def _comma(numbers: Sequence[str]) -> str | None:
+    """Return what a comma in numbers as they are written stands for."""
+    commas = [text for text in numbers if "," in text]
+    points = any("." in text for text in numbers)
+    if commas and all(map(_THOUSANDS.fullmatch, commas)) and (points or any(text.count(",") > 1 for text in commas)):
+        return ""
+    return None if points else "."
 
 
 def _best_names(above: Sequence[tuple[int, list[str]]]) -> tuple[int, list[str]]:
@@ -380,7 +406,7 @@ def _only_names(lines: Sequence[tuple[int, str]]) -> _Table | None:
         return None
     number, line = known[0]
     delimiter = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, delimiter), {}, delimiter, False, number, number + 1, set())
+    return _Table(_names(line, delimiter), {}, delimiter, ".", number, number + 1, set())
 
 
 def _names(line: str, delimiter: str | None) -> list[str]:

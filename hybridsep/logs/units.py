@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+from ..base.errors import SignalError, brief
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,6 @@ _SPELLINGS = {
     "metre": "m",
     "meters": "m",
     "metres": "m",
-    "millimeter": "mm",
-    "millimetre": "mm",
     "micron": "um",
     "microns": "um",
     "inch": "in",
@@ -103,15 +103,21 @@ _SPELLINGS = {
     "msec": "ms",
     "usec": "us",
 }
+_SPELLINGS |= {
+    f"{prefix}{word}": f"{short}{unit}"
+    for prefix, short in (("milli", "m"), ("micro", "u"), ("nano", "n"))
+    for word, unit in _SPELLINGS.items()
+    if unit in ("m", "s", "rad") and len(word) > 3
+}
 """Other spellings, in small letters, of the units' names; µ is u."""
 
 _SUFFIXES = ("mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns")
-"""Units that end a name after an underscore or a blank; m is none, as ``x_m`` is rather the measured position."""
+"""Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
 _MULTIPLE = re.compile(r"^\s*(?P<times>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+)\s*$")
-_SUFFIX = re.compile(r"^(?P<name>.*?[^_\s])[_\s](?P<unit>[^_\s]+)$")
+_SUFFIX = re.compile(r"^(?P<name>.*?[^_\s,])(?:_|\s*,\s*)(?P<unit>[^_\s,]+)$")
 
 
 def plain_name(text: str) -> str:
@@ -130,6 +136,18 @@ def position_unit(text: str) -> Unit | None:
     return Unit(f"{times:g} {unit.name}", unit.si, times * unit.factor) if unit is not None and known else None
 
 
+def si_factor(own: str) -> Callable[[str], float]:
+    """Return the function that gives the factor to SI of a unit, ``own`` where it is empty; SignalError of others."""
+
+    def factor(stated: str) -> float:
+        unit, usual = position_unit(stated or own), position_unit(own)
+        if unit is None or usual is None or unit.si != usual.si:
+            raise SignalError(f"positions must be in {own} or a unit of its kind, got {brief(stated)}")
+        return unit.factor
+
+    return factor
+
+
 def time_unit(text: str) -> Unit | None:
     """Return the unit of a time of that spelling, None if there is none."""
     return TIME_UNITS.get(plain_name(text))
@@ -138,12 +156,15 @@ def time_unit(text: str) -> Unit | None:
 def stated_unit(name: str) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit as it is written, empty if it states none.
 
-    ``x [mm]``, ``x (mm)``, ``x / mm``, ``x in mm``, ``x_mm`` and ``x mm`` are ``("x", "mm")``. In square brackets any
-    text is a unit, and anywhere a known one divided by another, as in ``v (mm/s)``; otherwise only a known one.
+    ``x [mm]``, ``x (mm)``, ``x / mm``, ``x in mm``, ``x, mm`` and ``x_mm`` are ``("x", "mm")``. In square brackets any
+    text is a unit, but for the number of a matrix's column, ``q[0]``, and anywhere a known one divided by another, as
+    in ``v (mm/s)``; otherwise only a known one.
     """
     brackets = _BRACKETS.match(name)
     if brackets:
         square, text = brackets["square"], brackets["square"] or brackets["round"] or ""
+        if (square or "").isdigit() and name[len(brackets["name"])] == "[":
+            return name, ""
         if text.strip() in ("", "-", "1"):
             return brackets["name"], ""
         if square is not None or _is_unit(text.split("/")[0]):

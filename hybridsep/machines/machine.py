@@ -358,9 +358,9 @@ def machine_name(path: Path, axis: str | None = None) -> str:
 
 def checked_name(name: str) -> str:
     """Return a machine's name; ParameterError if it cannot be one."""
-    if re.fullmatch(NAME_PATTERN, name):
+    if isinstance(name, str) and re.fullmatch(NAME_PATTERN, name):
         return name
-    raise ParameterError(f"--name must be a letter, then at most 99 letters, digits and _, got {name!r}")
+    raise ParameterError(f"name (--name) must be a letter, then at most 99 letters, digits and _, got {brief(name)}")
 
 
 PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {

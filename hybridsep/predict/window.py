@@ -50,7 +50,7 @@ class Forecast:
     scales: FeatureScales | None  # with averaging
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prediction:
     """Prediction of one window."""
 

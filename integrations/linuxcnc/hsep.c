@@ -106,7 +106,7 @@ typedef struct {
     int faulty;     /* whether it has refused a sample: it does not begin until reset or inactive */
     int held;       /* whether the command is no position, so that the last one is held */
     int said;       /* whether that was said */
-    int was_reset;
+    int was_reset, was_active;
 } axis_data;
 
 static const hsep_fmi_names axis_words = {
@@ -321,7 +321,7 @@ static void axis_write(axis_data *self, double delayed, int state)
     *pins->error = self->runs ? scale * *axis_value(self, HSEP_VR_e_servo) : 0.0;
     *pins->std_dev = self->runs ? scale * *axis_value(self, HSEP_VR_x_h_std) : 0.0;
     /* The joint judges feedback against the command now: shifted by the look-ahead, what it sees is delayed - fb. */
-    *pins->fb_joint = scale * (self->measured + origin + (state == AXIS_INACTIVE ? 0.0 : self->command - delayed));
+    *pins->fb_joint = scale * (self->measured + origin + (*pins->active ? self->command - delayed : 0.0));
     *pins->state = state;
     pins->rejected = (hal_u32_t)*axis_value(self, HSEP_VR_n_rejected);
 }
@@ -334,11 +334,19 @@ static int axis_meet(axis_data *self)
     const int is_first = self->still == 0;
     self->begun = axis_is_position(self, "cmd", command);
     self->command = self->begun ? command : 0.0;
-    self->measured = axis_is_position(self, "fb", feedback) ? feedback : self->command;
+    self->missing = !axis_is_position(self, "fb", feedback);
+    self->measured = self->missing ? self->command : feedback;
     self->feedback[0] = self->feedback[1] = self->measured;
     axis_rest(self);
     self->out = is_first ? self->command : out;
     return self->begun;
+}
+
+/* Let out be the feedback of an axis that is not driven, and where it is missing the command: no position that is old. */
+static void axis_wait(axis_data *self, double delayed)
+{
+    axis_change(self, (self->missing > 0 ? self->command : self->measured) - delayed);
+    axis_write(self, delayed, self->missing > 0 ? AXIS_NO_MEASUREMENT : AXIS_INACTIVE);
 }
 
 /* The function of one axis, in a thread. */
@@ -354,18 +362,16 @@ static void axis_step(void *data, long period)
         self->scale = pins->scale; /* in motion, another one would be a step */
     }
     if (!self->begun && !axis_meet(self)) {
-        axis_change(self, self->measured - self->command);
-        axis_write(self, self->command, AXIS_INACTIVE);
+        axis_wait(self, self->command);
         return;
     }
     if (!*pins->active) {
-        self->runs = self->ending = self->faulty = self->said = 0;
-        const double delayed = axis_take_in(self);
-        axis_change(self, self->measured - delayed);
-        axis_write(self, delayed, AXIS_INACTIVE);
+        self->runs = self->ending = self->faulty = self->said = self->was_active = 0;
+        axis_wait(self, axis_take_in(self));
         return;
     }
-    const int was_inactive = *pins->state == AXIS_INACTIVE;
+    const int was_inactive = !self->was_active;
+    self->was_active = 1;
     if (was_inactive) {
         axis_activate(self);
     }

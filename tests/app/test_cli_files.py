@@ -211,7 +211,7 @@ REFUSED = [
         "has an effect with averaging only: set",
     ),
     ("tune {log} {m} --out x.csv", "--out must end in .toml, got 'x.csv'"),
-    ("fit {log} --out {folder} --name no-name", "--name must be"),
+    ("fit {log} --out {folder} --name no-name", "name (--name) must be"),
     ("fit {log} --out {log}/deeper", "log.csv is a file, not a folder; choose another"),
 ]
 

@@ -76,7 +76,6 @@ def test_the_physics_model_is_judged_with_its_offset(
     found = json.loads((tmp_path / "fit" / "fit.json").read_text())
     assert found["judged"]["rms_pb"] < 2e-6
     assert found["identification"]["offset"] == pytest.approx(40e-6, rel=0.05)
-    assert max(one["rms_pb"] for one in found["windows"]) < 2e-6
     assert "judged with the offset" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
 
 

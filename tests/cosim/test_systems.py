@@ -66,8 +66,7 @@ def test_the_structure_is_that_of_the_fmus(archive: Path, tmp_path: Path) -> Non
             assert connector.get("kind") == variables[name].causality
             assert connector[0].tag.rpartition("}")[2] == variables[name].type
             assert connector[0].get("unit") == variables[name].unit
-            operators = name == "reset"  # whoever runs the drive resets it
-            assert operators or variables[name].causality == "output" or (component.get("name"), name) in wired
+            assert variables[name].causality == "output" or (component.get("name"), name) in wired
         (binding,) = component.iter(f"{SSD}ParameterBinding")
         given = etree.fromstring(files[binding.get("source")]).iter(f"{SSV}Parameter")
         parameters = {parameter.get("name"): parameter[0] for parameter in given}

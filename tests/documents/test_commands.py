@@ -14,7 +14,7 @@ import pytest
 from built_once import built_once
 from command_line import Run, run_line
 from places import ROOT
-from quick_fits import without_larger_structures, without_other_settings, without_other_windows
+from quick_fits import without_larger_structures, without_other_settings
 
 from benchmarks.pictures import RECORD, judged_figures
 from hybridsep import staircase
@@ -89,7 +89,6 @@ def test_fmpy_gets_the_communication_step_size() -> None:
 def test_a_page_runs_behind_the_readmes_fit(
     page: Path, whole: bool, hybridsep: Run, tmp_path: Path, session_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    without_other_windows(monkeypatch)
     if not whole:
         without_larger_structures(monkeypatch)
         without_other_settings(monkeypatch)

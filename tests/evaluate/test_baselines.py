@@ -118,7 +118,8 @@ def test_a_lag_needs_motion_to_be_fitted_to() -> None:
     x_d, x = axis()
     x_d[:300] = x_d[300]
     found = predict_peers([Piece(x_d, x, 300, 300)], NP)
-    assert {one.title for one in found} == {f"ARX{n} ({way})" for n in (20, 40) for way in (FROZEN, REFITTED)}
+    arx = {f"ARX{n} ({way})" for n in (20, 40) for way in (FROZEN, REFITTED)}
+    assert {one.title for one in found} == {*arx, "N4SID"}
 
 
 def test_a_lag_is_found_and_its_last_measured_residual_held() -> None:
@@ -133,3 +134,19 @@ def test_a_lag_is_found_and_its_last_measured_residual_held() -> None:
     x_lag = lag.position(x_d)
     np.testing.assert_allclose(held[1200:1300], x_lag[1200:1300] + (x - x_lag)[1189], rtol=0, atol=1e-15)
     np.testing.assert_allclose(held[1300:1400], x_lag[1300:1400] + (x - x_lag)[1299], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("missing", [(), range(1290, 1312)])
+@pytest.mark.parametrize("delay", [0, 3])
+def test_a_state_space_model_is_found_with_its_filter(missing: range, delay: int) -> None:
+    """Of an axis of second order with an offset and coloured noise: no worse than a long ARX, which is refitted."""
+    rng = np.random.default_rng(3)
+    x_d, x = axis(3000)
+    x = x + 1e-3 + lfilter([1.0], [1.0, -0.9], rng.normal(0.0, 2e-6, len(x)))
+    x = np.concatenate((np.full(delay, x[0]), x[: len(x) - delay]))
+    x[list(missing)] = np.nan
+    found = predict_peers([Piece(x_d, x, 1500, 1500)], NP, delay=delay)
+    errors = {one.title: np.sqrt(np.nanmean((one.predictions[0] - x)[1500:] ** 2)) for one in found}
+    assert errors["N4SID"] < 1.02 * errors["ARX40 (refitted)"]
+    assert errors["N4SID"] < 0.5 * errors["lag + hold"]
+    assert delay or np.isnan(peer(found, "N4SID", "").predictions[0][:1500]).all()

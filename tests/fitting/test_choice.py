@@ -1,4 +1,4 @@
-"""Choice of settings: what is tried, what is chosen, and the error over other windows."""
+"""Choice of settings: what is tried, what is chosen."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.fitting.choice import choose_settings, settings_to_try, window_scores, with_window
+from hybridsep.fitting.choice import choose_settings, settings_to_try, with_window
 from hybridsep.fitting.replay import Recording, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
@@ -62,13 +62,3 @@ def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     assert chosen == candidates[tried.index(best)]
     spoiled = [replace(recordings[0], x=np.concatenate((recordings[0].x[:400], np.zeros(400))))]
     assert choose_settings(MODEL, spoiled, settings)[0] == chosen
-
-
-@pytest.mark.slow
-def test_errors_over_the_window() -> None:
-    recordings, settings = ringing(), with_window(PredictorSettings(), 40)
-    judged = replay(HybridPredictor(MODEL, settings), recordings)
-    scores = window_scores(MODEL, recordings, settings)
-    assert [one.Np for one in scores] == [8, 20, 40, 80]
-    assert [scores[2].rms_pb, scores[2].rms_hold, scores[2].rms_h] == judged.rms()
-    assert scores[0].rms_hold < scores[2].rms_hold

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from command_line import write_rows
-from quick_fits import without_larger_structures, without_other_settings, without_other_windows
+from quick_fits import without_larger_structures, without_other_settings
 from staircase_data import commanded, measured
 
 import hybridsep
@@ -19,6 +20,10 @@ from hybridsep.fitting.fit import Fit
 N, NP = 1200, 40
 PART = np.r_[:600, 999:1599]  # moves in each half, between them at rest
 X_D, X = commanded()[PART], measured(0)[PART]
+
+
+def cut(first: int, every: int) -> dict[str, Any]:
+    return {name: np.delete(values, np.arange(first, N, every)) for name, values in (("x_d", X_D), ("x", X))}
 
 
 class Frame:
@@ -36,7 +41,6 @@ class Frame:
 def axis() -> Fit:
     with pytest.MonkeyPatch.context() as patch:
         without_larger_structures(patch)
-        without_other_windows(patch)
         without_other_settings(patch)
         return hybridsep.fit(1e3 * X_D, 1e3 * X, T_s=1e-3, unit="mm", Np=NP)
 
@@ -60,15 +64,23 @@ def test_arrays_a_table_and_a_file_are_one_log(axis: Fit, tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_what_is_returned_predicts_compensates_and_shows_itself(axis: Fit, tmp_path: Path) -> None:
     rms_pb, _, rms_h = axis.judged.replay.rms()
-    assert repr(axis) == f"Fit(axis: Np = {NP}, hybrid {1e6 * rms_h:.3g} µm RMS, {axis.judged.replay.best().name} " + (
+    assert repr(
+        axis
+    ) == f"Fit(axis: Np = {NP}, positions in mm, hybrid {1e6 * rms_h:.3g} µm RMS, {axis.judged.replay.best().name} " + (
         f"{1e6 * axis.judged.replay.best().rms:.3g} µm)"
     )
     shown = unescape(axis._repr_html_())
     assert axis.advice in shown
     assert f"<td>physics model, RMS [µm]</td><td>{1e6 * rms_pb:.4g}</td>" in shown
     assert [line.get_label() for line in axis.plot().axes[0].get_lines()] == ["physics model", "hold", "hybrid"]
-    window = axis.predict(X_D[:NP])
-    np.testing.assert_array_equal(window.x_h, axis.predictor().predict(X_D[:NP]).x_h)
+    assert axis.unit == "mm"  # as what it was given
+    window, in_m = axis.predict(1e3 * X_D[:NP]), axis.predictor().predict(X_D[:NP])
+    for name in ("x_h", "x_pb", "e_h", "x_h_std"):
+        np.testing.assert_allclose(getattr(window, name), 1e3 * getattr(in_m, name), rtol=1e-12, atol=1e-12)
+    of_metres = axis.predict(SimpleNamespace(magnitude=X_D[:NP], units="meter"))
+    np.testing.assert_allclose(of_metres.x_h, window.x_h, rtol=1e-12)
+    with pytest.raises(SignalError, match="positions must be in mm or a unit of its kind, got 'deg'"):
+        axis.predict(SimpleNamespace(magnitude=X_D[:NP], units="deg"))
     [log] = axis.logs
     again = hybridsep.backtest(axis.predictor(), log)
     assert again.overall == hybridsep.backtest(axis.predictor(), log.x_d, log.x_meas).overall
@@ -79,8 +91,18 @@ def test_what_is_returned_predicts_compensates_and_shows_itself(axis: Fit, tmp_p
     assert axis.advice in unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
 
 
-def test_what_cannot_be_is_refused(axis: Fit) -> None:
+def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
     [log] = axis.logs
+    assert axis == axis
+    assert log != hybridsep.read_log({"x_d": X_D, "x": X}, T_s=1e-3)
+    with pytest.raises(IsADirectoryError, match="report's path must be a file"):
+        axis.report(tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(NotADirectoryError, match="out must be a folder"):
+        axis.build(tmp_path / "file")
+    pieces = hybridsep.read_log({"t": np.delete(1e-3 * np.arange(N), np.arange(7, N, 20)), **cut(7, 20)})
+    with pytest.raises(ParameterError, match=r"a smaller Np, or read the log with resample=True .* into 61 pieces"):
+        hybridsep.fit(pieces, Np=NP)
     with pytest.raises(LogError, match=r"a log is a file, a mapping of columns or a table, got ndarray; x beside x_d"):
         hybridsep.fit(X_D, T_s=1e-3)
     with pytest.raises(LogError, match=r"arrays: column 'x' .* T_s \(--T_s\)|columns? 't'"):

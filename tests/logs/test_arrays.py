@@ -54,10 +54,21 @@ def test_damaged_headers_of_npz(tmp_path: Path, header: str, message: str) -> No
     assert len(str(caught.value)) < 400
 
 
-def test_datetimes_of_numpy(tmp_path: Path) -> None:
-    path = write(tmp_path / "log.npz", columns() | {"t": np.datetime64("2026-03-05T10:20:30", "ns") + np.arange(50)})
-    with pytest.raises(LogError, match=r"column 't' must be numbers, got datetime64\[ns\]; save \(t - t\[0\]\)"):
-        read_log(path)
+@pytest.mark.parametrize("start", [np.datetime64("2026-03-05T10:20:30", "ns"), np.timedelta64(5, "ms")])
+def test_times_of_numpy(tmp_path: Path, start: np.datetime64) -> None:
+    path = write(tmp_path / "log.npz", columns() | {"t": start + 2 * np.arange(50).astype("m8[ms]")})
+    assert read_log(path).T_s == 2e-3
+    with pytest.raises(LogError, match=r"T_s = 0\.001 s was given, but column 't' has an interval of 0\.002 s"):
+        read_log(path, T_s=1e-3)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+def test_columns_of_matrices(tmp_path: Path, suffix: str) -> None:
+    both = {"q_cmd": np.stack([X_D, 2 * X_D], axis=1), "q_act": np.stack([X, 2 * X])}
+    path = write(tmp_path / f"log{suffix}", {"t": DATA["t"], **both})
+    np.testing.assert_array_equal(read_log(path, axis="1").x_meas, 2 * X)
+    named = read_log(path, columns={"x_d": "q_cmd[1]", "x": "q_act[0]"})
+    np.testing.assert_array_equal((named.x_d, named.x_meas), (2 * X_D, X))
 
 
 def test_damaged_members_of_an_npz(tmp_path: Path) -> None:
@@ -121,7 +132,8 @@ def test_mat_that_is_not_a_plain_matrix(tmp_path: Path, value: object, message: 
         ({"x": np.full(50, np.nan)}, r"the measured position is missing \(NaN\) in all 50 samples; name its column"),
         ({"x": np.zeros(49)}, r"same number of samples, got: .*'x_d' has 50, 'x' has 49"),
         ({"x": np.zeros(50) * 1j}, r"column 'x' must be real, got complex numbers \(complex128\)"),
-        ({"x": np.zeros((25, 2))}, r"column 'x' must have shape \(n,\), \(n, 1\) or \(1, n\), got \(25, 2\)"),
+        ({"x": np.zeros((25, 2))}, r"column 'x' is missing, the file has 't', 'x_d', 'x\[0\]', 'x\[1\]'"),
+        ({"x": np.zeros((25, 1, 2))}, r"column 'x' must have shape \(n,\), \(n, 1\) or \(1, n\), got \(25, 1, 2\)"),
         ({"x": np.array(["a"] * 50)}, r"column 'x' must be numbers, got <U1"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -199,3 +200,26 @@ def test_axes_of_a_text(tmp_path: Path, names: str, axes: list[str]) -> None:
 def test_the_other_position_of_a_named_one(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_cmd,x_act,y_cmd,y_act\n0,1,2,3,4\n1,1,2,3,4\n")
     assert read_log(path, columns={"x_d": "y_cmd"}).x_meas.tolist() == [4.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "right"),
+    [
+        ("0.000;120,000;119,999\n0.001;120,001;120,000\n", [120.0, 120.001]),
+        ("0.000;0;1\n0.001;1,200;1,201\n", [0.0, 1.2]),
+        ("0.000;1,000,000.5;1,000,000\n0.001;1,000,001.5;1,000,000\n", [1000.0005, 1000.0015]),
+        ("0,000;120,000;119,999\n0,001;120,001;120,000\n", [0.12, 0.120001]),
+        ("0.000;1;1\n0.001;1,20;1,201\n", r"line 3: column 'x_d \[um\]' must be a number, got '1,20'; .* of thousands"),
+        ("".join(f"{k / 1000:.3f};{k:,};{k:,}\n" for k in range(1010)), "line 1002: .* must be a number, got '1,000'"),
+    ],
+)
+def test_points_and_commas(tmp_path: Path, rows: str, right: Any) -> None:
+    """A file with both has thousands, or is refused."""
+    path = write_csv(tmp_path / "log.csv", f"t [s];x_d [um];x [um]\n{rows}")
+    if isinstance(right, str):
+        with pytest.raises(LogError, match=right):
+            read_log(path)
+    else:
+        np.testing.assert_allclose(read_log(path).x_d, 1e-3 * np.array(right), rtol=1e-12)
+    quoted = write_csv(tmp_path / "quoted.csv", 't [s],x_d [um],x [um]\n0.000,"120,000",5\n0.001,"120,001",5\n')
+    np.testing.assert_allclose(read_log(quoted).x_d, [0.12, 0.120001], rtol=1e-12)

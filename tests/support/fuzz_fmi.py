@@ -192,16 +192,17 @@ class Fuzzer:
             odd = self._chance(0.05)
             for name in names:
                 value = self._number() if odd else self.random.gauss(0, 1e-2)
-                self.library.set(instance, name, value > 0.0 if name == "reset" else value)
+                self.library.set(instance, name, value)
+            if "reset" in self.library.causalities and self._chance(0.2):
+                self.library.set(instance, "reset", self._chance(0.5))
             t = self.times[instance]
             usual = self.random.choice([1e-3, 1e-3, 3e-4, 8e-3, self.random.uniform(0.0, 0.05)])
             h = self.random.choice([1e-7, 0.0, -1e-3, 1.3, self._number()]) if odd else usual
             if not self.is_3 and self._chance(0.1):
-                sloping = [name for name in names if odd or name != "reset"]
-                n = len(sloping)
-                references = (c_uint * n)(*(self.library.references[name] for name in sloping))
-                orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in sloping))
-                slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in sloping))
+                n = len(names)
+                references = (c_uint * n)(*(self.library.references[name] for name in names))
+                orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in names))
+                slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in names))
                 self._call("SetRealInputDerivatives", instance, references, n, orders, slopes)
             before, at = self._reals(instance), self._number() if self._chance(0.02) else t
             self.library.messages.clear()

@@ -14,11 +14,6 @@ def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("hybridsep.identify.operation.STRUCTURES", small)
 
 
-def without_other_windows(patch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` judge the controller's look-ahead alone, none that are shorter or longer: a third of its time."""
-    patch.setattr("hybridsep.fitting.choice._WINDOWS", (1.0,))
-
-
 def without_python_fmus(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` write the native FMUs alone: a tenth of its time."""
     patch.setattr("hybridsep.fitting.build.FLAVOURS", FLAVOURS[:1])

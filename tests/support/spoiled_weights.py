@@ -50,6 +50,8 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "another number of numbers": with_head(2, n_learned + 1),
         "numbers that are cut": sealed(body[: numbers + 8]),
         "a factor that is cut": sealed(body[:-8]),
+        "a number that is none": sealed(body[:numbers] + struct.pack("<d", float("nan")) + body[numbers + 8 :]),
+        "a factor that is not finite": sealed(body[:-8] + struct.pack("<d", float("inf"))),
         "more behind it": sealed(body + bytes(8)),
     }
     other = {f"another {name.decode()}": with_setting(i, name, -7.5) for i, name in enumerate(names)}

@@ -26,6 +26,9 @@ ROLES: Mapping[str, tuple[str, ...]] = {
 
 _WORD = re.compile(r"[a-z]+")
 
+_FREQUENCIES = {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rad": 0.5 / np.pi, "1/s": 1.0}
+"""Units of frequencies, in small letters, in Hz."""
+
 
 class ResponseFile(NamedTuple):
     """Frequency response of a file."""
@@ -45,8 +48,9 @@ def has_response(path: Path) -> bool:
 def read_response(path: Path) -> ResponseFile:
     """Return the frequency response of a file.
 
-    Frequencies are in Hz, or in rad/s where the column is called omega or has that unit; magnitudes are linear unless
-    their column's name has dB; phases are in degrees or radians as theirs says, in degrees where one is beyond 2π.
+    Frequencies are in Hz, or in kHz or rad/s where the column has that unit or is called omega; magnitudes are linear
+    unless their column's name has dB; phases are in degrees or radians as theirs says, in degrees where one is
+    beyond 2π.
 
     Parameters
     ----------
@@ -72,7 +76,8 @@ def read_response(path: Path) -> ResponseFile:
     values = source.read([found[role] for role in roles]).columns
     if not len(values[0]):
         raise LogError(f"{path}: a frequency response needs lines, got none")
-    frequency = values[0] / (2 * np.pi) if _is_angular(found["frequency"]) else values[0]
+    name = found["frequency"]
+    frequency = values[0] * _frequency_unit(path, name, source.units.get(name, ""))
     if pair == ("real", "imag"):
         response = values[1] + 1j * values[2]
     else:
@@ -98,8 +103,14 @@ def _plain(name: str) -> str:
     return re.sub(r"[\[(].*", "", name.lower()).strip(" _")
 
 
-def _is_angular(name: str) -> bool:
-    return _plain(name) in ("omega", "w") or "rad" in name.lower()
+def _frequency_unit(path: Path, name: str, stated: str) -> float:
+    """Return the unit of a column of frequencies, Hz; LogError if it states another."""
+    in_name = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", name)
+    words = [word for word in _WORD.findall(name.lower()) if word in _FREQUENCIES]
+    unit = (stated or (in_name[1] if in_name else "") or (words[-1] if words else "")).lower()
+    if unit and unit not in _FREQUENCIES:
+        raise LogError(f"{path}: column {brief(name)} must be in Hz, kHz or rad/s, its unit is {brief(unit)}")
+    return _FREQUENCIES[unit or ("rad/s" if _plain(name) in ("omega", "w") else "hz")]
 
 
 def _magnitude(name: str, values: Array) -> Array:

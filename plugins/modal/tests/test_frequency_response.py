@@ -221,6 +221,9 @@ G_FILE = table_1("x").frequency_response(OMEGA[:50])
     [
         ("frequency,real,imag", (F[:50], G_FILE.real, G_FILE.imag)),
         ("f [Hz];Re(H);Im(H)", (F[:50], G_FILE.real, G_FILE.imag)),
+        ("frequency [kHz],real,imag", (1e-3 * F[:50], G_FILE.real, G_FILE.imag)),
+        ("freq_khz,real,imag", (1e-3 * F[:50], G_FILE.real, G_FILE.imag)),
+        ("frequency (rad/s),real,imag", (OMEGA[:50], G_FILE.real, G_FILE.imag)),
         ("omega,h_re,h_im", (OMEGA[:50], G_FILE.real, G_FILE.imag)),
         ("Freq [Hz],Mag [dB],Phase [deg]", (F[:50], 20 * np.log10(np.abs(G_FILE)), np.rad2deg(np.angle(G_FILE)))),
         ("f,magnitude,phase [rad],std", (F[:50], np.abs(G_FILE), np.angle(G_FILE), np.abs(G_FILE))),
@@ -251,6 +254,9 @@ def test_files_without_a_response(tmp_path: Path) -> None:
     assert not has_response(path)
     other = tmp_path / "phase.csv"
     other.write_text("f,mag,phase\n1,2,0.1\n2,3,0.2\n", encoding="utf-8")
+    (tmp_path / "log.csv").write_text("frequency [rpm],real,imag\n1,1,0\n")
+    with pytest.raises(LogError, match=r"column 'frequency \[rpm\]' must be in Hz, kHz or rad/s, its unit is 'rpm'"):
+        read_response(tmp_path / "log.csv")
     with pytest.raises(LogError, match="may be in degrees or radians"):
         read_response(other)
     with pytest.raises(LogError, match=r"magnitude, phase was not found, the file has 'f', 'x'"):

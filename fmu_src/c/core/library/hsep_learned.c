@@ -2,6 +2,7 @@
 
 #include "hsep_crc.h"
 
+#include <math.h>
 #include <string.h>
 
 HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size)
@@ -20,12 +21,12 @@ HSEP_API int hsep_learned_next(hsep_learned_bytes *from, hsep_learned_setting *s
     return hsep_learned_read(from, setting, sizeof *setting) && setting->name[sizeof setting->name - 1] == '\0';
 }
 
-/* Read n numbers, which a file has in 8 bytes each; 0 if there are less. */
+/* Read n numbers, which a file has in 8 bytes each; 0 if there are less, or one is not finite. */
 static int learned_numbers(hsep_learned_bytes *from, hsep_real to[], uint64_t n)
 {
     for (uint64_t i = 0; i < n; i++) {
         double number;
-        if (!hsep_learned_read(from, &number, sizeof number)) {
+        if (!hsep_learned_read(from, &number, sizeof number) || !isfinite((hsep_real)number)) {
             return 0;
         }
         to[i] = (hsep_real)number;

@@ -1,0 +1,262 @@
+"""What users hand over: masked, labelled, with units, in tables; stand-ins for pandas, polars, xarray and pint."""
+
+from __future__ import annotations
+
+import decimal
+import math
+from collections.abc import Mapping
+from datetime import datetime, timedelta, timezone
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from log_files import columns
+
+import hybridsep
+from hybridsep.base.errors import HybridSepError, LogError, SignalError
+from hybridsep.base.signals import as_measured, as_samples
+from hybridsep.logs.log import read_log
+from hybridsep.logs.units import stated_unit
+
+N = 3000
+T = 1e-3 * np.arange(N)
+X_D = 10.0 * (1.0 - np.cos(8.0 * T))
+X = np.r_[X_D[:5] * 0.0, X_D[:-5]]
+GONE = (np.arange(N) >= 1000) & (np.arange(N) < 1100)
+GAPS = np.where(GONE, math.nan, X)
+
+
+class Labelled:
+    """Column or index with labels, as pandas' Series and Index; ``units`` as xarray's attributes."""
+
+    def __init__(self, values: Any, index: Any = None, name: str | None = None) -> None:
+        self._values, self.index, self.name = np.asarray(values), index, name
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return self._values.astype(dtype) if dtype else self._values
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+
+class Frame:
+    """Table as pandas has it, or polars' LazyFrame, where ``collect`` is called first."""
+
+    def __init__(self, index: Any = None, **columns: Any) -> None:
+        self._columns, self.index, self.columns = columns, index, list(columns)
+
+    def __getitem__(self, name: str) -> Any:
+        return Labelled(self._columns[name], self.index)
+
+
+class Lazy:
+    def __init__(self, **columns: Any) -> None:
+        self._columns = columns
+
+    def collect(self) -> Frame:
+        return Frame(**self._columns)
+
+
+class Variable:
+    """Array as xarray has it."""
+
+    dims, ndim = ("time",), 1
+
+    def __init__(self, values: Any, units: str, time: Any) -> None:
+        self._values, self.attrs, self.indexes = np.asarray(values), {"units": units}, {"time": time}
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return self._values
+
+
+class NAType:
+    """What pandas calls NA: no comparison with it is true or false."""
+
+    def __float__(self) -> float:
+        raise TypeError("float() argument must be a real number")
+
+
+def without(mask: np.ndarray, index: Any) -> Frame:
+    return Frame(Labelled(index[~mask]), x_d=X_D[~mask], x=X[~mask])
+
+
+def structured() -> np.ndarray:
+    table = np.zeros(N, [("x_d", "f8"), ("x", "f8")])
+    table["x_d"], table["x"] = X_D, GAPS
+    return table
+
+
+MISSING: Mapping[str, Any] = {
+    "NaN": {"x_d": X_D, "x": GAPS},
+    "masked": {"x_d": X_D, "x": np.ma.array(np.where(GONE, 999.0, X), mask=GONE)},
+    "masked integers": {"x_d": X_D, "x": np.ma.array(np.where(GONE, 999, X), mask=GONE)},
+    "None": {"x_d": X_D.tolist(), "x": [None if gone else x for gone, x in zip(GONE, X, strict=True)]},
+    "NA": Frame(x_d=X_D, x=np.array([NAType() if gone else x for gone, x in zip(GONE, X, strict=True)], object)),
+    "Decimal": {"x_d": [decimal.Decimal(repr(x)) for x in X_D.tolist()], "x": GAPS},
+    "Arrow": pa.table({"x_d": X_D, "x": pa.array(GAPS, from_pandas=True)}),
+    "Arrow's batch": pa.record_batch({"x_d": X_D, "x": pa.array(GAPS, from_pandas=True)}),
+    "fields": structured(),
+    "lazy": Lazy(x_d=X_D, x=GAPS),
+}
+
+
+@pytest.mark.parametrize("how", MISSING)
+def test_what_is_missing_is_missing(how: str) -> None:
+    """However it is said, and never a position."""
+    log = read_log(MISSING[how], T_s=1e-3, unit="mm")
+    np.testing.assert_array_equal(np.isnan(log.x_meas), GONE)
+    np.testing.assert_allclose(log.x_d, 1e-3 * X_D, rtol=1e-15)
+    if how != "masked integers":
+        np.testing.assert_allclose(log.x_meas[~GONE], 1e-3 * X[~GONE], rtol=1e-15)
+
+
+def test_a_masked_command_is_refused() -> None:
+    with pytest.raises(LogError, match=r"sample 1001 .*: column 'x_d' must be finite, got nan"):
+        read_log({"x_d": np.ma.array(X_D, mask=GONE), "x": X}, T_s=1e-3)
+    with pytest.raises(SignalError, match="x_d must be finite, got nan at sample 1000"):
+        as_samples(np.ma.array(1e-3 * X_D, mask=GONE), "x_d")
+    masked = as_measured(np.ma.array(1e-3 * X, mask=GONE), "x")
+    np.testing.assert_array_equal(np.isnan(masked), GONE)
+
+
+DAY = np.datetime64("2026-01-01T00:00:00", "ns")
+ZONE = timezone(timedelta(hours=1))
+INDEXES: Mapping[str, np.ndarray] = {
+    "datetimes": DAY + 2 * np.arange(N).astype("m8[ms]"),
+    "durations": 2 * np.arange(N).astype("m8[ms]"),
+    "seconds": 2 * T,
+    "with a zone": np.array([datetime(2026, 1, 1, tzinfo=ZONE) + timedelta(milliseconds=2 * k) for k in range(N)]),
+}
+
+
+@pytest.mark.parametrize("what", INDEXES)
+def test_an_index_of_times_is_the_time(what: str) -> None:
+    index = INDEXES[what]
+    assert read_log(Frame(Labelled(index), x_d=X_D, x=X)).T_s == 2e-3
+    with pytest.raises(LogError, match=r"T_s = 0\.001 s was given, but column 'index' has an interval of 0\.002 s"):
+        read_log(Frame(Labelled(index), x_d=X_D, x=X), T_s=1e-3)
+    assert read_log(without(GONE, index)).starts == (0, 1000)
+    own = read_log(Frame(Labelled(index), t=T, x_d=X_D, x=X))
+    assert own.T_s == 1e-3
+
+
+@pytest.mark.parametrize("step", [1, 3])
+def test_gaps_in_the_labels_are_gaps(step: int) -> None:
+    """As ``dropna`` leaves them: rows that were taken out are not closed up."""
+    log = read_log(without(GONE, step * np.arange(N) + 7), T_s=1e-3)
+    assert (log.T_s, log.starts, len(log.t)) == (1e-3, (0, 1000), N - 100)
+    assert "100 samples are missing in 1 gap" in log.remarks[-1]
+    assert read_log(Frame(Labelled(np.arange(N) + 7), x_d=X_D, x=X), T_s=1e-3).starts == (0,)
+    joined = np.r_[0:1500, 0:1500]
+    assert read_log(Frame(Labelled(joined), x_d=X_D, x=X), T_s=1e-3).starts == (0, 1500)
+    assert read_log(Frame(Labelled(np.arange(N), name="time [ms]"), x_d=X_D, x=X)).T_s == 1e-3
+    texts = Labelled(np.arange(N).astype(str))
+    assert read_log(Frame(texts, x_d=X_D, x=X), T_s=1e-3).starts == (0,)
+
+
+def test_labels_of_samples() -> None:
+    shifted = Labelled(X, Labelled(np.arange(N) + 20))
+    message = "x_d and x.* must have the same index, got 0 and 20 at sample 0; align them"
+    with pytest.raises(LogError, match=message):
+        read_log({"x_d": Labelled(X_D, Labelled(np.arange(N))), "x": shifted}, T_s=1e-3)
+    machine = hybridsep.load_machine("spring_mass_damper")
+    predictor = hybridsep.HybridPredictor(machine.model, machine.predictor_settings)
+    with pytest.raises(SignalError, match=message):
+        hybridsep.backtest(predictor, Labelled(1e-3 * X_D, Labelled(np.arange(N))), shifted)
+    kept = Labelled(1e-3 * X_D[~GONE], Labelled(np.flatnonzero(~GONE)))
+    with pytest.raises(SignalError, match="the index of r must be even, it goes from 999 to 1100 at sample 1000; read"):
+        hybridsep.cosimulate(predictor, machine.new_plant(), kept)
+    levels = Labelled(np.arange(N))
+    levels.nlevels = 2  # type: ignore[attr-defined]
+    with pytest.raises(LogError, match=r"several levels is not read; reset_index\(\) makes columns"):
+        read_log(Frame(levels, x_d=X_D, x=X), T_s=1e-3)
+
+
+def test_quantities_and_attributes_state_units() -> None:
+    pint = {name: SimpleNamespace(magnitude=values, units="millimeter") for name, values in (("x_d", X_D), ("x", X))}
+    log = read_log(pint, T_s=1e-3)
+    assert (log.file_unit, log.unit_stated) == ("mm", True)
+    np.testing.assert_allclose(log.x_d, 1e-3 * X_D)
+    astropy = {"x_d": SimpleNamespace(value=X_D, unit="mm"), "x": SimpleNamespace(value=1e3 * X, unit="um")}
+    np.testing.assert_allclose(read_log(astropy, T_s=1e-3).x_meas, 1e-3 * X)
+    xarray = {name: Variable(values, "mm", T) for name, values in (("x_d", X_D), ("x", GAPS))}
+    of_xarray = read_log(xarray)
+    assert (of_xarray.T_s, of_xarray.file_unit, int(np.isnan(of_xarray.x_meas).sum())) == (1e-3, "mm", 100)
+    with pytest.raises(LogError, match=r"unit='um' \(--unit um\) was given, but column 'x_d' states 'mm'"):
+        read_log(xarray, unit="um")
+    fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("x_d", "x")]
+    assert read_log(pa.table([X_D, X], schema=pa.schema(fields)), T_s=1e-3).file_unit == "mm"
+    with pytest.raises(SignalError, match="x_d must be in m or rad, got 'millimeter'; convert it, or read_log does"):
+        as_samples(pint["x_d"], "x_d")
+    with pytest.raises(LogError, match="column 'x_d' must be numbers: a list of quantities; make one quantity of it"):
+        read_log({"x_d": [SimpleNamespace(magnitude=1.0, units="mm")] * N, "x": X}, T_s=1e-3)
+
+
+@pytest.mark.parametrize(
+    "values", [["0.1"] * 5, [True] * 5, np.ones(5, np.bool_), np.ones(5) * 1j, None, [object()] * 5, {"x": [1.0]}]
+)
+def test_no_numbers(values: Any) -> None:
+    with pytest.raises(SignalError, match=r"x_d must be (numbers, got|one column, got a table|one-dimensional)"):
+        as_samples(values, "x_d")
+
+
+@pytest.mark.parametrize("given", [None, X_D, [1.0, 2.0], 5, np.stack([X_D, X])])
+def test_what_is_no_log(given: Any) -> None:
+    with pytest.raises(LogError, match="a log is a file, a mapping of columns or a table, got"):
+        read_log(given, T_s=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("names", "axis"),
+    [
+        (("target_q_{}", "actual_q_{}", "target_qd_{}", "actual_qd_{}"), "3"),
+        (("desired.positions[{}]", "actual.positions[{}]", "desired.velocities[{}]"), "3"),
+        (("/arm/state/reference/positions[{}]", "/arm/state/feedback/positions[{}]"), "3"),
+        (("q_cmd[{}]", "q_act[{}]"), "3"),
+        (("x_d[{}]", "x[{}]"), "3"),
+        (("ctrl_pos|{}", "enc_pos|{}", "des_pos|{}"), "3"),
+        (("set_point", "process_value"), None),
+    ],
+)
+def test_names_of_robots_and_controllers(names: tuple[str, ...], axis: str | None) -> None:
+    data = {
+        name.format(j): (j + 1) * values for j in range(4) for name, values in zip(names, [X_D, X, X, X], strict=False)
+    }
+    log = read_log(data, T_s=1e-3, axis=axis)
+    np.testing.assert_array_equal((log.x_d, log.x_meas), (4 * X_D, 4 * X))
+    assert log.columns == (names[0].format(axis), names[1].format(axis))
+
+
+@pytest.mark.parametrize("name", ["Boom Ms", "Boom ms", "Room in", "q[0]", "x_m"])
+def test_names_that_state_no_unit(name: str) -> None:
+    assert stated_unit(name) == (name, "")
+
+
+def test_units_after_a_comma() -> None:
+    assert stated_unit("Position, mm") == ("Position", "mm")
+    assert stated_unit("t_milliseconds") == ("t", "milliseconds")
+    assert stated_unit("t [milliseconds]") == ("t", "milliseconds")
+
+
+@pytest.mark.parametrize("unit", [1e-3, "furlong", b"mm", ["mm"]])
+def test_units_that_are_none(unit: Any) -> None:
+    with pytest.raises(LogError, match="unit must be one of m, mm"):
+        read_log(columns(), unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"name": "../x"}, r"name .* must be a letter, then .* got '\.\./x'"),
+        ({"name": 5}, "must be a letter, then .* got 5"),
+        ({"v_max": math.nan, "a_max": 1.0, "j_max": 10.0}, "v_max must be finite, got nan"),
+        ({"v_max": 1.0}, "a_max, j_max are missing"),
+        ({"speed": 1.0}, "got 'speed'"),
+        ({"Np": 0.5}, "Np must be a whole number, got 0.5"),
+    ],
+)
+def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any], message: str) -> None:
+    with pytest.raises(HybridSepError, match=message):
+        hybridsep.fit(None, **known)  # type: ignore[arg-type]
