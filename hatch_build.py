@@ -4,7 +4,7 @@ They are this machine's, half a minute of processor time at most: whoever instal
 which are compiled when they are. ``HYBRIDSEP_TARGETS`` (names of ``hybridsep build --target`` with commas, or ``none``)
 says which ones else; a release sets ``all``, since its wheel goes to other machines, and no hook can tell one from the
 other. ``ziglang``, a build requirement, compiles for all of them; libraries that the checkout has kept are taken as
-they are. Where it fails, the installation goes on without them, and says so: the Python flavour of the FMUs remains. It
+they are. Where it fails, the installation goes on without them, and says so. It
 asks git for the commit.
 """
 
@@ -66,7 +66,7 @@ class ReleaseHook(BuildHookInterface[Any]):
                     lambda library, _done: self.app.display_info(f"{library[0]} for {library[1]}"),
                 )
         except Exception as error:  # whatever it is, the library without them is better than none
-            self.app.display_warning(f"no libraries of the native FMUs, whose Python flavour remains: {error}")
+            self.app.display_warning(f"no libraries of the native FMUs: {error}")
             return {}
         return {
             str(path): f"hybridsep/_data/binaries/{kind}/{target}{TARGETS[target].suffix}"

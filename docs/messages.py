@@ -67,7 +67,7 @@ ERRORS: Mapping[str, Explanation] = {
     "FmuError": Explanation(
         "An FMU cannot be built, read or loaded, or a call came that FMI does not allow in the present state.",
         "A native FMU takes its libraries from the installation; where they could not be compiled then, `pip install "
-        "ziglang`, or build with `--flavour python`. A refused archive is named, with the reason.",
+        "ziglang`. A refused archive is named, with the reason.",
     ),
 }
 """By class of exception; in the order of the hierarchy in :mod:`hybridsep.base.errors`."""

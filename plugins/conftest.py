@@ -11,7 +11,7 @@ os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 import pytest
 from built_once import BuiltFmus
 from command_line import Run
-from quick_fits import without_other_settings, without_python_fmus
+from quick_fits import without_other_settings
 
 
 @pytest.fixture
@@ -21,8 +21,7 @@ def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` with the default settings alone, and write the native FMUs alone."""
-    without_python_fmus(monkeypatch)
+    """Let ``fit`` try the default settings only."""
     without_other_settings(monkeypatch)
 
 

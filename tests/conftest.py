@@ -34,7 +34,6 @@ from properties import LEFT_OUT, take_profile
 from quick_fits import (
     without_larger_structures,
     without_other_settings,
-    without_python_fmus,
 )
 
 sys.dont_write_bytecode = False  # of this process too
@@ -85,9 +84,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` try small structures and the default settings, and write native FMUs alone."""
+    """Let ``fit`` try small structures and the default settings."""
     without_larger_structures(monkeypatch)
-    without_python_fmus(monkeypatch)
     without_other_settings(monkeypatch)
 
 
@@ -115,12 +113,6 @@ def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fmus(session_folder: Path) -> BuiltFmus:
     """Any FMU of any machine by name, built once a session."""
     return BuiltFmus(session_folder / "fmus")
-
-
-@pytest.fixture(scope="session")
-def python_fmu(fmus: BuiltFmus) -> Callable[[str], Path]:
-    """Return a function that gives the path of a pythonfmu FMU by name."""
-    return fmus
 
 
 @pytest.fixture(scope="session")

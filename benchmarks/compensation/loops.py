@@ -144,19 +144,14 @@ class FmuLoops:
 
     Use it as a context manager: the FMUs are in a temporary folder.
 
-    Parameters
-    ----------
-    flavour : {"native", "python"}
-        Flavour of the FMUs.
-
     Attributes
     ----------
     apart : float, m
         Largest difference of ``x_dm`` from the library's cold runs so far.
     """
 
-    def __init__(self, flavour: str) -> None:
-        self.flavour, self.apart = flavour, 0.0
+    def __init__(self) -> None:
+        self.apart = 0.0
         self._folder = tempfile.TemporaryDirectory()
         self._built: dict[tuple[str, ...], Path] = {}
         self._library = LibraryLoops()
@@ -211,9 +206,9 @@ class FmuLoops:
         """Return an FMU of a machine; only those with weights are built anew."""
         key = (machine.name, model, str(machine.compensator))
         if weights is not None or key not in self._built:
-            name = next(name for name, built in fmu_names(machine, self.flavour).items() if built == model)
+            name = next(name for name, built in fmu_names(machine).items() if built == model)
             folder = Path(self._folder.name) / ("warm" if weights else str(len(self._built)))
-            path = build_fmu(machine, name, folder, self.flavour, targets=("host",), weights=weights)
+            path = build_fmu(machine, name, folder, targets=("host",), weights=weights)
             if weights is not None:
                 return path
             self._built[key] = path

@@ -1,44 +1,56 @@
-"""pythonfmu slave of the hybrid predictor; the arithmetic is in the library."""
+"""pythonfmu slave of the hybrid predictor."""
 
 from __future__ import annotations
 
-from hybridsep.fmi import look_ahead_slave
+from pathlib import Path
+
+from fmu_src.python import slave
+from hybridsep.base.errors import FmuError
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.fmi.variables import modes_from
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
+_TOLERANCE = 0.05  # of a sample: the importer's steps may be whole nanoseconds or in single precision
 
-class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
+
+class HybridPredictorPy(slave.Slave):
     """Look-ahead buffer between interpolator and drive: delays the command by Np samples and predicts the position."""
 
-    model_type = HybridPredictor
+    def begin(self) -> None:
+        """Make the look-ahead, warm-started from the resources if they hold weights."""
+        model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
+        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
+        trained = Path(self.resources, WEIGHTS_FILE)
+        if trained.exists():
+            restore_weights(predictor, trained.read_bytes())
+        self.look_ahead = LookAhead(predictor, self.values["x_d_ahead"], unit=self.unit)
 
-    def new_model(self) -> HybridPredictor:
-        """Create the predictor from the current parameters, warm-started from the resources if they hold weights."""
-        return self.new_predictor(self.physics_model())
+    def advance(self, h: float) -> None:
+        """Execute the samples of the step, whose inputs they share."""
+        T_s, inputs = self.values["T_s"], (self.values["x_d_ahead"], self.values["x_meas"])
+        n = round(h / T_s)
+        if n < 1 or abs(h - n * T_s) > _TOLERANCE * T_s:
+            raise FmuError(f"a step must be whole samples of T_s = {T_s:g} s, got {h!r} s; the native FMU takes any")
+        self.look_ahead.check(*inputs)
+        for _ in range(n):
+            self.look_ahead.sample(*inputs)
 
-    def initial_value(self, name: str) -> float | int | bool:
-        """Return the value at ``t_0``: the drive rests at the start value of ``x_d_ahead``."""
-        if name in ("batch", "n_rejected"):
-            return 0
-        if name == "hybrid_active":
-            return False
-        if name in ("x_h_std", "e_servo", "rms_pb", "rms_h", "rms_hold"):
-            return 0.0
-        window, i = _window_index(name)
-        if window == "x_h_std_window":
-            return 0.0
-        return float(self.values["x_d_ahead"]) if i < self.values["Np"] else 0.0
+    def output(self, name: str) -> float | int | bool:
+        """Return an output, or one sample of the current window, such as ``x_d_window[3]``."""
+        window, _, place = name.partition("[")
+        if place:
+            samples, i = getattr(self.look_ahead.window, window.removesuffix("_window")), int(place[:-1]) - 1
+            return float(samples[i]) if i < len(samples) else 0.0
+        value: float | int | bool = getattr(self.look_ahead, name)
+        return value if isinstance(value, (bool, int)) else float(value)
 
-    def current_value(self, name: str) -> float | int | bool:
-        """Return an output, or one sample of the current window."""
-        if not name.endswith("]"):
-            value: float | int | bool = getattr(self.look_ahead, name)
-            return value
-        window, i = _window_index(name)
-        samples = getattr(self.look_ahead.window, window.removesuffix("_window"))
-        return float(samples[i]) if i < len(samples) else 0.0
+    def saved(self) -> bytes:
+        """Return the look-ahead's state."""
+        return self.look_ahead.to_bytes()
 
-
-def _window_index(name: str) -> tuple[str, int]:
-    """Split ``x_d_window[3]`` into name and zero-based index 2; a scalar has index 0."""
-    window, _, place = name.partition("[")
-    return window, int(place[:-1]) - 1 if place else 0
+    def restore(self, blob: bytes) -> None:
+        """Take over a look-ahead."""
+        self.look_ahead = LookAhead.from_bytes(blob, HybridPredictor)

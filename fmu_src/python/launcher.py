@@ -1,13 +1,9 @@
-"""Load the slave beside this file, and refuse instances if that fails, as without SciPy, with the reason and a way out.
-
-With the importer's logging off pythonfmu passes on no message; the reason goes to stderr, too.
-"""
+"""Load the slave beside this file, with what pythonfmu's binary needs to begin and end well."""
 
 from __future__ import annotations
 
 import atexit
 import ctypes
-import logging
 import os
 import sys
 from contextlib import suppress
@@ -34,10 +30,9 @@ except Exception as error:  # whatever a library that does not fit this Python r
     REASON = f"{error}; the FMU needs a Python with NumPy and SciPy in the importing tool's process, and all its files"
 
     class UnusableSlave(Fmi2Slave):  # type: ignore[misc]
-        """Slave that refuses to be made."""
+        """Slave that refuses to be made, where the error alone would end the importer's process."""
 
-        def __init__(self, **kwargs: Any) -> None:
-            logging.getLogger("hybridsep.fmu").error("%s: %s", kwargs.get("instance_name"), REASON)
+        def __init__(self, **_: Any) -> None:
             raise RuntimeError(REASON)
 
         def do_step(self, current_time: float, step_size: float) -> bool:

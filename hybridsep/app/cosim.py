@@ -77,7 +77,7 @@ def cosim(
     from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
     from ..fitting.compensation import COSTS_MAX, limit_costs
-    from ..fmi.archive import build_here, default_flavour
+    from ..fmi.archive import build_here
     from ..logs.units import shown_in
     from ..machines.machine import load_machine, machine_path
     from .console import RUNS, check_outputs, console, print_run, print_written, progress_bar
@@ -91,8 +91,7 @@ def cosim(
     shown = shown_in(axis.unit)
     model = "HybridPredictor" if compensate is None else "SepCompensator"
     trajectory, command = _command(trajectory, machine, axis, unit)
-    flavour = default_flavour()
-    _check_pair(axis, model, predictor, plant, weights, flavour, entries or ())
+    _check_pair(axis, model, predictor, plant, weights, entries or ())
     inputs = {"trajectory": _file(trajectory), "predictor": predictor, "plant": plant, "saved predictor": weights}
     outputs = (("--out", out, RUNS), ("--figure", figure, (".png",)))
     check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)
@@ -100,8 +99,8 @@ def cosim(
     values = {} if compensate is None else {"compensate": PARAMETERS["compensate"].to_fmi(compensate)}
     limits, costs = None, None
     with tempfile.TemporaryDirectory() as folder, progress_bar(as_json) as advance:
-        controller = predictor or build_here(axis, model, Path(folder), flavour, weights=weights)
-        drive = plant or build_here(axis, "FeedDrive", Path(folder), flavour)
+        controller = predictor or build_here(axis, model, Path(folder), weights=weights)
+        drive = plant or build_here(axis, "FeedDrive", Path(folder))
         run = cosimulate(
             *(controller, drive, command),
             controller_values=values,
@@ -148,7 +147,7 @@ def _two_axes(
     from ..cosim.compensated import COMPENSATED, compensate
     from ..cosim.contour import contours_of
     from ..cosim.run import save_columns
-    from ..fmi.archive import build_here, default_flavour
+    from ..fmi.archive import build_here
     from ..machines.machine import load_machine, machine_path
     from ..plants.path import read_path
     from .console import RUNS, check_outputs, print_contours, print_written, progress_bar
@@ -158,9 +157,9 @@ def _two_axes(
             f"two machines and a path belong together, got {len(axes)}{'' if path else ' and none'}: "
             "hybridsep cosim x.toml y.toml --path part.ngc; one axis alone is --machine"
         )
-    flavour, machines = default_flavour(), [load_machine(axis, entries) for axis in axes]
+    machines = [load_machine(axis, entries) for axis in axes]
     for axis in machines:
-        _check_pair(axis, "SepCompensator", None, None, None, flavour, ())
+        _check_pair(axis, "SepCompensator", None, None, None, ())
     delays = [f"{axis.T_s:g} s and {axis.compensator_settings.preview} samples" for axis in machines]
     if delays[0] != delays[1]:
         raise ParameterError(
@@ -179,7 +178,7 @@ def _two_axes(
 
         for name, axis, command in zip("XY", machines, meant.axes, strict=True):
             folder = Path(temporary, name)
-            plant = build_here(axis, "FeedDrive", folder, flavour)
+            plant = build_here(axis, "FeedDrive", folder)
             runs.append(compensate(axis, plant, command, folder, f"{name} axis", say)[0])
     x, y = runs
     contours = contours_of(x, y, meant)
@@ -250,7 +249,6 @@ def _check_pair(
     predictor: Path | None,
     plant: Path | None,
     weights: Path | None,
-    flavour: str,
     entries: Sequence[str],
 ) -> None:
     """Check the FMUs of a look-ahead ``model`` and a plant: those that are given, and that the others can be built."""
@@ -259,7 +257,7 @@ def _check_pair(
     from ..fmi.compile import check_available
     from ..fmi.spec import fmu_names
 
-    models = fmu_names(axis, flavour).values()
+    models = fmu_names(axis).values()
     if plant is None and "FeedDrive" not in models:
         raise ParameterError(
             f"machine {axis.name} has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant "
@@ -280,7 +278,7 @@ def _check_pair(
         check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
     if plant is not None:
         check_plant(plant)
-    if flavour == "native" and None in (predictor, plant):
+    if None in (predictor, plant):
         check_available(("host",))
 
 

@@ -300,6 +300,7 @@ def _print_fit(found: Fit) -> None:
 def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
     """Return what to do after a fit that wrote ``files``, as lines to paste."""
     from ..fmi.archive import other_platforms
+    from ..fmi.compile import no_native
 
     file, state = (shlex.quote(str(files[what])) for what in ("machine file", "trained predictor"))
     limits = found.machine.drive_limits
@@ -326,7 +327,9 @@ def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
         lines.append(f"  # a compensator FMU for the drive; the limits are estimates: put in your drive's, {rates}")
         lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")
     native = files.get("native FMU")
-    if native and (said := other_platforms(native, files["machine file"], files["trained predictor"])):
+    if native is None:
+        lines += [f"  # no FMUs, {no_native()}; then", f"  hybridsep build -m {file}"]
+    elif said := other_platforms(native, files["machine file"], files["trained predictor"]):
         lines += [f"  # {said[0]}", f"  {said[1]}"]
     lines.append("  # your own compensator, sample by sample, in Python: docs/howto/python.md")
     return lines

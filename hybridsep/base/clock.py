@@ -20,7 +20,6 @@ _STEP_MAX = 100.0
 """Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
 
 _TOLERANCE = 0.05  # of T_s: the importer's times may be whole nanoseconds or in single precision
-_NOTICED = 1e-3  # of T_s: deviations beyond it are warned of
 _SPACINGS = 8.0  # ulp(t): a few roundings of the importer's arithmetic
 _SPLIT = 134217729.0  # 2^27 + 1, splits a double into two halves (Veltkamp 1968)
 
@@ -78,10 +77,9 @@ class SampleClock(NamedTuple):
             n -= 1
             since, carry = _take(since, carry, -1, T_s)
         reached = n > 0 and since <= delta  # the instant is at this point, and belongs to the next step
-        moved = since if reached else 0.0
         after = SampleClock(T_s, self.k + n, *((0.0, 0.0) if reached else (since, carry)), end)
         n_latched = n + after.latched - self.latched
-        return ClockStep(after, n, n_latched, T_s - self.since if self.latched else 0.0, moved)
+        return ClockStep(after, n, n_latched, T_s - self.since if self.latched else 0.0)
 
     def state(self) -> list[float]:
         """Return all fields as numbers."""
@@ -110,19 +108,6 @@ class ClockStep(NamedTuple):
     n_samples: int  # samples executed in the step
     n_latched: int  # instants at which inputs are latched in the step
     first: float  # time from the start of the step to the first of them, s
-    moved: float  # time by which the last instant lay before the step's end, where it was taken, s; below 0 behind it
-
-    @property
-    def warning(self) -> str:
-        """What there is to say about an instant that was taken at a communication point; empty if it lay there."""
-        clock = self.after
-        if not abs(self.moved) > _NOTICED * clock.T_s:
-            return ""
-        return (
-            f"the communication point {clock.end:.9g} s is {abs(self.moved) / clock.T_s:.2g} samples of T_s = "
-            f"{clock.T_s:g} s {'behind' if self.moved > 0 else 'before'} a sampling instant, which is taken there: "
-            "samples follow the importer's points; a model of T_s needs steps of T_s"
-        )
 
 
 def check_step_size(h: float) -> None:

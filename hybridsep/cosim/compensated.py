@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.settings import PARAMETERS
 from ..base.signals import Array
-from ..fmi.archive import build_here, default_flavour
+from ..fmi.archive import build_here
 from ..machines.machine import Machine
 from ..plants.plant import Encoder
 from .inverse import FirInverse, PlayedCommand
@@ -50,11 +50,11 @@ def compensate(
     """
     assert machine.plant is not None
     seeds = seeds or [machine.plant.seed]
-    flavour, weights = default_flavour(), out / f"{machine.name}.state"
-    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
+    weights = out / f"{machine.name}.state"
+    cold = build_here(machine, "SepCompensator", out / "fmus")
     advance(f"{label}, a run to learn from")
     train(machine, command, weights)
-    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
 

@@ -16,7 +16,7 @@ from ..cosim.loop import cosimulate
 from ..cosim.run import Run
 from ..evaluate.figures import contour_figure, prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
-from ..fmi.archive import build_here, default_flavour
+from ..fmi.archive import build_here
 from ..fmi.spec import fmu_name
 from ..machines.machine import PAPER_SETTINGS, Machine, load_machine
 from ..plants.trajectory import spiral, staircase
@@ -35,7 +35,7 @@ SEEDS = 10
 
 def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
     """Return a machine's predictor and plant FMU, built."""
-    predictor, plant = (build_here(machine, one, out, default_flavour()) for one in ("HybridPredictor", "FeedDrive"))
+    predictor, plant = (build_here(machine, one, out) for one in ("HybridPredictor", "FeedDrive"))
     return predictor, plant
 
 
@@ -106,14 +106,14 @@ def _worse(run: Run) -> dict[str, Any]:
 
 def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:
     """Return all files that :func:`demo` writes."""
-    out, flavour = Path(out), default_flavour()
+    out = Path(out)
     files = [out / name for name in ("index.html", "summary.json", *(["spiral_contour.png"] * full))]
     for case, name in list(MACHINES.items())[: len(MACHINES) if full else 1]:
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")
         for model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
-            files.append(out / "fmus" / f"{fmu_name(model, name, flavour)}.fmu")
-        files.append(out / "fmus" / "warm" / f"{fmu_name('SepCompensator', name, flavour)}.fmu")
+            files.append(out / "fmus" / f"{fmu_name(model, name)}.fmu")
+        files.append(out / "fmus" / "warm" / f"{fmu_name('SepCompensator', name)}.fmu")
     return files
 
 

@@ -7,25 +7,21 @@ from pathlib import Path
 
 from ..base.files import COMMANDS, written_text
 from ..base.signals import Array
-from ..fmi.compile import has_native
-from ..fmi.flavours import FLAVOURS
+from ..fmi.compile import no_native
 from ..fmi.spec import fmu_name
 
 
 def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
-    """Return the files of a fit of a machine, in their folder, by what they are."""
+    """Return the files of a fit of a machine, in their folder, by what they are; FMUs where they can be built."""
     models = {"": "HybridPredictor", **({"compensator ": "SepCompensator"} if compensator else {})}
+    archives = {f"native {what}FMU": out / f"{fmu_name(model, name)}.fmu" for what, model in models.items()}
     return {
         "machine file": out / "machine.toml",
         "trained predictor": out / "trained.state",
         "results": out / "fit.json",
         "report": out / "report.html",
         "commands to try": out / COMMANDS,
-        **{
-            f"{flavour} {what}FMU": out / f"{fmu_name(model, name, flavour)}.fmu"
-            for what, model in models.items()
-            for flavour in (FLAVOURS if has_native() else FLAVOURS[1:])
-        },
+        **({} if no_native() else archives),
     }
 
 

@@ -211,7 +211,7 @@ class Fit:
             state.write(self.trained)
         for i, (what, path) in enumerate(archives.items() if fmus else ()):
             progress(f"build the {what}", i / len(archives))
-            build_fmu(self.machine, path.stem, path.parent, what.split()[0], weights=files["trained predictor"])
+            build_fmu(self.machine, path.stem, path.parent, weights=files["trained predictor"])
         if report:
             self.report(files["report"], [path.name for path in archives.values() if fmus])
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}

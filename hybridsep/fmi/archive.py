@@ -19,7 +19,7 @@ from ..base.errors import FmuError
 from ..base.files import written_whole
 from ..fmi import native, python
 from ..machines.machine import Machine
-from .compile import ALL_TARGETS, default_targets, expanded, has_native
+from .compile import ALL_TARGETS, default_targets, expanded
 from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 
@@ -54,7 +54,7 @@ def build_fmu(
     out : str or Path
         Folder for the archive; made if needed.
     flavour : {"native", "python"}
-        Flavour of the FMU.
+        Flavour of the FMU; predictors and drives have one in Python.
     targets : sequence of str, optional
         Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compile.TARGET_NAMES`, ``"host"`` being this
         machine. If left out: all platforms where their libraries are there, else this machine.
@@ -129,14 +129,9 @@ def archived(files: Mapping[str, bytes]) -> bytes:
     return file.getvalue()
 
 
-def default_flavour() -> str:
-    """Return the flavour of the demo's FMUs: native where their libraries can be had, Python otherwise."""
-    return "native" if has_native() else "python"
-
-
-def build_here(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
-    """Build one of a machine's FMUs (``model`` is ``HybridPredictor``, ``FeedDrive``, …); as :func:`build_fmu`."""
-    return build_fmu(machine, fmu_name(model, machine.name, flavour), out, flavour, weights=weights)
+def build_here(machine: Machine, model: str, out: Path, *, weights: Path | None = None) -> Path:
+    """Build a machine's native FMU of a model (``HybridPredictor``, ``FeedDrive``, …); as :func:`build_fmu`."""
+    return build_fmu(machine, fmu_name(model, machine.name), out, weights=weights)
 
 
 def other_platforms(fmu: Path, machine: Path, weights: Path | None = None) -> tuple[str, ...]:

@@ -272,13 +272,13 @@ def check_available(targets: Sequence[str]) -> None:
             compiler_for(target)
 
 
-def has_native() -> bool:
-    """Return whether native FMUs that run on this machine can be built."""
+def no_native() -> str:
+    """Return why no native FMUs for this machine can be built; empty if they can."""
     try:
         check_available(("host",))
-    except FmuError:
-        return False
-    return True
+    except FmuError as error:
+        return str(error)
+    return ""
 
 
 def default_targets() -> tuple[str, ...]:

@@ -79,6 +79,8 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
             "canInterpolateInputs": _text(native and bool(INTERPOLATED[model])),
             "canNotUseMemoryManagementFunctions": _text(not native),
         }
+        if not native and model == "HybridPredictor":  # its steps are whole samples
+            simulation.set("canHandleVariableCommunicationStepSize", "false")
         if native:
             ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name="all.c")
     elif any(size is not None for _, size in described):

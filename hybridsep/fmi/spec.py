@@ -79,7 +79,8 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
     """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
 
     A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
-    ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one.
+    ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one. Of the
+    Python flavour are predictors and drives.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
         If the flavour is unknown, or has no FMUs of this version of FMI.
     """
     models = ["HybridPredictor"]
-    if machine.drive_limits is not None:
+    if machine.drive_limits is not None and flavour == "native":
         models.append("SepCompensator")
     if machine.plant is not None:
         models.append("FeedDrive")
@@ -96,7 +97,7 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
     return {fmu_name(model, machine.name, flavour, fmi): model for model in models}
 
 
-def fmu_name(model: str, machine: str, flavour: str, fmi: str = FMI_VERSIONS[0]) -> str:
+def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> str:
     """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")

@@ -323,12 +323,6 @@ class FmuTable:
     windows: bool = True  # whether a HybridPredictor shows the samples of its window
     rest: float = 0.0  # m: start value of the positions that enter: where the axis is at rest
 
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> FmuTable:
-        """Return the table that :meth:`as_json` wrote."""
-        more = {key: content[key] for key in ("unit", "windows", "rest") if key in content}
-        return cls(content["model"], content["name"], content["parameters"], tuple(content["modes"]), **more)
-
     def as_json(self) -> dict[str, object]:
         """Return plain values; unit, windows and rest where they are not the usual ones."""
         content = {"model": self.model, "name": self.name, "parameters": dict(self.parameters)}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 from command_line import Run, write_log
 from log_files import write
 
@@ -166,7 +167,8 @@ REFUSED = [
     ("backtest {log} {m} --figure a.jpg", "--figure must end in .png or .pdf or .svg, got 'a.jpg'"),
     ("backtest {log} {m} --save a.bin", "--save must end in .state or .csv or .npz"),
     ("backtest {log} {m} --report page.pdf", "--report must end in"),
-    ("build SepCompensatorPy -m emps --flavour python", "; emps has no [drive_limits], which a"),
+    ("build SepCompensator -m emps", "; emps has no [drive_limits], which a"),
+    ("build SepCompensatorPy --flavour python", "there are HybridPredictorPy, FeedDrivePy"),
     ("build Robot --flavour python", "no FMU Robot of spring_mass_damper; there are HybridPredictorPy"),
     ("build --flavour cobol", "flavour must be one of"),
     ("build --fmi 4", "the version of FMI must be one of 2, 3, got '4'"),
@@ -221,7 +223,7 @@ def test_arguments_are_checked_before_any_work(
     hybridsep: Run,
     tmp_path: Path,
     log: Path,
-    python_fmu: Callable[[str], Path],
+    fmus: BuiltFmus,
     monkeypatch: pytest.MonkeyPatch,
     command: str,
     message: str,
@@ -234,7 +236,7 @@ def test_arguments_are_checked_before_any_work(
     monkeypatch.chdir(folder)
     for place in ("fmi.archive.build_fmu", "fitting.replay.backtest", "cosim.loop.cosimulate"):
         monkeypatch.setattr(f"hybridsep.{place}", work)
-    names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy"), "m": f"-m {MACHINE}"}
+    names = {"log": log, "folder": folder, "fmu": fmus("HybridPredictorPy"), "m": f"-m {MACHINE}"}
     said = refusal(hybridsep, *command.format(**names).split())
     assert message in said
     assert len(said.replace(str(tmp_path), "")) < 1000

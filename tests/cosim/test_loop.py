@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 
 from hybridsep import load_machine, paper_machine
 from hybridsep.base.errors import FmuError, ParameterError, SignalError
@@ -25,8 +25,6 @@ from hybridsep.plants.trajectory import staircase
 MACHINE = load_machine("spring_mass_damper")
 R = staircase()[:1200]
 PAPER = {"averaging": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
-
-Fmu = Callable[[str], Path]
 
 
 def encoder() -> Encoder:
@@ -53,7 +51,7 @@ def test_a_warm_predictor_is_active_at_once() -> None:
     assert cosimulate(predictor, MACHINE.new_plant(), R, t_init=0.0).active.all()
 
 
-def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> None:
+def test_what_the_controller_takes_for_late_arrives_late(fmus: BuiltFmus) -> None:
     late = 5
     settings = replace(MACHINE.predictor_settings, measurement_delay=late)
     run = cosimulate(MACHINE.new_predictor(settings), MACHINE.new_plant(), R)
@@ -65,7 +63,7 @@ def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> Non
         found, expected = getattr(run, name)[:-late], getattr(result, name)[late:]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15, err_msg=name)
     values = {"measurement_delay": late}
-    fmu = cosimulate(python_fmu("HybridPredictorPy"), MACHINE.new_plant(), R, controller_values=values)
+    fmu = cosimulate(fmus("HybridPredictorPy"), MACHINE.new_plant(), R, controller_values=values)
     np.testing.assert_array_equal(fmu.x_h, run.x_h)
     assert fmu.measurement_delay == late
 
@@ -83,32 +81,27 @@ def test_a_drive_that_steps_first_makes_the_same_run(section: Literal["predictor
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", ["HybridPredictor", pytest.param("SepCompensator", marks=pytest.mark.nightly)])
-def test_library_and_fmu_take_each_others_place(python_fmu: Fmu, model: str) -> None:
-    def new_controller() -> Any:
-        return MACHINE.new_predictor() if model == "HybridPredictor" else MACHINE.new_compensator()
-
-    controller, plant = python_fmu(f"{model}Py"), python_fmu("FeedDrivePy")
-    library = cosimulate(new_controller(), MACHINE.new_plant(), R, encoder=encoder())
-    assert library.kind == (PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
+def test_library_and_fmu_take_each_others_place(fmus: BuiltFmus) -> None:
+    controller, plant = fmus("HybridPredictorPy"), fmus("FeedDrivePy")
+    library = cosimulate(MACHINE.new_predictor(), MACHINE.new_plant(), R, encoder=encoder())
     for run in (
         cosimulate(controller, MACHINE.new_plant(), R, encoder=encoder()),
-        cosimulate(new_controller(), plant, R),
+        cosimulate(MACHINE.new_predictor(), plant, R),
         cosimulate(controller, plant, R),
     ):
-        assert run.kind == library.kind
+        assert run.kind == library.kind == PREDICTOR
         for name in ("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state"):
             np.testing.assert_array_equal(getattr(run, name), getattr(library, name), err_msg=name)
 
 
-def test_hooks_count_from_the_end_of_the_fill(python_fmu: Fmu) -> None:
+def test_hooks_count_from_the_end_of_the_fill(fmus: BuiltFmus) -> None:
     """``disturb`` gets the plant, or the instance of its FMU; ``sensor`` says what arrives."""
     seen: dict[str, list[tuple[int, type]]] = {"library": [], "fmu": []}
 
     def offset(k: int, x_meas: float) -> float:
         return x_meas + (1e-3 if k == 7 else 0.0)
 
-    plants: dict[str, Any] = {"library": MACHINE.new_plant(), "fmu": python_fmu("FeedDrivePy")}
+    plants: dict[str, Any] = {"library": MACHINE.new_plant(), "fmu": fmus("FeedDrivePy")}
     for name, plant in plants.items():
 
         def look(k: int, subject: object, calls: list[tuple[int, type]] = seen[name]) -> None:
@@ -141,12 +134,10 @@ def test_a_plant_that_is_changed_in_mid_run() -> None:
     ],
 )
 def test_arguments_that_have_no_use_are_refused(
-    python_fmu: Fmu, of_fmus: bool, arguments: dict[str, Any], message: str
+    fmus: BuiltFmus, of_fmus: bool, arguments: dict[str, Any], message: str
 ) -> None:
     pair: tuple[Any, Any] = (
-        (python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"))
-        if of_fmus
-        else (MACHINE.new_predictor(), MACHINE.new_plant())
+        (fmus("HybridPredictorPy"), fmus("FeedDrivePy")) if of_fmus else (MACHINE.new_predictor(), MACHINE.new_plant())
     )
     with pytest.raises(ParameterError, match=message):
         cosimulate(*pair, R, **arguments)
@@ -161,21 +152,21 @@ SIGNALS: dict[Kind, list[str]] = {
 
 
 @pytest.fixture(scope="module")
-def runs(python_fmu: Fmu) -> dict[Kind, Run]:
+def runs(fmus: BuiltFmus) -> dict[Kind, Run]:
     """Short runs of a predictor and of a compensator."""
-    plant = python_fmu("FeedDrivePy")
+    plant = fmus("FeedDrivePy")
     return {
-        PREDICTOR: cosimulate(python_fmu("HybridPredictorPy"), plant, R[:900]),
-        COMPENSATOR: cosimulate(python_fmu("SepCompensatorPy"), plant, R[:600]),
+        PREDICTOR: cosimulate(fmus("HybridPredictorPy"), plant, R[:900]),
+        COMPENSATOR: cosimulate(fmus("SepCompensator"), fmus("FeedDrive"), R[:600]),
     }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("choice", PARAMETERS["compensate"].choices)
-def test_native_fmus_equal_the_library_and_keep_the_drives_limits(python_fmu: Fmu, choice: str) -> None:
+def test_native_fmus_equal_the_library_and_keep_the_drives_limits(fmus: BuiltFmus, choice: str) -> None:
     """1 nm, with the paper's model."""
     values = {**PAPER, "compensate": PARAMETERS["compensate"].to_fmi(choice)}
-    run = cosimulate(python_fmu("SepCompensator"), python_fmu("FeedDrive"), R, controller_values=values)
+    run = cosimulate(fmus("SepCompensator"), fmus("FeedDrive"), R, controller_values=values)
     given = {**MACHINE.fmi_compensator_parameters(), **values}
     library = MACHINE.new_compensator(CompensatorSettings.from_fmi(given), predictor=PredictorSettings.from_fmi(given))
     loop = cosimulate(library, MACHINE.new_plant(), R, encoder=encoder())
@@ -193,8 +184,8 @@ def test_native_fmus_equal_the_library_and_keep_the_drives_limits(python_fmu: Fm
 
 
 @pytest.mark.slow
-def test_start_time_and_a_shifted_start(python_fmu: Fmu, runs: dict[Kind, Run]) -> None:
-    pair = python_fmu("SepCompensatorPy"), python_fmu("FeedDrivePy")
+def test_start_time_and_a_shifted_start(fmus: BuiltFmus, runs: dict[Kind, Run]) -> None:
+    pair = fmus("SepCompensator"), fmus("FeedDrive")
     moved, short = cosimulate(*pair, R[:600] + 0.1, start_time=50.0), runs[COMPENSATOR]
     np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(moved.t - 50.0, short.t, rtol=0, atol=1e-12)
@@ -238,17 +229,17 @@ def test_results_as_csv_and_npz(runs: dict[Kind, Run], tmp_path: Path, kind: Kin
         run.save(tmp_path / "run.txt")
 
 
-def test_progress_is_reported_to_the_end(python_fmu: Fmu) -> None:
+def test_progress_is_reported_to_the_end(fmus: BuiltFmus) -> None:
     calls: list[tuple[int, int]] = []
-    pair = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy")
+    pair = fmus("HybridPredictorPy"), fmus("FeedDrivePy")
     cosimulate(*pair, staircase()[:300], progress=lambda k, n: calls.append((k, n)))
     assert calls[-1] == (400, 400)
     assert 50 < len(calls) < 150
 
 
-def test_what_is_refused(python_fmu: Fmu) -> None:
-    names = ("HybridPredictorPy", "SepCompensatorPy", "FeedDrivePy", "FeedDrivePy_als25010_x")
-    predictor, compensator, plant, other = map(python_fmu, names)
+def test_what_is_refused(fmus: BuiltFmus) -> None:
+    names = ("HybridPredictorPy", "SepCompensator", "FeedDrivePy", "FeedDrivePy_als25010_x")
+    predictor, compensator, plant, other = map(fmus, names)
     cases: list[tuple[tuple[Path, Path], list[float], dict[str, Any], str]] = [
         ((predictor, plant), [0.0, float("nan")], {}, "r must be finite, got nan at sample 1"),
         ((predictor, plant), [], {}, "r must have 1 samples, got 0"),

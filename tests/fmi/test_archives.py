@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import logging
 import re
 import shlex
@@ -39,9 +38,7 @@ etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 
 MACHINE = load_machine("spring_mass_damper")
 ALL = [*NATIVE, *FMI3, *PYTHON]
-MORE_MODES_ALONE = tuple(
-    f"{kind}_als25010_x" for kind in ("HybridPredictor", "HybridPredictorPy", "SepCompensator", "SepCompensatorPy")
-)
+MORE_MODES_ALONE = tuple(f"{kind}_als25010_x" for kind in ("HybridPredictor", "HybridPredictorPy", "SepCompensator"))
 """The default machine's variables and more modes, as other FMUs have: fmpy takes seconds for so many variables."""
 
 FILES = {
@@ -189,12 +186,6 @@ def test_the_notices_are_those_of_the_compiler() -> None:
         assert (own / one).read_text(encoding="utf-8").split() == (zig / other).read_text(encoding="utf-8").split()
 
 
-def test_pythonfmu_without_its_licence_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.fmi.python.metadata.files", lambda name: [])
-    with pytest.raises(FmuError, match=r"pythonfmu's LICENSE, .* is not installed: reinstall it"):
-        build_fmu(MACHINE, "FeedDrivePy", tmp_path, "python")
-
-
 # Libraries and sources ---------------------------------------------------------------------------------------------
 
 
@@ -272,33 +263,3 @@ def test_the_archive_without_binaries_can_be_compiled(
     (command,) = re.findall(r"<pre>cc (.*?)</pre>", page, re.DOTALL)
     subprocess.run([*compiler(), *shlex.split(command.replace("\\\n", " "))], cwd=folder, check=True)
     assert (folder / f"{name}.so").is_file()
-
-
-# The Python flavour ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_a_python_fmu_carries_what_it_needs(fmus: BuiltFmus, tmp_path: Path) -> None:
-    """And its slave can be imported where NumPy and SciPy are all there is."""
-    script = """
-import importlib, sys
-sys.modules.update(dict.fromkeys(("hybridsep", "ruckig", "matplotlib", "fmpy", "control", "typer", "rich")))
-sys.path.insert(0, ".")
-slave = importlib.import_module(open("slavemodule.txt").read())
-assert any(name.endswith("Py") for name in dir(slave))
-"""
-    needed = {
-        "SepCompensatorPy": {"compensate/compensator.py", "compensate/qp.py", "online/look_ahead.py", "fmi/slave.py"},
-        "HybridPredictorPy": {"online/look_ahead.py", "predict/predictor.py", "fmi/slave.py"},
-        "FeedDrivePy": {"plants/feed_drive.py", "fmi/slave.py"},
-    }
-    for name, some in needed.items():
-        with zipfile.ZipFile(fmus(name)) as archive:
-            archive.extractall(tmp_path / name)
-            assert "modes" in json.loads(archive.read("resources/machine.json"))
-            found = [re.match(r"resources/hybridsep_\w+/(.+)", file) for file in archive.namelist()]
-        modules = {match[1] for match in found if match}
-        assert some < modules
-        assert not {"machines/machine.py", "plants/trajectory.py", "fmi/archive.py"} & modules
-        assert any(module.startswith("compensate/") for module in modules) == name.startswith("Sep")
-        subprocess.run([sys.executable, "-c", script], check=True, cwd=tmp_path / name / "resources")

@@ -34,7 +34,6 @@ def variables_of(path: Path) -> dict[str, Any]:
 LOOK_AHEAD = ("Look-ahead and residual model", "Residual model with averaging")
 GROUPS: dict[str, tuple[str, ...]] = {
     "HybridPredictor": (*LOOK_AHEAD, "Physics model"),
-    "HybridPredictorPy": (*LOOK_AHEAD, "Physics model"),
     "SepCompensatorFmi3": (*LOOK_AHEAD, "Compensation", "Physics model"),
     "FeedDrive": ("Drive", "Encoder"),
     "FeedDrive_als25010_x": ("Disturbance", "Command", "Encoder", "Physics model"),
@@ -152,14 +151,13 @@ def outputs_of(path: Path) -> list[list[float]]:
     return shown
 
 
-@pytest.mark.parametrize("name", ["HybridPredictor", "HybridPredictorFmi3", "HybridPredictorPy"])
+@pytest.mark.parametrize("name", ["HybridPredictor", "HybridPredictorFmi3"])
 def test_windows_can_be_left_out_and_nothing_else_is_missing(
     fmus: BuiltFmus, tmp_path: Path, name: str, hybridsep: Run
 ) -> None:
     """For tools that choke on so many variables; where they are, they stand in the order of their samples."""
-    flavour, fmi = "python" if name.endswith("Py") else "native", "3" if name.endswith("3") else "2"
-    targets = ("host",) if flavour == "native" else None
-    path = build_fmu(MACHINE, name, tmp_path, flavour, targets=targets, fmi=fmi, windows=False)
+    fmi = "3" if name.endswith("3") else "2"
+    path = build_fmu(MACHINE, name, tmp_path, targets=("host",), fmi=fmi, windows=False)
     assert validate_fmu(str(path)) == []
     found, whole = variables_of(path), variables_of(fmus(name))
     left_out = [key for key in whole if key not in found]

@@ -140,11 +140,13 @@ def test_figures_with_an_importers_times_are_those_of_exact_steps(
         runs.append(outputs)
     assert runs[0] == runs[1]
     warnings = stream.warnings()
+    if (new_stream.implementation, "warnings") in CANNOT:
+        return
     assert (min(len(warnings), 1) if (new_stream.implementation, "one warning") in CANNOT else len(warnings)) == warned
     assert all("a sampling instant, which is taken there" in warning for warning in warnings)
 
 
-@on_all(LOOK_AHEADS)
+@on_all(LOOK_AHEADS, needs="warnings")
 def test_each_kind_of_warning_is_given_once(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream)

@@ -13,7 +13,7 @@ from averaged_cases import averaged_model, change_learned
 from driving import closed_loop, replay, steps
 from library_models import trained_state
 from library_stream import LookAheadStream
-from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
+from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters
 
 from hybridsep.evaluate.backtest import backtest
@@ -41,13 +41,11 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @on_adapters(LOOK_AHEADS, needs="agreement")
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker) -> None:
-    # 1e-11 m at every sample; a pythonfmu FMU is the library, over the first quarter.
-    tolerance, part = (0.0, 4) if new_stream.implementation == PYTHON else (1e-11, 1)
     path, model = trained_state(new_stream.model), new_stream.model
     loop = closed_loop(model, 6001 if model == PREDICTOR else 1001, weights=path)
-    stream, last = new_stream(weights=path), len(loop.r) // part
+    stream = new_stream(weights=path)
     stream.initialise(loop.values)
-    np.testing.assert_allclose(replay(stream, loop, last=last), loop.outputs[: last + 1], rtol=0, atol=tolerance)
+    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=1e-11)
     # The learned weights are used from the first predicted window on.
     if model == PREDICTOR:
         assert (loop.column(model, "hybrid_active")[100:] == 1.0).all()
@@ -62,18 +60,10 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker) -> None:
 @on_adapters((COMPENSATOR,), needs="agreement")
 def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, led: Path) -> None:
     """Its counterpart doubts it, and has a part in the plans."""
-    tolerance = 0.0 if new_stream.implementation == PYTHON else 1e-10
     loop = closed_loop(COMPENSATOR, 700, weights=led)
     stream = new_stream(weights=led)
     stream.initialise(loop.values)
-    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
-
-
-@on_adapters(LOOK_AHEADS, needs="weights before")
-def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) -> None:
-    path = trained_state(new_stream.model)
-    expected = closed_loop(new_stream.model, 10, weights=path).outputs[0]
-    assert new_stream(weights=path).outputs_before({}) == expected.tolist()
+    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=1e-10)
 
 
 @on_adapters(LOOK_AHEADS)
@@ -171,7 +161,7 @@ def test_what_was_learned_with_averaging_is_all_there_again(new_stream: StreamMa
         each.initialise(values)
         runs.append(np.array(steps(each, 0, 650)))
     # The smooth motion is none of the drive's, so a single window is left of what was learned: 2e-12 m seen.
-    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    tolerance = 0.0 if new_stream.implementation == LIBRARY else 1e-11
     np.testing.assert_allclose(runs[2], runs[1], rtol=0, atol=tolerance)
     rms_h = OUTPUTS[PREDICTOR].index("rms_h")
     assert runs[1][-1, rms_h] != runs[0][-1, rms_h]

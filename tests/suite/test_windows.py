@@ -15,7 +15,7 @@ from library_models import library_compensator
 from library_stream import start_values
 from numpy.typing import NDArray
 from staircase_data import TS, C, K, M
-from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Array, Value, machine_of
+from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_adapters, on_all
 
 from hybridsep import backtest
@@ -71,7 +71,7 @@ def planned(preview: int, start: float) -> dict[str, Array]:
 
 
 def tolerance_of(new_stream: StreamMaker) -> float:
-    return 1e-16 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    return 1e-16 if new_stream.implementation == LIBRARY else 1e-11
 
 
 @on_all((PREDICTOR,))
@@ -101,7 +101,7 @@ def directly_solved(n: int) -> Array:
 @on_all((PREDICTOR,))
 def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
     shown = shown_by(new_stream, 4001, {})
-    tolerance = 1e-12 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    tolerance = 1e-12 if new_stream.implementation == LIBRARY else 1e-11
     assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(4001))) < tolerance
 
 
@@ -110,7 +110,7 @@ def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream
 def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker) -> None:
     shown = shown_by(new_stream, 900, PLANS | {"preview": 170}, 0.1)
     expected = planned(170, 0.1)
-    exact = new_stream.implementation in (LIBRARY, PYTHON)
+    exact = new_stream.implementation == LIBRARY
     for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state"):
         np.testing.assert_allclose(shown[name][:900], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
     assert set(expected["sep_state"]) == {1, 2}

@@ -11,9 +11,10 @@ from library_models import library_look_ahead, library_plant, numbered, restored
 from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep import HybridSepError
+from hybridsep.base.clock import SampleClock
+from hybridsep.base.errors import SignalError
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.online.look_ahead_inputs import LookAheadInputs
 from hybridsep.plants.plant import Encoder
 
 
@@ -38,7 +39,6 @@ class LibraryStream:
 
     def __init__(self, model: str) -> None:
         self.model, self._kind = model, kind_of(model)
-        self._warnings: list[str] = []
         self._values = start_values(model)
 
     def set(self, name: str, value: Value) -> None:
@@ -57,7 +57,7 @@ class LibraryStream:
         self._values = start_values(self.model)
 
     def warnings(self) -> list[str]:
-        return self._warnings
+        return []
 
     def close(self) -> None:
         pass
@@ -81,12 +81,25 @@ class LookAheadStream(LibraryStream):
         self._values |= values
         with refusing():
             self._look_ahead = library_look_ahead(self._values, self._weights)
-            self._clock = LookAheadInputs(start, self._values["T_s"], self._values["x_d_ahead"])
+            self._clock = SampleClock.begin(start, self._values["T_s"])
+        self._latched = (self._values["x_d_ahead"],) * 2
 
     def step(self, t: float, h: float) -> None:
+        """Latch the inputs at each instant within the step, and execute them where the next one is reached."""
+        inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
         with refusing():
-            inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
-            self._warnings += self._clock.advance(self._look_ahead, *inputs, t, h, begin=self._tune).values()
+            if self._look_ahead.diverged:
+                raise SignalError(self._look_ahead.diverged)
+            step, pending = self._clock.stepped(t, h), self._clock.latched
+            if step.n_latched:
+                self._look_ahead.check(*inputs, self._clock.k + pending)
+            self._tune()
+            for _ in range(step.n_samples):
+                self._look_ahead.sample(*(self._latched if pending else inputs))
+                pending = False
+        if step.after.latched and not pending:
+            self._latched = inputs
+        self._clock = step.after
 
     def _tune(self) -> None:
         compensator = self._look_ahead.planner
@@ -103,14 +116,15 @@ class LookAheadStream(LibraryStream):
         return shown
 
     def save(self) -> bytes:
-        meta = {"clock": self._clock.state(), "values": self._values}
+        meta = {"clock": self._clock.state(), "latched": self._latched, "values": self._values}
         return pack(f"stream {self.model}", meta, {}, {"core": self._look_ahead.to_bytes()})
 
     def restore(self, blob: bytes) -> None:
         with refusing():
             meta, _, parts = unpack(f"stream {self.model}", blob)
             self._look_ahead = restored_look_ahead(self._kind, parts["core"])
-        self._clock, self._values = LookAheadInputs.from_state(meta["clock"]), meta["values"]
+        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"])
+        self._values = meta["values"]
 
 
 class PlantStream(LibraryStream):

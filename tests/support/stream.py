@@ -16,7 +16,7 @@ from hybridsep.machines.machine import Machine
 Array = NDArray[np.float64]
 Value = float | int | bool
 
-LIBRARY, CORE, PYTHON, NATIVE = IMPLEMENTATIONS = ("library", "C core", "pythonfmu FMU", "native FMU")
+LIBRARY, CORE, NATIVE = IMPLEMENTATIONS = ("library", "C core", "native FMU")
 FMI3 = "FMI 3.0 FMU"
 """Beside them in the tests of what an adapter does; its values are the native FMU's, bit for bit."""
 
@@ -28,24 +28,17 @@ PLANTS = (DRIVE, STAGE)
 
 CANNOT = {
     (LIBRARY, TRAJECTORY): "an array of positions needs no player",
-    (PYTHON, TRAJECTORY): "the native one runs beside pythonfmu FMUs; a table of numbers has nothing to edit",
     (LIBRARY, "slopes"): "its inputs are samples",
-    (PYTHON, "slopes"): "pythonfmu has no fmi2SetRealInputDerivatives",
     (LIBRARY, "stop time"): "a stop time is the adapter's",
     (CORE, "stop time"): "a stop time is the adapter's",
     (LIBRARY, "setters"): "its settings are changed together, by change(), which checks them",
     (CORE, "setters"): "what is set in a run is checked by the adapter",
-    (LIBRARY, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
+    (LIBRARY, "warnings"): "its clock says nothing of where instants lie",
     (CORE, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
     (LIBRARY, "outputs before"): "before its object is made there is nothing to ask",
-    (LIBRARY, "weights before"): "before its object is made there is nothing to ask",
-    (CORE, "weights before"): "weights are taken when the initialization ends",
-    (NATIVE, "weights before"): "weights are taken when the initialization ends",
-    (FMI3, "weights before"): "weights are taken when the initialization ends",
     (FMI3, "slopes"): "FMI 3.0 has no derivatives of inputs",
     (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
     (LIBRARY, "figures"): "the C core agrees with it to 1e-12 m, and its figures take a tenth of the time",
-    (PYTHON, "figures"): "it agrees with the library to the last bit",
     (NATIVE, "figures"): "it agrees with the C core, which it is compiled from",
     (
         CORE,

@@ -23,7 +23,6 @@ from stream import (
     LIBRARY,
     NATIVE,
     OUTPUTS,
-    PYTHON,
     STAGE,
     STAGE_COMPENSATOR,
     STAGE_PREDICTOR,
@@ -239,7 +238,7 @@ class StreamMaker:
         return CoreStream(model, folder, learned)
 
 
-_SUFFIX = {NATIVE: "", PYTHON: "Py", FMI3: "Fmi3"}
+_SUFFIX = {NATIVE: "", FMI3: "Fmi3"}
 
 
 def fmu_name(model: str, implementation: str) -> str:
@@ -251,12 +250,11 @@ def fmu_name(model: str, implementation: str) -> str:
 def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, alike: Sequence[str] = ()) -> list[Any]:
     """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
 
-    With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
-    and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and so does the
-    latter but for a test of adapters, and what ``alike`` names (``one_set``); the other sets run at night, and so does
-    the comparison of a pythonfmu FMU of the stage with the library.
+    With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a native FMU computes is the C core's: it
+    runs one set of a test's other parameters, but for a test of adapters, and so does what ``alike`` names
+    (``one_set``); the other sets run at night.
     """
-    once = (PYTHON, *alike) if adapters and needs != "agreement" else (PYTHON, NATIVE, *alike)
+    once = alike if adapters and needs != "agreement" else (NATIVE, *alike)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
     if adapters:
         pairs.append((FMI3, models[0]))
@@ -266,12 +264,7 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, ali
             id=f"{implementation}-{model}",
             marks=[
                 *([pytest.mark.one_set] if implementation in once else []),
-                *([pytest.mark.slow] if implementation == PYTHON or model in STAGES else []),
-                *(
-                    [pytest.mark.nightly]
-                    if implementation == PYTHON and model in STAGES and needs == "agreement"
-                    else []
-                ),
+                *([pytest.mark.slow] if model in STAGES else []),
             ],
         )
         for implementation, model in pairs
