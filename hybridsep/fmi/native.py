@@ -60,7 +60,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
         from .weights import WEIGHTS_FILE, weights_file
 
         weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
-    reference = reference_run(spec, content)
+    reference = reference_run(spec)
     dependencies = filled("native_dependencies.txt")
     content |= documentation(spec, needs, dependencies, reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)

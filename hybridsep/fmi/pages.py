@@ -76,7 +76,6 @@ def documentation(
     run = {
         "name": name,
         "digits": AGREEMENT.get(model, 11),
-        "origin": "this FMU" if spec.flavour == "native" else "its native twin",
         "inputs": "",
     }
     if model != "ReferenceTrajectory":

@@ -40,7 +40,7 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits.html", version=version).rstrip("\n")
     content["model.png"] = icon(model)
-    reference = reference_run(spec, content)
+    reference = reference_run(spec)
     content |= documentation(spec, needs, filled("python_dependencies.txt", version=version), reference, limits=limits)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source

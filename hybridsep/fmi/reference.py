@@ -2,31 +2,26 @@
 
 The files are named and written as the FMI cross-check had them: ``<name>_in.csv`` with the inputs at each
 communication point, ``<name>_ref.csv`` with the outputs there, ``<name>_ref.opt`` with the times of the run. All
-parameters have their start values. The outputs are the FMU's own, by fmpy; the tests compare them with the library's.
+parameters have their start values. The outputs are the library's, which computes the same independently; the tests
+compare them with the FMU's.
 """
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack, closing
-from dataclasses import replace
-from itertools import groupby
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
-from ..base.errors import FmuError
-from ..base.settings import samples_before
+from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
+from ..base.threads import one_blas_thread
 from ..machines.machine import Machine
+from ..online.look_ahead import LookAhead
 from ..plants.plant import Encoder
 from ..plants.trajectory import staircase
-from .c_header import TABLE_FILE, table_file
-from .compile import TARGETS, host_target, libraries
-from .spec import FmuSpec, table_of
-from .variables import FmuTable
+from ..predict.predictor import HybridPredictor
+from .spec import FmuSpec
 
 REFERENCE_FOLDER = "documentation/reference"
 
@@ -36,8 +31,8 @@ AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}
 _SAMPLES = 600
 """Length of a run; a look-ahead's is longer if its fill and warm-up are."""
 
-_COMPENSATED_SAMPLES = 1500
-"""Length of a compensator's run: into the second move, when the hybrid model plans on all machines."""
+_COMPENSATED_SAMPLES = 750
+"""Length of a compensator's run: the hybrid model has planned half of it, on all machines."""
 
 _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000
@@ -51,99 +46,20 @@ _RESULT_RESOLUTION = 11
 
 _REL_TOL = 1e-4
 _GAIN, _NOISE_STD = 1.02, 5e-6
-_GUID = "{reference}"
-"""Of an FMU that only computes its reference: its table and its instance agree, whatever the archive's becomes."""
 
 
-class _HostFmu:
-    """A native FMU with its start values on this machine, before it is an archive.
+def reference_run(spec: FmuSpec) -> dict[str, bytes]:
+    """Return inputs, result and times: archive name → content; empty where the look-ahead is too long.
 
-    Parameters
-    ----------
-    table : FmuTable
-    resources : mapping
-        Content of its resources by file name; the table is added.
-    folder : Path
-        Empty.
-    T_s : float, s
-
-    Raises
-    ------
-    FmuError, OSError
-        If its library cannot be had, or not be loaded from the folder.
+    Platforms differ in the last digits, so it stays out of the GUID, as the binaries do.
     """
-
-    def __init__(self, table: FmuTable, resources: Mapping[str, bytes], folder: Path, T_s: float) -> None:
-        import fmpy  # which loads slowly
-        from fmpy.fmi2 import FMU2Slave
-
-        target, self._T_s, self._k = host_target(), T_s, 0
-        library = folder / "binaries" / fmpy.platform / f"{table.kind}{TARGETS[target].suffix}"
-        files = {library: libraries(table.kind, (target,))[target]}
-        files |= {folder / "resources" / file: content for file, content in resources.items()}
-        files[folder / "resources" / TABLE_FILE] = table_file(table, _GUID)
-        for file, content in files.items():
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(content)
-        here = Path.cwd()
-        try:  # fmpy changes the working directory while it loads a library, and leaves it changed if that fails
-            self._slave = FMU2Slave(
-                guid=_GUID, unzipDirectory=str(folder), modelIdentifier=table.kind, instanceName=table.name
-            )
-        finally:
-            os.chdir(here)
-        self.close = self._slave.freeInstance
-        self._slave.instantiate()
-        self._slave.setupExperiment(startTime=0.0)
-        self._slave.enterInitializationMode()
-        self._slave.exitInitializationMode()
-        gets = {"Real": self._slave.getReal, "Boolean": self._slave.getBoolean}
-        variables = list(enumerate(table.variables))
-        self._inputs = [i for i, variable in variables if variable.causality == "input" and variable.kind == "Real"]
-        outputs = [(i, variable.kind) for i, variable in variables if variable.causality == "output"]
-        self._outputs = [
-            (gets.get(kind, self._slave.getInteger), [i for i, _ in same])
-            for kind, same in groupby(outputs, lambda each: each[1])
-        ]
-
-    def outputs(self) -> list[float]:
-        """Return all outputs, in the order of the table."""
-        return [float(value) for get, references in self._outputs for value in get(references)]
-
-    def sample(self, *inputs: float) -> None:
-        """Do one step of T_s, with all positions that enter in the order of the table."""
-        self._slave.setReal(self._inputs, inputs)
-        self._slave.doStep(self._k * self._T_s, self._T_s)
-        self._k += 1
-
-
-def reference_run(spec: FmuSpec, content: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return inputs, result and times as the native FMU of that content runs them here: archive name → content.
-
-    Empty where the look-ahead is too long, or this machine cannot load its library. A Python FMU's is its native
-    twin's, which agrees with it. Platforms differ in the last digits, so it stays out of the GUID, as the binaries do.
-    """
-    machine, table, folder = spec.machine, spec.table, "resources/"
+    table, T_s = spec.table, spec.machine.T_s
     if int(table.parameters.get("preview", table.parameters.get("Np", 0))) > _WINDOW_MAX:
         return {}
-    resources = {
-        file.removeprefix(folder): data
-        for file, data in content.items()
-        if file.startswith(folder) and file.endswith(".bin")
-    }
-    with TemporaryDirectory(ignore_cleanup_errors=True) as place, ExitStack() as running:
-        try:
-            model = running.enter_context(closing(_HostFmu(table, resources, Path(place) / "model", machine.T_s)))
-            measure = _linear_drive(machine)
-            if machine.plant is not None:
-                plant = table_of(machine, "FeedDrive", "drive")
-                measure = _drive(running.enter_context(closing(_HostFmu(plant, {}, Path(place) / "d", machine.T_s))))
-        except (FmuError, OSError):  # no library, another C library, or a folder from which nothing may be loaded
-            return {}
-        rows = _run(spec, model, measure)
+    rows = {"FeedDrive": _drive_rows, "ReferenceTrajectory": _played_rows}.get(table.model, _look_ahead_rows)(spec)
     outputs = [(name, variable.kind) for name, variable in table.named("output").items()]
     inputs = [(name, variable.kind) for name, variable in table.named("input").items() if variable.kind == "Real"]
-    base, T_s = f"{REFERENCE_FOLDER}/{table.name}", machine.T_s
+    base = f"{REFERENCE_FOLDER}/{table.name}"
     options = {"StartTime": 0.0, "StopTime": (len(rows) - 1) * T_s, "StepSize": T_s, "RelTol": _REL_TOL}
     files = {
         f"{base}_ref.csv": _csv(T_s, outputs, (row for row, _ in rows), _RESULT_RESOLUTION),
@@ -154,42 +70,80 @@ def reference_run(spec: FmuSpec, content: Mapping[str, bytes]) -> dict[str, byte
     return files
 
 
-def _run(spec: FmuSpec, model: _HostFmu, measure: Callable[[float], float]) -> list[tuple[list[float], list[float]]]:
-    """Return the outputs at each communication point, and the inputs that go in there.
+Rows = list[tuple[list[float], list[float]]]
+"""Outputs at each communication point, and the inputs that go in there."""
 
-    The command is the staircase. A look-ahead runs through two windows of prediction; behind it is a drive that
-    measures what a command, m, leads to, of a compensator the modified one.
-    """
-    machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
-    n, inputs, on_the_way = _SAMPLES, "x_d" in spec.table.named("input"), deque[float]()
-    looks_ahead = "x_h" in names
-    if looks_ahead:
-        compensates = "x_dm" in names
-        sent = names.index("x_dm" if compensates else "x_d")
-        settings = machine.compensator_predictor if compensates else machine.predictor_settings
-        settings = replace(settings, t_init=parameters["t_init"])
-        warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))
-        n = min(max(_COMPENSATED_SAMPLES if compensates else _SAMPLES, 3 * settings.Np + warm_up), _SAMPLES_MAX)
-        on_the_way.extend([0.0] * settings.n_late)
+
+def _command(machine: Machine, n: int) -> list[float]:
+    """Return ``n + 1`` samples of the staircase, m, which ends at rest."""
     limits = {} if machine.limits is None else {"limits": machine.trajectory_limits()}
     command = np.round(staircase(machine.T_s, **limits)[: n + 1], _RESOLUTION)
-    rows = []
-    for x_d in np.pad(command, (0, n + 1 - len(command)), mode="edge").tolist():
-        outputs, given = model.outputs(), [x_d] if inputs or looks_ahead else []
-        if looks_ahead:
-            on_the_way.append(round(measure(outputs[sent]), _RESOLUTION))
-            given.append(on_the_way.popleft())
-        rows.append((outputs, given))
-        model.sample(*given)
+    rows: list[float] = np.pad(command, (0, n + 1 - len(command)), mode="edge").tolist()
     return rows
 
 
-def _drive(drive: _HostFmu) -> Callable[[float], float]:
-    """Return a function of ``x_d(k)`` that gives the measured ``x(k)`` of a plant."""
+def _played_rows(spec: FmuSpec) -> Rows:
+    """Return the rows of a trajectory, which stays where it ends."""
+    played = staircase(spec.machine.T_s) if spec.samples is None else spec.samples
+    return [([float(played[min(k, len(played) - 1)])], []) for k in range(_SAMPLES + 1)]
+
+
+def _drive_rows(spec: FmuSpec) -> Rows:
+    """Return the rows of a drive under the staircase."""
+    plant, encoder, rows = *_drive(spec.machine), Rows()
+    plant.reset(spec.table.rest)
+    for x_d in _command(spec.machine, _SAMPLES):
+        rows.append(([plant.x, plant.v, encoder.measure(plant.x)], [x_d]))
+        plant.step(x_d, spec.machine.T_s)
+    return rows
+
+
+@one_blas_thread
+def _look_ahead_rows(spec: FmuSpec) -> Rows:
+    """Return the rows of a look-ahead under the staircase, through two windows of prediction.
+
+    Behind it is a drive that measures what a command leads to, of a compensator the modified one.
+    """
+    machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
+    settings = PredictorSettings.from_fmi(parameters)
+    predictor, compensates = HybridPredictor(machine.model, settings), "x_dm" in names
+    if spec.trained is not None:
+        from .weights import restore_weights, weights_file
+
+        restore_weights(predictor, weights_file(spec.trained))
+    model: Any = predictor
+    if compensates:
+        from ..compensate.compensator import SepCompensator
+
+        model = SepCompensator(predictor, CompensatorSettings.from_fmi(parameters))
+    look_ahead = LookAhead(model, spec.table.rest, unit=machine.unit)
+    warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))
+    n = min(max(_COMPENSATED_SAMPLES if compensates else _SAMPLES, 3 * settings.Np + warm_up), _SAMPLES_MAX)
+    measure, on_the_way = _measured(machine), deque([0.0] * settings.n_late)
+    rows = Rows()
+    for x_d in _command(machine, n):
+        outputs = [float(getattr(look_ahead, name)) for name in names]
+        on_the_way.append(round(measure(look_ahead.x_dm), _RESOLUTION))
+        rows.append((outputs, [x_d, on_the_way.popleft()]))
+        look_ahead.sample(*rows[-1][1])
+    return rows
+
+
+def _drive(machine: Machine) -> tuple[Any, Encoder]:
+    """Return a machine's plant and its encoder."""
+    assert machine.plant is not None  # by fmu_names
+    return machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
+
+
+def _measured(machine: Machine) -> Callable[[float], float]:
+    """Return a function of ``x_d(k)`` that gives the measured ``x(k)`` of the plant, or of a linear drive."""
+    if machine.plant is None:
+        return _linear_drive(machine)
+    plant, encoder = _drive(machine)
 
     def measure(x_d: float) -> float:
-        *_, x_meas = drive.outputs()
-        drive.sample(x_d)
+        x_meas = encoder.measure(plant.x)
+        plant.step(x_d, machine.T_s)
         return x_meas
 
     return measure
