@@ -199,12 +199,6 @@ class Replay:
         place = self._place[self._judged]
         return [known_rms(one.errors[place < n]) for one in self.scored()]
 
-    def residuals(self) -> list[tuple[Array, Array]]:
-        """Return ``x_pb``, ``(n,)``, and ``x`` and ``x_h`` minus it, ``(2, n)``, m, over each whole recording."""
-        x_pb = self.backtest.x_pb
-        both = np.stack((self._compared, self.backtest.x_h)) - x_pb
-        return [(x_pb[span], both[:, span]) for span in self._spans if span.stop - span.start > 1]
-
     def modelled(self, *, tested: bool = False) -> list[tuple[Array, Array, Array]]:
         """Return commands, positions and the physics model's errors of the same instants, (n,) each, m.
 

@@ -13,7 +13,6 @@ from scipy.signal import welch
 from ..base.metrics import coverage
 from ..base.signals import Array
 from ..evaluate.html_report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
-from ..evaluate.reversals import friction_table, reversal_curve
 from ..identify.model import IdentifiedModel
 from ..identify.validation import FrequencyResponse, ResidualTest, frequency_response, model_response, residual_test
 from ..logs.checks import Finding
@@ -44,7 +43,6 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
         _write_time(report, judged)
         _write_horizon(report, judged)
         _write_spectra(report, judged)
-    _write_reversals(report, judged)
     return report
 
 
@@ -235,36 +233,6 @@ def _write_spectra(report: Report, judged: Judged) -> None:
     lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
     report.heading("Spectra of the errors")
     report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
-
-
-def _write_reversals(report: Report, judged: Judged) -> None:
-    pieces = judged.replay.residuals()
-    curve = reversal_curve(pieces)
-    if curve is None:
-        return
-    scale, unit = judged.shown.error(curve.errors[0])
-    near, near_unit = judged.shown.error(curve.distance[-1])
-    report.heading("Backlash and friction")
-    report.paragraph(
-        f"Reversal error {scale * curve.errors[0]:.3g} ± {scale * curve.deviation:.2g} {unit}, of which 63 % come "
-        f"about within {judged.shown.words(curve.settling)}. The hybrid predicts {scale * curve.errors[1]:.3g} {unit}."
-    )
-    names = zip(("measured", "hybrid"), (_COMMAND, HYBRID), curve.changes, strict=True)
-    report.chart(
-        Chart(
-            f"distance since the reversal [{near_unit}]",
-            (f"lag behind the physics model [{unit}]",),
-            [Line(name, near * curve.distance, scale * row, colour) for name, colour, row in names],
-            f"Position after a reversal against that before it at the same place, median of {curve.n} reversals in the "
-            "whole log, without what grows with the velocity.",
-        )
-    )
-    factor, position = judged.shown.position
-    velocities, (measured, _) = friction_table(pieces, curve.slope, max(judged.replay.Np // 2, 1))
-    if len(velocities):
-        rows = zip(factor / judged.T_s * velocities, scale * measured, strict=True)
-        report.paragraph("Friction at the velocities of the log, for the table of a controller that takes one:")
-        report.code(f"velocity [{position}/s], error [{unit}]\n" + "\n".join(f"{v:.4g}, {e:.3g}" for v, e in rows))
 
 
 def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> None:
