@@ -54,7 +54,7 @@ def backtest(
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
     from ..evaluate.backtest import replayed_run
-    from ..fitting.advice import Judged, extent, recommendation, whole_log_words
+    from ..fitting.advice import Judged, advice_on, extent, whole_log_words
     from ..fitting.replay import Recording, knew, replay
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
@@ -112,12 +112,12 @@ def backtest(
     verdict = str(replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples))
     if as_json:
         figures = {name.replace("_um", f"_u{axis.unit}"): value for name, value in scores.summary().items()}
-        more = {"findings": findings_table(findings), "advice": recommendation(judged), "controller": judged.controller}
-        print_json({**figures, "judged": replayed.judgement(), "verdict": verdict, **more})
+        more = {"findings": findings_table(findings), "advice": advice_on(judged), "controller": judged.controller}
+        print_json({**figures, "judged": replayed.figures(), "verdict": verdict, **more})
         return
     console.print(f"{log.name}: {extent([read])}")
     print_judged(judged, f"{title}: prediction error against the measured position", verdict)
-    for line in dict.fromkeys((words, recommendation(judged))):
+    for line in dict.fromkeys((words, advice_on(judged))):
         console.print(line)
     print_written(report, figure, *saved)
 

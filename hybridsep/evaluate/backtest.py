@@ -22,7 +22,7 @@ from ..cosim.run import PREDICTOR, Run
 from ..logs.log import Log, Table, is_table, read_log
 from ..online.look_ahead import SepState
 from ..predict.predictor import HybridPredictor
-from .verdict import Tally, Verdict
+from .verdict import Verdict, judge
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,7 +126,7 @@ def backtest(
     n, Np, delay = len(command), predictor.Np, predictor.settings.n_late
     if n == 0:
         raise SignalError("a log must have at least one sample, got none")
-    tally, n_rejected, parts = Tally(Np), 0, []
+    n_rejected, parts = 0, []
     for begin, end in zip(starts, (*starts[1:], n), strict=True):
         if begin:
             predictor.restart()
@@ -153,13 +153,12 @@ def backtest(
         at_rest[4:] = 0.0
         rows = np.concatenate((at_rest, rows), axis=1)[:, : len(x)]
         compared = np.where(np.arange(len(x)) < delay, np.nan, x)
-        for k in range(0, len(x), Np):
-            tally.add(rows[0, k : k + Np], compared[k : k + Np], rows[1:4, k : k + Np])
-        parts.append(np.concatenate((rows[1:], compared - rows[1:4])))
+        parts.append(np.concatenate((rows[1:], compared - rows[1:4], [rows[0], compared, np.arange(len(x)) % Np])))
     x_pb, x_hold, x_h, x_h_std, published, *_ = signals = np.concatenate(parts, axis=1)
-    active, errors = published > 0.0, signals[5:]
+    active, errors, (arrived, compared, place) = published > 0.0, signals[5:8], signals[8:]
     batches = [np.concatenate([batch_rms(part[i], Np) for part in parts]) for i in (5, 6, 7)]
-    verdict = tally.verdict(n_rejected=n_rejected, n_missing=int(np.isnan(measured).sum()))
+    made_of = (arrived, compared, signals[:3], place.astype(np.int64), Np)
+    verdict = judge(*made_of, n_rejected=n_rejected, n_missing=int(np.isnan(measured).sum()))
     scores = Score.of(errors), Score.of(errors[:, active])
     return Backtest(*scores, verdict, x_pb, x_hold, x_h, x_h_std, active, *batches)
 

@@ -1,19 +1,18 @@
 """Verdict on a hybrid model in words: better or worse than the physics model, hold and other peers, where, and why.
 
 The errors of a run are summed up by place: a third of the look-ahead window, and whether the axis is commanded to move.
-What is kept does not grow with the run.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.metrics import rms_ratio
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from ..cosim.run import Run
 
 ALIKE = 0.02
@@ -82,126 +81,106 @@ class Verdict:
 
 def verdict_of(run: Run) -> Verdict:
     """Return the verdict on the prediction of a run."""
-    tally, predictions = Tally(run.Np), np.stack((run.x_pb, run.x_hold, run.x_h))
-    for first in range(0, len(run.t), run.Np):
-        window = slice(first, first + run.Np)
-        tally.add(run.x_d[window], run.x_meas[window], predictions[:, window])
-    return tally.verdict(n_rejected=run.n_rejected)
+    predictions, place = np.stack((run.x_pb, run.x_hold, run.x_h)), np.arange(len(run.t)) % run.Np
+    return judge(run.x_d, run.x_meas, predictions, place, run.Np, n_rejected=run.n_rejected)
 
 
-class Tally:
-    """Running sums of the errors of the peers and of the hybrid, by their place.
+def judge(
+    x_d: Array,
+    x: Array,
+    predictions: Array,
+    place: Indices,
+    Np: int,
+    *,
+    further: Sequence[str] = (),
+    least: float = 0.0,
+    n_rejected: int = 0,
+    n_missing: int | None = None,
+) -> Verdict:
+    """Return the verdict on predictions of whole windows, of which the last may be shorter.
 
     Parameters
     ----------
-    Np : int
-        Samples in a window.
+    x_d, x : (n,) array, m
+        Commanded and measured positions, NaN where missing.
+    predictions : (3 or more, n) array, m
+        ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``.
+    place : (n,) array of int
+        Number of each sample in its window of ``Np``.
     further : sequence of str
         Names of peers besides :data:`_PEERS`.
     least : float
         Least RMS error, m, that the measurement's resolution shows: no ratio to a smaller one is formed.
+    n_rejected, n_missing : int
+        Measurements not learned, and of these missing ones; as many as the samples lack, if left out.
     """
+    begin, known = np.flatnonzero(place == 0), ~np.isnan(x)
+    window = np.cumsum(place == 0) - 1
+    speed = np.abs(np.diff(x_d, prepend=x_d[:1]))
+    fastest = np.maximum.accumulate(np.maximum.reduceat(speed, begin))[window] if len(x) else speed
+    moving = speed > STANDSTILL * fastest
+    squares = np.where(known, (x - predictions) ** 2, 0.0)
+    cell = _N_THIRDS * moving + np.minimum(place * _N_THIRDS // Np, _N_THIRDS - 1)
+    shape = (len(_MOTIONS), _N_THIRDS)
+    sums = np.array([np.bincount(cell, row, math.prod(shape)) for row in (*squares, 1.0 * known)], np.float64)
+    *peers, h, counts = sums.reshape(-1, *shape)
+    total = float(counts.sum())
+    ratios = tuple(math.nan if peer.sum() < least**2 * total else _ratio(h.sum(), peer.sum()) for peer in peers)
+    whole = (np.bincount(window) == Np) & (np.bincount(window, known) > 0)
+    places = _places(counts)
+    lost = int((~known).sum())
+    later = squares[:, window >= _N_EARLY].sum(axis=1) if len(begin) > 2 * _N_EARLY else None
+    change = float(np.abs(predictions[-1] - predictions[0]).max(initial=0.0))
+    largest = math.sqrt(squares[0].max(initial=0.0))
+    return Verdict(
+        (*_PEERS, *further),
+        ratios,
+        tuple(_worse(h, peer, places) for peer in peers),
+        tuple(places),
+        tuple(_causes(ratios[: len(_PEERS)], change, largest, float(counts[1].sum()) / max(total, 1.0), later)),
+        n_rejected,
+        min(lost if n_missing is None else n_missing, n_rejected),
+        int(total) + lost,
+        int(whole.sum()),
+    )
 
-    def __init__(self, Np: int, further: Sequence[str] = (), least: float = 0.0) -> None:
-        self.Np, self._least = Np, least
-        self._peers = (*_PEERS, *further)
-        self._squares = np.zeros((len(self._peers) + 1, len(_MOTIONS), _N_THIRDS))
-        self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
-        self._early, self._n_windows, self._n_whole = np.zeros(len(self._squares)), 0, 0
-        self._last_x_d = math.nan
-        self._fastest = 0.0
-        self._largest_residual = self._largest_change = 0.0
-        self._n_missing = 0
 
-    def add(self, x_d: Array, x: Array, predictions: Array) -> None:
-        """Add a window.
+def _places(counts: Array) -> dict[str, tuple[int, int]]:
+    """Return the places with enough samples: name → axis of the sums, and place there."""
+    places = {name: (0, i) for i, name in enumerate(_MOTIONS)} | {name: (1, i) for i, name in enumerate(_THIRDS)}
+    least = max(_LEAST_SHARE * counts.sum(), 1.0)
+    return {name: (axis, i) for name, (axis, i) in places.items() if counts.take(i, axis=axis).sum() >= least}
 
-        Parameters
-        ----------
-        x_d, x : (n,) array, m
-            Commanded and measured positions, NaN where missing.
-        predictions : (3 or more, n) array, m
-            ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``.
-        """
-        speed = np.empty(len(x_d))
-        speed[0] = 0.0 if math.isnan(self._last_x_d) else abs(x_d[0] - self._last_x_d)
-        np.abs(x_d[1:] - x_d[:-1], out=speed[1:])
-        self._last_x_d = float(x_d[-1])
-        self._fastest = max(self._fastest, float(speed.max()))
-        moving = (speed > STANDSTILL * self._fastest).astype(np.int64)
-        third = np.minimum(np.arange(len(x)) * _N_THIRDS // self.Np, _N_THIRDS - 1)
-        known = ~np.isnan(x)
-        squares = (x - predictions) ** 2
-        if not known.all():
-            squares = np.where(known, squares, 0.0)
-        place = _N_THIRDS * moving + third
-        for total, weights in zip((*self._squares, self._counts), (*squares, known), strict=True):
-            total += np.bincount(place, weights, total.size).reshape(total.shape)
-        self._n_missing += int((~known).sum())
-        self._largest_change = max(self._largest_change, float(np.abs(predictions[-1] - predictions[0]).max()))
-        if known.any():
-            self._largest_residual = max(self._largest_residual, float(np.sqrt(squares[0].max())))
-        if self._n_windows < _N_EARLY:
-            self._early += squares.sum(axis=1)
-        self._n_windows += 1
-        self._n_whole += int(len(x) == self.Np and known.any())
 
-    def verdict(self, *, n_rejected: int = 0, n_missing: int | None = None) -> Verdict:
-        """Return the verdict on the windows so far, with the numbers of measurements not learned, and of missing ones.
+def _worse(h: Array, peer: Array, places: Mapping[str, tuple[int, int]]) -> tuple[str, ...]:
+    """Return the places where the hybrid is worse."""
+    sums = {name: (h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) for name, (axis, i) in places.items()}
+    return tuple(name for name, pair in sums.items() if _ratio(*pair) > 1.0 + ALIKE)
 
-        The latter are among the former; as many as the windows lack, if left out.
-        """
-        *peers, h = self._squares
-        least = self._least**2 * self._counts.sum()
-        ratios = tuple(math.nan if peer.sum() < least else _ratio(h.sum(), peer.sum()) for peer in peers)
-        n_samples = int(self._counts.sum()) + self._n_missing
-        return Verdict(
-            self._peers,
-            ratios,
-            tuple(self._worse(h, peer) for peer in peers),
-            tuple(self._places()),
-            tuple(self._causes(ratios[: len(_PEERS)])),
-            n_rejected,
-            min(self._n_missing if n_missing is None else n_missing, n_rejected),
-            n_samples,
-            self._n_whole,
-        )
 
-    def _places(self) -> dict[str, tuple[int, int]]:
-        """Return the places with enough samples: name → axis of the sums, and place there."""
-        places = {name: (0, i) for i, name in enumerate(_MOTIONS)} | {name: (1, i) for i, name in enumerate(_THIRDS)}
-        least = max(_LEAST_SHARE * self._counts.sum(), 1.0)
-        return {name: (axis, i) for name, (axis, i) in places.items() if self._counts.take(i, axis=axis).sum() >= least}
+def _causes(ratios: Sequence[float], change: float, largest: float, moving: float, later: Array | None) -> list[str]:
+    """Return what explains a hybrid that is worse than some of :data:`_PEERS`.
 
-    def _worse(self, h: Array, peer: Array) -> tuple[str, ...]:
-        """Return the places where the hybrid is worse."""
-        return tuple(
-            name
-            for name, (axis, i) in self._places().items()
-            if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + ALIKE
-        )
-
-    def _causes(self, ratios: Sequence[float]) -> list[str]:
-        """Return what explains a hybrid that is worse than some of :data:`_PEERS`."""
-        if self._largest_change > _UNSTABLE * self._largest_residual > 0.0:
-            times = self._largest_change / self._largest_residual
-            return [f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"]
-        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
-        if not peers:
-            return []
-        causes = []
-        moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
-        if moving < _LITTLE_MOTION:
-            causes.append(f"hardly any motion, in {100 * moving:.2g} % of these samples")
-        rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
-        good_later = all(_ratio(rest[-1], rest[peer]) <= 1.0 + ALIKE for peer in peers)
-        if good_later and self._n_windows > 2 * _N_EARLY:
-            causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")
-        elif ratios[0] <= 1.0 + ALIKE and not causes:
-            causes.append("the residual changes so slowly that its last value predicts it better than the motion does")
-        elif not causes:
-            causes.append("the residual does not repeat with the motion")
-        return causes
+    ``change`` is the largest of the prediction and ``largest`` the largest residual, m, ``moving`` the share of samples
+    in motion, ``later`` the sums of squares behind the beginning of a long run.
+    """
+    if change > _UNSTABLE * largest > 0.0:
+        return [
+            f"the prediction is unstable: it leaves the physics model by {change / largest:.2g} × the largest residual"
+        ]
+    peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
+    if not peers:
+        return []
+    causes = []
+    if moving < _LITTLE_MOTION:
+        causes.append(f"hardly any motion, in {100 * moving:.2g} % of these samples")
+    if later is not None and all(_ratio(later[-1], later[peer]) <= 1.0 + ALIKE for peer in peers):
+        causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")
+    elif ratios[0] <= 1.0 + ALIKE and not causes:
+        causes.append("the residual changes so slowly that its last value predicts it better than the motion does")
+    elif not causes:
+        causes.append("the residual does not repeat with the motion")
+    return causes
 
 
 def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:

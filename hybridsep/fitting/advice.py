@@ -81,7 +81,7 @@ def whole_log_words(*, warm: bool, known: bool) -> str:
     )
 
 
-def recommendation(judged: Judged) -> str:
+def advice_on(judged: Judged) -> str:
     """Return what to do, in words; with caution where there are few test windows.
 
     The hybrid is recommended where it is better than each of physics model, hold and peers alone.

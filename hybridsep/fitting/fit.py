@@ -33,7 +33,7 @@ from ..machines.text import machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .advice import Judged, recommendation
+from .advice import Judged, advice_on
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, largest_motion
@@ -122,7 +122,7 @@ class Fit:
     @property
     def advice(self) -> str:
         """What to do, in words."""
-        return recommendation(self.judged)
+        return advice_on(self.judged)
 
     def predictor(self) -> HybridPredictor:
         """Return the trained predictor at the beginning of a run."""
@@ -228,7 +228,7 @@ class Fit:
             "choice": plain(self.choice),
             "plant": plain(self.plant),
             "tracking": plain(self.tracking) or {},
-            "judged": plain(self.judged.replay.judgement()),
+            "judged": plain(self.judged.replay.figures()),
             "controller": plain(self.judged.controller) or {},
         }
 

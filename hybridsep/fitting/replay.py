@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..base.metrics import ErrorSize, known_rms, rms_ratio
 from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.peers import Peer, Piece, predict_peers
-from ..evaluate.verdict import Tally, Verdict
+from ..evaluate.verdict import Verdict, judge
 from ..identify.output_error import delayed
 from ..logs.checks import resolution
 from ..predict.predictor import HybridPredictor
@@ -90,7 +91,7 @@ def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
 
 
 @dataclass(frozen=True)
-class Scored:
+class Errors:
     """Errors of a prediction over the test samples."""
 
     name: str
@@ -101,23 +102,6 @@ class Scored:
     def rms(self) -> float:
         """RMS of the errors, m; infinite where it diverged, NaN without a measurement."""
         return math.inf if self.diverged else known_rms(self.errors)
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """Figures of a replay over the test samples."""
-
-    # RMS of physics model, hold and hybrid, m
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
-    peers: Mapping[str, float | str]  # name of a peer → its RMS, m, or ``"diverged"``
-    best: str  # best of physics model, hold and peers
-    ratio: float  # the hybrid's RMS relative to its
-    # name of each that did not diverge, as in :meth:`Replay.scored` → its largest error, m
-    largest: Mapping[str, float]
-    n_windows: int
-    verdict: str  # in words
 
 
 @dataclass(frozen=True)
@@ -169,12 +153,12 @@ class Replay:
         """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
         return [known_rms(row) for row in self.errors()]
 
-    def scored(self) -> list[Scored]:
+    def scored(self) -> list[Errors]:
         """Return the errors of physics model, hold, every peer, and the hybrid, over the test samples."""
         pb, hold, h = self.errors()
         errors = [(self._compared - np.concatenate(one.predictions))[self._judged] for one in self.peers]
-        peers = [Scored(peer.title, one, peer.diverged) for peer, one in zip(self.peers, errors, strict=True)]
-        return [Scored("physics model", pb), Scored("hold", hold), *peers, Scored("hybrid", h)]
+        peers = [Errors(peer.title, one, peer.diverged) for peer, one in zip(self.peers, errors, strict=True)]
+        return [Errors("physics model", pb), Errors("hold", hold), *peers, Errors("hybrid", h)]
 
     def best_ways(self) -> list[Peer]:
         """Return the peers, each fitted in the way that is better over the test samples; none that diverged."""
@@ -185,7 +169,7 @@ class Replay:
                 best.setdefault(peer.name, peer)
         return [peer for peer in self.peers if best.get(peer.name) is peer]
 
-    def best(self) -> Scored:
+    def best(self) -> Errors:
         """Return the best of physics model, hold and peers over the test samples."""
         return min(self.scored()[:-1], key=lambda one: one.rms)
 
@@ -214,23 +198,30 @@ class Replay:
     def verdict(self) -> Verdict:
         """Return the verdict on the test samples."""
         peers = self.best_ways()
-        tally = Tally(self.Np, [peer.title for peer in peers], self.least)
         pb, hold, h = self._predictions
         rows = np.stack((pb, hold, *(np.concatenate(peer.predictions) for peer in peers), h))
-        for recording, span in zip(self.recordings, self._spans, strict=True):
-            for begin in range(span.start + recording.first_judged(self.Np), span.stop, self.Np):
-                window = slice(begin, min(begin + self.Np, span.stop))
-                tally.add(recording.x_d[begin - span.start :][: self.Np], self._compared[window], rows[:, window])
-        return tally.verdict()
+        of = (self.commands(), self._compared[self._judged], rows[:, self._judged], self._place[self._judged])
+        return judge(*of, self.Np, further=[peer.title for peer in peers], least=self.least)
 
-    def judgement(self) -> Judgement:
-        """Return the figures; the physics model is judged with the offset, which the FMU's ``x_pb`` has not."""
+    def figures(self) -> dict[str, Any]:
+        """Return the figures over the test samples, m, by name; the physics model is judged with its offset.
+
+        ``best`` of physics model, hold and peers, to which the hybrid's error has the ``ratio``; the ``largest`` error
+        of each that did not diverge.
+        """
         scored, verdict, best = self.scored(), self.verdict(), self.best()
         rms_pb, rms_hold, rms_h = self.rms()
-        peers: dict[str, float | str] = {one.name: "diverged" if one.diverged else one.rms for one in scored[2:-1]}
-        ratio = rms_ratio(rms_h, best.rms, self.least)
-        most = {one.name: ErrorSize.of(one.errors).largest for one in scored if not one.diverged}
-        return Judgement(rms_pb, rms_hold, rms_h, peers, best.name, ratio, most, verdict.n_windows, str(verdict))
+        return {
+            "rms_pb": rms_pb,
+            "rms_hold": rms_hold,
+            "rms_h": rms_h,
+            "peers": {one.name: "diverged" if one.diverged else one.rms for one in scored[2:-1]},
+            "best": best.name,
+            "ratio": rms_ratio(rms_h, best.rms, self.least),
+            "largest": {one.name: ErrorSize.of(one.errors).largest for one in scored if not one.diverged},
+            "n_windows": verdict.n_windows,
+            "verdict": str(verdict),
+        }
 
     @cached_property
     def _spans(self) -> list[slice]:

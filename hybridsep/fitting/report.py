@@ -17,7 +17,7 @@ from ..identify.model import IdentifiedModel
 from ..identify.validation import FrequencyResponse, ResidualTest, frequency_response, model_response, residual_test
 from ..logs.checks import Finding
 from ..logs.log import Log
-from .advice import OF_ITSELF, Judged, extent, peers_in_words, recommendation
+from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
 from .choice import WORTH, Tried
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")
@@ -34,7 +34,7 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     Np = judged.replay.Np
     names, look_ahead = ", ".join(log.path.name for log in logs), 1e3 * Np * judged.T_s
     report = Report(title, f"{names} · {extent(logs)} · look-ahead {Np} samples, {look_ahead:.4g} ms")
-    report.paragraph(recommendation(judged), "verdict")
+    report.paragraph(advice_on(judged), "verdict")
     _write_figures(report, judged, heading, how)
     if said := judged.of_the_controller():
         report.heading(OF_ITSELF)

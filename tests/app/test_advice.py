@@ -11,7 +11,7 @@ import pytest
 
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Peer
-from hybridsep.fitting.advice import Judged, recommendation
+from hybridsep.fitting.advice import Judged, advice_on
 from hybridsep.fitting.replay import Recording, Replay
 from hybridsep.logs.units import shown_in
 
@@ -39,10 +39,10 @@ def test_more_motion_is_advised_where_there_is_little(hybrid: float, arx: float,
     t = np.arange(N) * 1e-3
     moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
     resting = moving[np.minimum(np.arange(N) % (N // 2), N // 20)]
-    advice = recommendation(judged(moving, hybrid, arx))
+    advice = advice_on(judged(moving, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows.")
-    advice = recommendation(judged(resting, hybrid, arx))
+    advice = advice_on(judged(resting, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows; the axis moves in 10 % of the samples: record more motion.")
 
@@ -51,9 +51,9 @@ def test_nothing_is_advised_where_the_axis_rests() -> None:
     """In the half that is tested, or in the one that physics model and others learn from."""
     t = np.arange(N) * 1e-3
     moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
-    advice = recommendation(judged(np.where(t < 0.1, moving, moving[100]), 1e-6, 9e-6))
+    advice = advice_on(judged(np.where(t < 0.1, moving, moving[100]), 1e-6, 9e-6))
     assert advice == "Nothing was tested: the commanded position does not move in the half; record moves to its end."
-    advice = recommendation(replace(judged(moving, 1e-6, 9e-6), unidentified=True))
+    advice = advice_on(replace(judged(moving, 1e-6, 9e-6), unidentified=True))
     assert advice.startswith(
         "So far the hybrid is better than the physics model alone, 0.33 × its error, but the first"
     )
@@ -77,7 +77,7 @@ def judged_of_rounded(peer: float) -> Judged:
 def test_no_ratio_is_formed_to_an_error_that_the_resolution_does_not_show() -> None:
     """It was "71545304172.46 × lag + hold"."""
     found = judged_of_rounded(1e-12)
-    assert recommendation(found) == (
+    assert advice_on(found) == (
         "There is nothing to gain in the half: the log's resolution does not show the error of ARX20 (refitted)."
     )
     words = str(found.replay.verdict())
@@ -98,7 +98,7 @@ def test_what_would_help_is_said() -> None:
     error = np.where(late, np.where(np.arange(N) < 3 * N // 4, 9e-6, 5e-6), 1e-6)
     result = SimpleNamespace(x_pb=np.full(N, 3e-6), x_hold=np.full(N, -3e-6), x_h=error)
     learned = replace(one, replay=replace(one.replay, backtest=cast(Any, result)), period="with --period 0.005 better")
-    words = recommendation(learned)
+    words = advice_on(learned)
     assert (
         "× the error of the physics model alone, which is best, judged by 25 windows. What may help: a smaller" in words
     )

@@ -7,7 +7,7 @@ import pytest
 
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
+from hybridsep.evaluate.verdict import Verdict, judge, verdict_of
 from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
@@ -16,7 +16,6 @@ NP = 30
 UM = 1e-6
 NOISE = np.random.default_rng(0).normal(size=NP)
 HALF = np.arange(NP) < NP // 2
-MOVING = np.linspace(0.0, 1e-3 * (NP - 1), NP)
 
 
 def errors(*sizes: Array | float) -> Array:
@@ -32,17 +31,17 @@ def verdict(
     n: int = 40,
     motion: Array | float = 1e-3,
     n_missing: int = 0,
-    **how: int,
+    n_rejected: int = 0,
 ) -> Verdict:
     """Return the verdict on ``n`` windows with these errors, µm; the axis moves by ``motion``, m a sample."""
-    tally, x_d, x = Tally(NP), 0.0, np.zeros(NP)
+    x = np.zeros(n * NP)
     x[:n_missing] = np.nan
-    for _ in range(n):
-        command = x_d + np.cumsum(np.full(NP, motion))
-        x_d = float(command[-1])
-        tally.add(command, x, errors(pb, hold, h))
-        x = np.zeros(NP)
-    return tally.verdict(**how)
+    x_d = np.cumsum(np.tile(np.broadcast_to(motion, NP), n))
+    return judged(x_d, x, np.tile(errors(pb, hold, h), n), n_rejected)
+
+
+def judged(x_d: Array, x: Array, predictions: Array, n_rejected: int = 0) -> Verdict:
+    return judge(x_d, x, predictions, np.arange(len(x)) % NP, NP, n_rejected=n_rejected)
 
 
 def test_better_everywhere() -> None:
@@ -93,10 +92,8 @@ def test_causes(sizes: tuple[float, float, float], motion: Array | float, cause:
 
 
 def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
-    tally, x_d = Tally(NP), MOVING
-    for k in range(60):
-        tally.add(x_d + k * NP * 1e-3, np.zeros(NP), errors(10, 10, 28 if k < 10 else 2))
-    found = tally.verdict()
+    predictions = np.hstack([errors(10, 10, 28 if k < 10 else 2) for k in range(60)])
+    found = judged(np.linspace(0.0, 1.8, 60 * NP), np.zeros(60 * NP), predictions)
     assert found.ratios[0] > 1.1
     assert found.causes == ("only the first 10 windows are worse, where hardly anything has been learned yet",)
 
@@ -121,19 +118,16 @@ def test_few_windows_are_told_and_fewer_judge_nothing() -> None:
     assert said.startswith("Better than the physics model: 0.4")
     assert said.endswith("\nJudged by 19 windows only.")
     assert str(verdict(10, 8, 4, n=2)) == "Nothing is judged: 2 windows, at least 3 are needed."
-    tally = Tally(NP)
-    for window in (np.full(NP, np.nan), np.zeros(NP), np.zeros(NP - 1)):  # nothing measured, whole, cut
-        n = len(window)
-        tally.add(MOVING[:n], window, errors(10, 8, 4)[:, :n])
-    assert tally.verdict().n_windows == 1
+    x = np.concatenate((np.full(NP, np.nan), np.zeros(2 * NP - 1)))  # nothing measured, whole, cut
+    assert judged(np.linspace(0.0, 0.1, len(x)), x, np.tile(errors(10, 8, 4), 3)[:, : len(x)]).n_windows == 1
+    assert str(judged(np.empty(0), np.empty(0), np.empty((3, 0)))).startswith("Nothing is judged: 0 windows")
 
 
 def test_missing_measurements_are_not_judged() -> None:
-    tally, x = Tally(NP), np.zeros(NP)
-    x[:3] = np.nan
-    tally.add(MOVING, x, errors(10, 8, 4))
-    tally.add(MOVING, np.full(NP, np.nan), np.ones((3, NP)))
-    found = tally.verdict(n_rejected=NP + 3)
+    x = np.zeros(2 * NP)
+    x[[0, 1, 2, *range(NP, 2 * NP)]] = np.nan
+    predictions = np.hstack((errors(10, 8, 4), np.ones((3, NP))))
+    found = judged(np.linspace(0.0, 0.06, 2 * NP), x, predictions, n_rejected=NP + 3)
     assert found.ratios[0] == pytest.approx(0.4)
     assert found.n_samples == 2 * NP
 

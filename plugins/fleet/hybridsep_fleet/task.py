@@ -17,7 +17,7 @@ from hybridsep.base.errors import MachineError, brief
 from hybridsep.base.files import plain
 from hybridsep.base.metrics import rms_ratio
 from hybridsep.base.threads import one_blas_thread
-from hybridsep.fitting.advice import Judged, recommendation
+from hybridsep.fitting.advice import Judged, advice_on
 from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording, Replay, replay
 from hybridsep.fitting.report import begun_report, write_findings
@@ -150,7 +150,7 @@ def _figures(found: _Judged) -> dict[str, Any]:
         "best": best.name,
         "ratio": _known(rms_ratio(rms_h, best.rms, judged.replay.least)),
         "verdict": str(verdict),
-        "advice": recommendation(judged),
+        "advice": advice_on(judged),
         "peers": json.dumps(peers),
         "modes": json.dumps(plain(found.modes)),
         "findings": json.dumps([[one["name"], one["severity"], one["words"]] for one in findings]),
