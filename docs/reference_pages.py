@@ -178,10 +178,7 @@ def fmu_variables() -> str:
         "Native FMUs whose names have `Fmi3` (`HybridPredictorFmi3`) are the twins of those above: the same "
         "variables, units, ranges, start values and dependencies, with other types.",
         _table(("FMI 2.0", "FMI 3.0"), types),
-        "With `averaging` false, `fmi3GetDirectionalDerivative` gives what a change of `x_d_window` makes of `x_h` and "
-        "`x_h_window`, eq. (3): `x_d_window` is what came by `x_d_ahead`, and no output follows an input at once. With "
-        "averaging, whose model is not linear in the commands, it is refused. SepCompensator has none, as its plan "
-        "keeps limits. "
+        "No output follows an input at once, and there are no directional derivatives. "
         "`Np` is set in Configuration Mode, or when the instance is there, and the arrays take its size; a state is "
         "taken by an instance of the same `Np`. `mode[i].*` stay scalars. There is no event mode, no early return, no "
         "intermediate update and no clock, and inputs have no derivatives. The state can be saved, restored and "

@@ -83,8 +83,6 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
             simulation.set("canHandleVariableCommunicationStepSize", "false")
         if native:
             ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name="all.c")
-    elif any(size is not None for _, size in described):
-        simulation.set("providesDirectionalDerivatives", "true")
     if fmi3 and model not in _OWN_STEPS:
         simulation.set("fixedInternalStepSize", _text(spec.machine.T_s))
     used = {variable.unit for variable in table}

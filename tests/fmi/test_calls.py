@@ -42,8 +42,7 @@ OF_VERSION = {
     | {f"Set{kind}": SETTABLE for kind in Library.values},
     3: {f"Get{kind}": ALWAYS for kind in (*Library3.values, "Binary")}
     | {f"Set{kind}": SETTABLE for kind in (*Library3.values, "Binary")}
-    | {"SetUInt64": {"instantiated"}, "EnterConfigurationMode": {"instantiated"}, "ExitConfigurationMode": set()}
-    | {"GetDirectionalDerivative": {"Initialization Mode", "stepping"}},
+    | {"SetUInt64": {"instantiated"}, "EnterConfigurationMode": {"instantiated"}, "ExitConfigurationMode": set()},
 }
 PLACES: list[Any] = [c_bool(), c_bool(), c_bool(), c_double()]
 ARGUMENTS: dict[int, dict[str, tuple[Any, ...]]] = {
@@ -59,7 +58,6 @@ ARGUMENTS: dict[int, dict[str, tuple[Any, ...]]] = {
         "SetDebugLogging": (True, 0, None),
         "EnterInitializationMode": Library3.initialization,
         "DoStep": (0.0, 1e-3, True, *map(byref, PLACES)),
-        "GetDirectionalDerivative": (None, 0) * 4,
         **{f"{verb}{kind}": (None, 0, None, 0) for verb in ("Get", "Set") for kind in Library3.values},
         **{f"{verb}Binary": (None, 0, None, None, 0) for verb in ("Get", "Set")},
     },

@@ -1,4 +1,4 @@
-/* What modelDescription.xml says is absent: clocks, events, adjoint derivatives, dependencies of single elements, and
+/* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and
  * the other kinds of FMUs. The functions are there, since importers look them all up; they are refused in every state.
  */
 #include "hsep_fmi3_calls.h"
@@ -65,9 +65,7 @@ FMI3_ABSENT(fmi3GetVariableDependencies, "providesPerElementDependencies is fals
      size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity), \
     unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity)
 FMI3_ABSENT_DERIVATIVE(fmi3GetAdjointDerivative, "providesAdjointDerivatives is false")
-#if HSEP_N_WINDOWS == 0
 FMI3_ABSENT_DERIVATIVE(fmi3GetDirectionalDerivative, "providesDirectionalDerivatives is false")
-#endif
 FMI3_ABSENT(fmi3GetOutputDerivatives, "maxOutputDerivativeOrder is 0",
     (fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t n, const fmi3Int32 orders[],
      fmi3Float64 values[], size_t nValues),

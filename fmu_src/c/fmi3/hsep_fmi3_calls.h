@@ -48,7 +48,6 @@
     CALL(fmi3SetUInt64,                HSEP_I | HSEP_C) \
     CALL(fmi3SetString,                HSEP_I | HSEP_M | HSEP_S) \
     CALL(fmi3SetBinary,                HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3GetDirectionalDerivative,                   HSEP_M | HSEP_S) \
     CALL(fmi3GetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi3SetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi3FreeFMUState,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \

@@ -10,11 +10,6 @@
  * done here. All later outputs are the same. Nothing is written if the window diverges. */
 HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, double values[]);
 
-/* Write the derivative of x_h in a direction of x_d_window, (Np,), m: of its window to x_h, (Np,), m, and of x_h itself
- * to now. work: (Np,). Fails with averaging, whose model is not linear in the commands. */
-HSEP_API hsep_status
-hsep_model_derivative(void *state, const double direction[], double x_h[], double *now, double work[], char message[]);
-
 #endif
 
 #endif

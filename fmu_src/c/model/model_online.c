@@ -96,19 +96,6 @@ HSEP_API void hsep_model_show_windows(const hsep_context *context, void *state, 
     }
 }
 
-HSEP_API hsep_status
-hsep_model_derivative(void *state, const double direction[], double x_h[], double *now, double work[], char message[])
-{
-    hsep_predictor *self = &((online_state *)state)->online;
-    if (hsep_residual_paper(hsep_predictor_model(self)) == NULL) {
-        return hsep_message_add(
-            message, "x_h is linear in x_d_window with averaging = false alone, got averaging = true");
-    }
-    hsep_predictor_respond(self, direction, work, x_h);
-    *now = x_h[self->k % self->Np];
-    return HSEP_OK;
-}
-
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */

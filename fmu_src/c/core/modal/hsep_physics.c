@@ -184,17 +184,6 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x
     }
 }
 
-HSEP_API void hsep_physics_from_rest(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n)
-{
-    const size_t delay = (size_t)self->dead_time < n ? (size_t)self->dead_time : n;
-    memset(x_pb, 0, n * sizeof(hsep_real));
-    for (hsep_int i = 0; i < self->n_modes; i++) {
-        hsep_discrete_mode mode = physics_modes(self)[i];
-        mode.s[0] = mode.s[1] = 0.0;
-        physics_respond(&mode, x_d, x_pb + delay, n - delay);
-    }
-}
-
 /* Add the responses of one mode of count models to n samples of the signals u, their states in registers: a function
  * of its own, as compilers believe restrict of parameters alone. */
 static void physics_respond_abreast(

@@ -52,9 +52,6 @@ HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
 HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n);
 
-/* The same from rest, the state being left as it is; x_pb is not x_d. */
-HSEP_API void hsep_physics_from_rest(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n);
-
 #define HSEP_PHYSICS_ABREAST 4 /* signals side by side at most */
 
 /* Responses x, m, of count models with the same parameters to the signals u, m, both (n, HSEP_PHYSICS_ABREAST), sample

@@ -314,26 +314,6 @@ HSEP_API void hsep_predictor_complete(hsep_predictor *self)
     }
 }
 
-HSEP_API void hsep_predictor_respond(hsep_predictor *self, const hsep_real x_d[], hsep_real x_pb[], hsep_real x_h[])
-{
-    const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(self)), 0);
-    const hsep_int Np = self->k < self->preview ? 0 : self->Np;
-    hsep_real *e = x_h;
-    memset(x_h, 0, (size_t)self->Np * sizeof(hsep_real));
-    hsep_physics_from_rest(hsep_predictor_physics(self), x_d, x_pb, (size_t)Np);
-    for (hsep_int k = 0; k < Np; k++) { /* Eq. (4), linear */
-        for (hsep_int i = 0; i <= recursion.q && i <= k; i++) {
-            e[k] += recursion.w_x[i] * x_pb[k - i];
-        }
-        for (hsep_int i = 1; i <= recursion.p && i <= k; i++) {
-            e[k] += recursion.w_e[i - 1] * e[k - i];
-        }
-    }
-    for (hsep_int k = 0; k < Np; k++) {
-        x_h[k] = k < self->n_physics ? x_pb[k] : x_pb[k] + e[k];
-    }
-}
-
 HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i)
 {
     const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);

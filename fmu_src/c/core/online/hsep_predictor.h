@@ -105,10 +105,6 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
 /* Predict at once what is left of the window, alone; later samples are the same. */
 HSEP_API void hsep_predictor_complete(hsep_predictor *self);
 
-/* Response of the window, (Np,), m, to a change x_d of its commands, (Np,), m, by the paper's model: x_h = G_h x_d,
- * x_pb = G_pb x_d; eq. (3). 0 in the first fill, which was not predicted. Cost: p + q + 1 multiply-adds a sample. */
-HSEP_API void hsep_predictor_respond(hsep_predictor *self, const hsep_real x_d[], hsep_real x_pb[], hsep_real x_h[]);
-
 /* Finish a window: learn it with averaging, and its errors; its residuals become the past of the next one. */
 HSEP_API void hsep_predictor_finish(hsep_predictor *self);
 
