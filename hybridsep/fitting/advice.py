@@ -76,8 +76,8 @@ def whole_log_words(*, warm: bool, known: bool) -> str:
         return _KNOWN
     began = "began with what an earlier run had learned" if warm else "began without any knowledge"
     return (
-        f"The predictor {began}, and the whole log is the test; hybridsep fit tests on its second half alone, when "
-        "the first has been learned."
+        f"The predictor {began}, and the whole log is the test; hybridsep fit tests only on the second half, "
+        "after learning the first."
     )
 
 

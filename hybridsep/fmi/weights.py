@@ -36,9 +36,7 @@ _HEAD = struct.Struct("<8s3Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
 _MODE = ("f_n", "zeta", "alpha", "beta")
-_DAMAGED = (
-    f"{WEIGHTS_FILE} must be what this version has learned; it is damaged, truncated or another version's: train again"
-)
+_DAMAGED = f"{WEIGHTS_FILE} is damaged, truncated or from another version; train again"
 
 
 def _learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str, float]:

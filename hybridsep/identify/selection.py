@@ -57,7 +57,7 @@ HELD_OUT = 0.35
 """Part of the commanded motion that is held out."""
 
 SETTLING = 10
-"""Part of a segment, one in so many, that is not judged: it may start in motion, where the model starts at rest."""
+"""The first 1/10 of a segment is not scored: it may start in motion, where the model starts at rest."""
 
 _BLOCKS = 12
 """Blocks of the held-out part whose errors are compared pair by pair."""

@@ -2,8 +2,8 @@
 
 One statistic accuses: the share of a signal's variance that is left by the best mixture of earlier samples of another,
 none of them with a negative weight. A drive makes such a mixture of its command, whatever its lag and friction. Another
-reading of the columns, such as a flipped sign, is believed where it leaves so much less than the given one as on none
-of a thousand good logs of simulated and recorded axes. What is noted changes nothing.
+reading of the columns, such as a flipped sign, is accepted if its residual is smaller by a ratio that no good log of a
+thousand, simulated and recorded, reached. What is noted changes nothing.
 """
 
 from __future__ import annotations

@@ -276,7 +276,7 @@ class HybridPredictor:
         return g_pb, free[len(self.state.late) :] + start * (1.0 - np.cumsum(g_pb))
 
     def _physics_from_rest(self, n: int) -> tuple[Array, Array, float]:
-        """Return the first column of ``G_pb``, the free response with what is late, relative to the start, and that."""
+        """Return the first column of ``G_pb``, its free response with the late samples, from the start, and the start."""
         start = self.start if self.start is not None or self.pending is None else self.pending.forecast.window.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")

@@ -170,7 +170,7 @@ def test_spoiled_files_are_refused_in_both_flavours() -> None:
             restore_weights(predictor, changed)
         model.learn(changed)
         said = refusal(model.initialise)
-        assert "damaged, truncated or another version" in said if name in damaged else "weights.bin" in said, name
+        assert "damaged, truncated or from another version" in said if name in damaged else "weights.bin" in said, name
     assert predictor.regression.n_rows == 0.0
     model.learn(content)
     assert model.initialise().state.tobytes() != CModel("predictor", SMALL).initialise().state.tobytes()

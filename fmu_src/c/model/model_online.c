@@ -272,10 +272,7 @@ static hsep_status online_load(
         online_name_others(context, values, message);
     }
     if (message[0] == '\0') {
-        hsep_message_add(
-            message,
-            "weights.bin must be what this version has learned; it is damaged, truncated or another version's: "
-            "train again");
+        hsep_message_add(message, "weights.bin is damaged, truncated or from another version; train again");
     }
     return HSEP_REFUSED;
 }

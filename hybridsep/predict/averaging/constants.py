@@ -14,8 +14,7 @@ from dataclasses import dataclass
 class AveragingConstants:
     """Constants of the residual model with averaging."""
 
-    # evidence that the first weights of the stack count for, in windows of the best expert's mean square: 0.3 or 3
-    # change errors by 1 to 3 %
+    # weight of the prior ``π₀`` of the stack, in windows: 0.3 or 3 change errors by 1 to 3 %
     kappa: float = 1.0
     # factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %
     gamma: float = 0.95
@@ -23,8 +22,8 @@ class AveragingConstants:
     # 20 errors are 2 % less on drives of modes, 8 % more on drives of two masses, and a third less where the physics
     # model is bad; more than 36 cost more than four million instructions in the dearest sample
     lags_of_command: int = 36
-    # prior variance of the weight of the last lag, and of the command's last increment, relative to the first one's:
-    # memory fades. Without it for the increments a CNC axis that outgrows them has three times the error
+    # prior variance at the largest lag relative to lag 1, of the command's increments too; without it for these a CNC
+    # axis that outgrows them has three times the error
     last_lag: float = 0.005
     # samples by which the command may act before the physics model's dead time is over: one that is two samples too
     # long, which no weight can mend, leaves 1.7 times the error of no compensation on a warm drive, instead of 0.25

@@ -30,7 +30,7 @@ class InnovationGate:
 def gated(
     gate: InnovationGate, e: Array, largest: float, fastest: float, T_s: float
 ) -> tuple[NDArray[np.bool_], InnovationGate]:
-    """Return whether each sample of a window is believed, ``(n,)`` bool, and the reach after it.
+    """Return whether each sample of a window is believed, ``(n,)`` bool, and the gate's state after it.
 
     Before the first motion, and over the first window that has a residual, all are.
 

@@ -48,8 +48,8 @@ from .stacking import Stack
 from .warm_start import WarmStartRows
 
 _AHEAD = 20
-"""Samples before the end of a window, half of it at most, at which the variances are taken that its next solution's
-penalties come from: a controller factors most of that solution in them."""
+"""The noise variances for the next solve are frozen this many samples before the window ends, half of it at most: a
+controller factors most of that solution in them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command);
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
-/* Samples that are predicted in one go, where so many of the window are predicted. Constant cost. */
+/* Number of samples to predict next, given how many of the window are done. Constant cost. */
 HSEP_API hsep_int hsep_residual_part(const hsep_residual_model *self, hsep_int predicted);
 
 /* Predict the residuals of samples first ... last - 1; first is 0, or where the last call ended. */
