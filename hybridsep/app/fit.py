@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import ParameterError
-from ..base.files import written_text
+from ..base.files import atomic_open_text
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits, PredictorSettings
 from .options import (
     ForceOption,
@@ -107,7 +107,7 @@ def tune(
         print_tuning(tuning, axis.title, *shown.error(float(max(tuning.rms_pb))))
     if out is not None:
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
-        with written_text(out) as file:
+        with atomic_open_text(out) as file:
             file.write(machine_text(axis.changed("predictor", chosen), [comment]))
     if not as_json:
         print_written(out)

@@ -169,7 +169,7 @@ def hal(
     The component (compensator, or predictor) is the same for all machines; each axis has a folder of its name that
     ``loadrt hsep axes=`` takes.
     """
-    from ..base.files import written_whole
+    from ..base.files import atomic_open
     from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
     from ..fmi.weights import WEIGHTS_FILE, load_trained
     from ..machines.machine import load_machine
@@ -200,7 +200,7 @@ def hal(
         force=force,
     )
     for path, content in files.items():
-        with written_whole(path) as file:
+        with atomic_open(path) as file:
             file.write(content)
     if not predictor:
         warn_of_estimates(axes)
@@ -227,7 +227,7 @@ def header(
     The library is fmu_src/c: a compensator, or a predictor, for a controller that runs no FMU. The header has the
     axis's modes, settings and, with ``--weights``, what an earlier run has learned.
     """
-    from ..base.files import written_text
+    from ..base.files import atomic_open_text
     from ..fmi.controllers import axis_header
     from ..fmi.weights import load_trained
     from ..machines.machine import load_machine, machine_path
@@ -242,6 +242,6 @@ def header(
     check_outputs([("--out", path, (".h",))], inputs, force=force)
     if not predictor:
         warn_of_estimates([axis])
-    with written_text(path) as file:
+    with atomic_open_text(path) as file:
         file.write(text)
     typer.echo(f"{path} written: include it after installing the library, whose README.md says how (fmu_src/c)")

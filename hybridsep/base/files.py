@@ -35,7 +35,7 @@ def data_folder(name: str) -> Path:
 
 
 @contextmanager
-def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
+def atomic_open(path: str | Path) -> Iterator[IO[bytes]]:
     """Open a binary file that replaces ``path`` when the block ends without an exception; its folder is made.
 
     A symbolic link is followed, the old file's permissions are kept; other hard links keep the old content. A device or
@@ -82,9 +82,9 @@ def named_errors(path: str | Path, part: str | Path | None = None) -> Iterator[N
 
 
 @contextmanager
-def written_text(path: str | Path) -> Iterator[IO[str]]:
-    """Open a UTF-8 text file, line ends untranslated, as :func:`written_whole` does."""
-    with written_whole(path) as file:
+def atomic_open_text(path: str | Path) -> Iterator[IO[str]]:
+    """Open a UTF-8 text file, line ends untranslated, as :func:`atomic_open` does."""
+    with atomic_open(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         yield text
         text.detach()  # what is buffered goes to the file, which stays open

@@ -19,7 +19,7 @@ from ..compensate.compensator import SepCompensator
 from ..online.look_ahead import LookAhead
 from ..plants.plant import Encoder, Plant
 from ..predict.predictor import HybridPredictor
-from .run import COMPENSATOR, PREDICTOR, Kind
+from .run import COMPENSATOR, PREDICTOR, ControllerType
 
 
 class Compensator(Protocol):
@@ -56,7 +56,7 @@ class LibraryController:
     ----------
     name : str
         Name in error messages.
-    kind : Kind
+    kind : ControllerType
     T_s : float
         Sampling interval, s; an FMU's, like the next three, is known after :meth:`initialise`.
     Np, delay, late : int
@@ -68,7 +68,7 @@ class LibraryController:
 
     def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
         self._controller, self._t_init = controller, t_init
-        self.kind: Kind
+        self.kind: ControllerType
         if isinstance(controller, SepCompensator):
             self.kind, predictor, self.delay = COMPENSATOR, controller.predictor, controller.preview
         else:
@@ -82,7 +82,7 @@ class LibraryController:
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
         ahead, kind = self._look_ahead, self.kind
-        return tuple(getattr(ahead, name) for name in kind.outputs), kind.lowest + int(getattr(ahead, kind.state))
+        return tuple(getattr(ahead, name) for name in kind.outputs), kind.state_offset + int(getattr(ahead, kind.state))
 
     def n_rejected(self) -> int:
         """Return how many measurements were missing or not plausible."""
@@ -103,7 +103,7 @@ class OwnController:
     """
 
     name: str = "the compensator"
-    kind: Kind = COMPENSATOR
+    kind: ControllerType = COMPENSATOR
     late: int = 0
 
     def __init__(self, compensator: Compensator) -> None:
@@ -216,7 +216,7 @@ class FmuController(_OpenedFmu):
         from .fmu import read_description  # fmpy is loaded where an FMU is
 
         outputs = [variable.name for variable in read_description(path).modelVariables]
-        self.kind: Kind = COMPENSATOR if COMPENSATOR.outputs[0] in outputs else PREDICTOR
+        self.kind: ControllerType = COMPENSATOR if COMPENSATOR.outputs[0] in outputs else PREDICTOR
         check_controller(path, self.kind)
         super().__init__(path, self.kind.name, values, start_time)
 
@@ -232,7 +232,7 @@ class FmuController(_OpenedFmu):
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
         *positions, state = self._get()
-        return tuple(positions), self.kind.lowest + int(state)
+        return tuple(positions), self.kind.state_offset + int(state)
 
     def n_rejected(self) -> int:
         """Return how many measurements were missing or not plausible; 0 of an FMU that does not tell."""
@@ -276,7 +276,7 @@ class FmuDrive(_OpenedFmu):
         self._step((x_d,), self._start_time + k * h, h)
 
 
-def check_controller(path: str | Path, kind: Kind) -> None:
+def check_controller(path: str | Path, kind: ControllerType) -> None:
     """Raise FmuError if an archive is no FMU, or lacks variables of a kind of controllers."""
     _check_variables(path, kind.name, ("x_d_ahead", "x_meas"), (*kind.outputs, kind.state))
 

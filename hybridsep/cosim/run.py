@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.files import written_text, written_whole
+from ..base.files import atomic_open, atomic_open_text
 from ..base.metrics import (
     Score,
     batch_rms,
@@ -31,32 +31,32 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ControllerType:
     """Kind of a controller: its outputs in the loop and the columns of its runs' files."""
 
     name: str  # name in error messages
     outputs: tuple[str, ...]  # its positions, m; the first one goes to the drive
     state: str  # its Integer or Boolean output that says which model predicts
-    lowest: SepState  # state that stands for 0 of that output
+    state_offset: SepState  # state that stands for 0 of that output
     delay: str  # its parameter with the number of samples by which it delays the trajectory
     columns: tuple[str, ...]  # attributes of :class:`Run` that are saved
 
 
-PREDICTOR = Kind(
+PREDICTOR = ControllerType(
     "predictor",
     ("x_d", "x_pb", "x_h", "x_h_std"),
     state="hybrid_active",
-    lowest=SepState.PHYSICS,
+    state_offset=SepState.PHYSICS,
     delay="Np",
     columns=("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "x_h_std", "active"),
 )
 """The loop is open: the drive gets the commanded position."""
 
-COMPENSATOR = Kind(
+COMPENSATOR = ControllerType(
     "compensator",
     ("x_dm", "x_d", "x_pb", "x_h", "x_h_std"),
     state="sep_state",
-    lowest=SepState.OFF,
+    state_offset=SepState.OFF,
     delay="preview",
     columns=("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std", "state"),
 )
@@ -71,7 +71,7 @@ class Run:
 
     Attributes
     ----------
-    kind : Kind
+    kind : ControllerType
         :data:`PREDICTOR` or :data:`COMPENSATOR`.
     t : (n,) array, s
         Communication points.
@@ -95,7 +95,7 @@ class Run:
         Samples by which measurements arrived late at the controller; −1: a sample early, and it held them.
     """
 
-    kind: Kind
+    kind: ControllerType
     t: Array
     x_d: Array
     x_dm: Array
@@ -219,14 +219,14 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        with written_whole(path) as archive:
+        with atomic_open(path) as archive:
             np.savez_compressed(archive, **columns)
     elif suffix == ".csv":
         texts = [
             map(repr, (column.astype(np.int64) if column.dtype == np.bool_ else column).tolist())
             for column in columns.values()
         ]
-        with written_text(path) as file:
+        with atomic_open_text(path) as file:
             writer = csv.writer(file)
             writer.writerow(columns)
             writer.writerows(zip(*texts, strict=True))

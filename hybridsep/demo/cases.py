@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.files import written_text
+from ..base.files import atomic_open_text
 from ..cosim.compensated import COMPENSATED, Advance, Runs, compensate, mean_summary
 from ..cosim.contour import contours_of
 from ..cosim.loop import cosimulate
@@ -160,7 +160,7 @@ def demo(
         summary |= spiral_case(out, advance)
     for name, case in summary.items():
         case["printed"] = PRINTED[name]
-    with written_text(out / "summary.json") as file:
+    with atomic_open_text(out / "summary.json") as file:
         file.write(json.dumps(summary, indent=2) + "\n")
     write_page(out, summary, demo_files(out, full=full))
     progress("done", 1.0)

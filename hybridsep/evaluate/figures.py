@@ -19,7 +19,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Patch
 
-from ..base.files import written_whole
+from ..base.files import atomic_open
 from ..base.metrics import rms
 from ..base.signals import Array
 from ..cosim.contour import Contour
@@ -80,7 +80,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
     kind = Path(path).suffix.lower().removeprefix(".")
     metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     # pieces of a line, which may be of any length
-    with written_whole(path) as file, rc_context({"svg.hashsalt": "hybridsep", "agg.path.chunksize": 10_000}):
+    with atomic_open(path) as file, rc_context({"svg.hashsalt": "hybridsep", "agg.path.chunksize": 10_000}):
         figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.files import written_text
+from ..base.files import atomic_open_text
 from ..base.signals import Indices
 
 if TYPE_CHECKING:
@@ -218,5 +218,5 @@ class Report:
         page = Template(template).substitute(
             title=html.escape(self.title), subtitle=html.escape(self.subtitle), body=body
         )
-        with written_text(path) as file:
+        with atomic_open_text(path) as file:
             file.write(page)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from ..base.files import COMMANDS, written_text
+from ..base.files import COMMANDS, atomic_open_text
 from ..base.signals import Array
 from ..fmi.compile import no_native
 from ..fmi.spec import fmu_name
@@ -27,7 +27,7 @@ def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, P
 
 def write_commands(path: Path, x_d: Array, T_s: float, unit: str) -> None:
     """Write commands as a CSV that ``--trajectory`` takes, m, or rad where that is the unit."""
-    with written_text(path) as file:
+    with atomic_open_text(path) as file:
         file.write(f"# commands of a log, by hybridsep fit, to try with\nt [s],x_d [{unit}]\n")
         file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate(x_d.tolist()))
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import IdentificationError, ParameterError, listed
-from ..base.files import plain, written_text, written_whole
+from ..base.files import atomic_open, atomic_open_text, plain
 from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, PredictorSettings
 from ..base.signals import Array, as_samples
@@ -203,11 +203,11 @@ class Fit:
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
         for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
             del files[what]
-        with written_text(files["machine file"]) as file:
+        with atomic_open_text(files["machine file"]) as file:
             file.write(machine_text(self.machine, comments=self._comments()))
         commands = commands_to_try(self.judged.replay.recordings)
         write_commands(files["commands to try"], commands, self.machine.T_s, self.machine.unit)
-        with written_whole(files["trained predictor"]) as state:
+        with atomic_open(files["trained predictor"]) as state:
             state.write(self.trained)
         for i, (what, path) in enumerate(archives.items() if fmus else ()):
             progress(f"build the {what}", i / len(archives))
@@ -216,7 +216,7 @@ class Fit:
             self.report(files["report"], [path.name for path in archives.values() if fmus])
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
         written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
-        with written_text(files["results"]) as file:
+        with atomic_open_text(files["results"]) as file:
             file.write(json.dumps({"hybridsep": __version__, **self.results(), "written": written}, indent=2) + "\n")
         progress("done", 1.0)
         return files
@@ -320,20 +320,20 @@ def fit(
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
 
-    def within(begin: float, end: float, message: str) -> Callable[[float], object]:
+    def stage(message: str, begin: float, end: float) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
 
-    found = _identified(recordings, default, logs, within(0.0, 0.38, "identify"))
+    found = _identified(recordings, default, logs, stage("identify", 0.0, 0.38))
     model = found.model
     default = replace(default, input_hold=found.input_hold)
     progress("look for what repeats with the position", 0.38)
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    settings, choice = choose_settings(model, tried, default, within(0.4, 0.7, "choose p and q"))
+    settings, choice = choose_settings(model, tried, default, stage("choose p and q", 0.4, 0.7))
     predictor = HybridPredictor(model, settings)
-    replayed = replay(predictor, recordings, progress=within(0.7, 0.8, "judge on the second half"))
-    replayed = replace(replayed, offset=found.offset).with_peers(within(0.8, 0.9, "peers on the second half"))
+    replayed = replay(predictor, recordings, progress=stage("judge on the second half", 0.7, 0.8))
+    replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
@@ -342,7 +342,7 @@ def fit(
     machine = _machine(name, logs, model, settings, plant.entries, limits, required=bool(given_limits))
     tracking = None
     if given_limits:
-        estimate = within(0.95, 1.0, "tracking error with compensation")
+        estimate = stage("tracking error with compensation", 0.95, 1.0)
         (fastest, *_), largest = largest_motion(recordings, T_s)
         tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest, fastest)
     judged = Judged(

@@ -16,7 +16,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
-from ..base.files import written_whole
+from ..base.files import atomic_open
 from ..fmi import native, python
 from ..machines.machine import Machine
 from .compile import ALL_TARGETS, default_targets, expanded
@@ -98,7 +98,7 @@ def build_fmu(
     if embed_weights and (weights is None or flavour != "native"):
         raise FmuError("embed_weights is for a native FMU with weights")
     path = Path(out) / f"{name}.fmu"
-    with written_whole(path) as file:
+    with atomic_open(path) as file:
         trained = None
         if weights is not None:
             from .weights import load_trained  # which loads slowly

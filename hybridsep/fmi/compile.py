@@ -30,7 +30,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
-from ..base.files import data_folder, named_errors, written_whole
+from ..base.files import atomic_open, data_folder, named_errors
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
 
@@ -242,7 +242,7 @@ def library_paths(
         try:
             for i, (library, compiled) in enumerate(running.items(), start=1):
                 content = compiled.result()
-                with written_whole(places[library]) as file:
+                with atomic_open(places[library]) as file:
                     file.write(content)
                 on_library(library, i / len(running))
         finally:  # after a failure or Ctrl-C no other one begins

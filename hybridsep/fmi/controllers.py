@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import FmuError, ParameterError
-from ..base.files import data_folder, written_text
+from ..base.files import atomic_open_text, data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_sources, kind_header, table_file
@@ -160,6 +160,6 @@ def write_configuration(out: Path, fmi: str) -> Path:
     """
     excluded = sorted(name for name in c_sources((fmi,)) if name.endswith(".c") and name != "all.c")
     values = {"definitions": ";".join(DEFINITIONS), "excluded": ";".join(excluded)}
-    with written_text(out / CONFIGURATION_FILE) as file:  # the tool is the generationTool of modelDescription.xml
+    with atomic_open_text(out / CONFIGURATION_FILE) as file:  # the tool is the generationTool of modelDescription.xml
         file.write(filled("CustomFMU.xml", tool=f"hybridsep {__version__}", **values))
     return out / CONFIGURATION_FILE

@@ -10,7 +10,7 @@ import gzip
 from pathlib import Path
 
 from ..base.errors import LogError
-from ..base.files import written_whole
+from ..base.files import atomic_open
 from .arrays import MatSource, NpzSource, ParquetSource
 from .capture import CaptureSource
 from .halscope import HalscopeSource
@@ -120,5 +120,5 @@ def _reader(path: Path, head: bytes) -> type[Source]:
 def write_example(path: Path) -> None:
     """Write the example log as CSV, or compressed where the name ends in ``.gz``."""
     packed = EXAMPLE.read_bytes()
-    with written_whole(path) as file:
+    with atomic_open(path) as file:
         file.write(packed if path.suffix == ".gz" else gzip.decompress(packed))

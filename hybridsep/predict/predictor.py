@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError, StateError
-from ..base.files import written_whole
+from ..base.files import atomic_open
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
@@ -276,7 +276,7 @@ class HybridPredictor:
         return g_pb, free[len(self.state.late) :] + start * (1.0 - np.cumsum(g_pb))
 
     def _physics_from_rest(self, n: int) -> tuple[Array, Array, float]:
-        """Return the first column of ``G_pb``, its free response with the late samples, from the start, and the start."""
+        """Return the first column of ``G_pb``, its free response from the late samples on, and the start."""
         start = self.start if self.start is not None or self.pending is None else self.pending.forecast.window.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
@@ -389,7 +389,7 @@ class HybridPredictor:
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""
         blob = self.to_bytes()
-        with written_whole(path) as file:
+        with atomic_open(path) as file:
             file.write(blob)
 
     @classmethod

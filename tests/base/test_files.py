@@ -13,7 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from hybridsep import HybridPredictor, ModalModel, build_fmu, load_machine
-from hybridsep.base.files import written_text, written_whole
+from hybridsep.base.files import atomic_open, atomic_open_text
 from hybridsep.cosim.run import save_columns
 from hybridsep.evaluate.figures import save_figure
 
@@ -24,7 +24,7 @@ OLD = b"what was there before"
 def test_new_content_appears_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
     path.write_bytes(OLD)
-    with written_text(path) as file:
+    with atomic_open_text(path) as file:
         file.write("µ\r\n")
         file.flush()
         assert path.read_bytes() == OLD
@@ -33,7 +33,7 @@ def test_new_content_appears_at_the_end(tmp_path: Path) -> None:
 
 
 def fail_half_way(path: Path, error: type[BaseException]) -> None:
-    with written_text(path) as file:
+    with atomic_open_text(path) as file:
         file.write("half")
         raise error
 
@@ -56,7 +56,7 @@ def test_permissions_links_and_umask(tmp_path: Path) -> None:
     path.chmod(0o640)
     link.symlink_to(path.name)
     hard.hardlink_to(path)
-    with written_whole(link) as file:
+    with atomic_open(link) as file:
         file.write(b"new")
     assert link.is_symlink()
     assert path.read_bytes() == b"new"
@@ -64,7 +64,7 @@ def test_permissions_links_and_umask(tmp_path: Path) -> None:
     assert hard.read_bytes() == OLD
     mask = os.umask(0o027)
     try:
-        with written_whole(tmp_path / "made.csv"):
+        with atomic_open(tmp_path / "made.csv"):
             pass
     finally:
         os.umask(mask)
@@ -74,7 +74,7 @@ def test_permissions_links_and_umask(tmp_path: Path) -> None:
 @POSIX
 def test_a_pipe_is_written_directly(tmp_path: Path) -> None:
     read, write = os.pipe()
-    with written_whole(f"/dev/fd/{write}") as file:
+    with atomic_open(f"/dev/fd/{write}") as file:
         file.write(b"through")
     os.close(write)
     assert os.read(read, 100) == b"through"
@@ -82,7 +82,7 @@ def test_a_pipe_is_written_directly(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match=r"Is a directory") as caught, written_whole(tmp_path):
+    with pytest.raises(OSError, match=r"Is a directory") as caught, atomic_open(tmp_path):
         pass
     assert caught.value.filename == str(tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -94,7 +94,7 @@ def test_a_write_protected_file_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
     path.write_bytes(OLD)
     path.chmod(0o444)
-    with pytest.raises(PermissionError), written_whole(path) as file:
+    with pytest.raises(PermissionError), atomic_open(path) as file:
         file.write(b"new")
     assert path.read_bytes() == OLD
 

@@ -17,7 +17,7 @@ from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSe
 from hybridsep.cosim.adapters import check_controller
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
+from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, ControllerType, Run
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import staircase
@@ -145,14 +145,14 @@ def test_arguments_that_have_no_use_are_refused(
 
 # FMUs --------------------------------------------------------------------------------------------------------------
 
-SIGNALS: dict[Kind, list[str]] = {
+SIGNALS: dict[ControllerType, list[str]] = {
     PREDICTOR: ["t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "x_h_std", "active"],
     COMPENSATOR: ["t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std", "state"],
 }
 
 
 @pytest.fixture(scope="module")
-def runs(fmus: BuiltFmus) -> dict[Kind, Run]:
+def runs(fmus: BuiltFmus) -> dict[ControllerType, Run]:
     """Short runs of a predictor and of a compensator."""
     plant = fmus("FeedDrivePy")
     return {
@@ -184,7 +184,7 @@ def test_native_fmus_equal_the_library_and_keep_the_drives_limits(fmus: BuiltFmu
 
 
 @pytest.mark.slow
-def test_start_time_and_a_shifted_start(fmus: BuiltFmus, runs: dict[Kind, Run]) -> None:
+def test_start_time_and_a_shifted_start(fmus: BuiltFmus, runs: dict[ControllerType, Run]) -> None:
     pair = fmus("SepCompensator"), fmus("FeedDrive")
     moved, short = cosimulate(*pair, R[:600] + 0.1, start_time=50.0), runs[COMPENSATOR]
     np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
@@ -193,7 +193,7 @@ def test_start_time_and_a_shifted_start(fmus: BuiltFmus, runs: dict[Kind, Run]) 
 
 
 @pytest.mark.slow
-def test_summary_is_what_the_signals_say(runs: dict[Kind, Run]) -> None:
+def test_summary_is_what_the_signals_say(runs: dict[ControllerType, Run]) -> None:
     short = runs[COMPENSATOR]
     summary, change = short.summary(), 1e6 * (short.x_dm - short.x_d)
     for name, error in (("tracking", short.x_d - short.x), ("tracking_measured", short.x_d - short.x_meas)):
@@ -214,7 +214,7 @@ def test_summary_is_what_the_signals_say(runs: dict[Kind, Run]) -> None:
 
 
 @pytest.mark.parametrize("kind", SIGNALS)
-def test_results_as_csv_and_npz(runs: dict[Kind, Run], tmp_path: Path, kind: Kind) -> None:
+def test_results_as_csv_and_npz(runs: dict[ControllerType, Run], tmp_path: Path, kind: ControllerType) -> None:
     run = runs[kind]
     run.save(tmp_path / "run.csv")
     run.save(tmp_path / "run.npz")

@@ -12,14 +12,14 @@ from drawn import cut_off, figures_drawn, hiding_legends
 
 from hybridsep.app.console import print_run
 from hybridsep.cosim.contour import Contour
-from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
+from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, ControllerType, Run
 from hybridsep.evaluate.figures import contour_figure, prediction_figure, tracking_figure
 from hybridsep.logs.units import shown_in
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.path import PlanarPath
 
 
-def made_run(kind: Kind, n: int) -> Run:
+def made_run(kind: ControllerType, n: int) -> Run:
     """Return a run of ``n`` samples whose hybrid is worse in some windows."""
     rng = np.random.default_rng(0)
     t = np.linspace(0.0, 1e-3 * (n - 1), n)

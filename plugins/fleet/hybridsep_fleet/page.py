@@ -15,7 +15,7 @@ from string import Template
 from typing import Any
 
 from hybridsep.base.errors import LogError
-from hybridsep.base.files import written_text
+from hybridsep.base.files import atomic_open_text
 
 _WORSE, _SHIFT, _FRICTION, _RESIDUAL = 1.03, 0.05, 0.3, 0.5
 """From which on an axis is looked at: error relative to the best baseline; relative changes of the first mode's
@@ -118,7 +118,7 @@ def write_page(rows: Sequence[Mapping[str, Any]], page: Path, results: Path) -> 
         data=data,
     )
     page.parent.mkdir(parents=True, exist_ok=True)
-    with written_text(page) as file:
+    with atomic_open_text(page) as file:
         file.write(text)
 
 

@@ -13,7 +13,7 @@ import pyarrow
 from pyarrow import parquet
 
 from hybridsep.base.errors import StateError, first_line
-from hybridsep.base.files import written_whole
+from hybridsep.base.files import atomic_open
 
 from .sources import LogFile
 
@@ -56,7 +56,7 @@ class Results:
         # Names increase with time, so that the last row of an axis is the latest
         name = f"{max(row['run'] for row in rows)}-{len(list(self._rows.iterdir())):06}-{uuid.uuid4().hex}"
         whole = [{column: row.get(column) for column in COLUMNS} for row in rows]
-        with written_whole(self._rows / f"{name.replace(':', '')}{_ENDING}") as file:
+        with atomic_open(self._rows / f"{name.replace(':', '')}{_ENDING}") as file:
             parquet.write_table(pyarrow.Table.from_pylist(whole, schema=_SCHEMA), file)
 
     def rows(self) -> list[dict[str, Any]]:

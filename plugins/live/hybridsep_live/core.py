@@ -156,7 +156,7 @@ class LiveCore:
 
     def _step(self, x_d: float, measured: Sample) -> Row | None:
         outputs, state = self._controller.outputs()
-        self._published.append(_Published(measured, outputs, state - self._controller.kind.lowest))
+        self._published.append(_Published(measured, outputs, state - self._controller.kind.state_offset))
         begun = perf_counter_ns()
         try:
             self._controller.step(self._k, x_d, measured.x_meas)

@@ -51,7 +51,7 @@ def modal(
     """
     from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
-    from hybridsep.base.files import written_text
+    from hybridsep.base.files import atomic_open_text
     from hybridsep.machines.machine import checked_name, machine_name
     from hybridsep.machines.text import machine_text
 
@@ -71,7 +71,7 @@ def modal(
     if out is not None:
         deviations = [f"{e.name} = {e.value:.6g} ± {e.std:.2g}{_unit(e.unit)}" for e in found.parameters]
         comments = [f"Identified by hybridsep modal from {file.name}.", *deviations, *found.findings]
-        with written_text(out) as text:
+        with atomic_open_text(out) as text:
             text.write(machine_text(found.machine(machine, f"Axis identified from {file.name}"), comments))
     if as_json:
         typer.echo(json.dumps(found.summary(), indent=2))

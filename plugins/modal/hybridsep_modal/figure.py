@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hybridsep.base.files import written_whole
+from hybridsep.base.files import atomic_open
 
 from .frequency_response import IdentifiedResponse
 
@@ -48,5 +48,5 @@ def response_figure(found: IdentifiedResponse, title: str, path: Path) -> None:
             if f[0] <= mode.f_n <= f[-1]:
                 axes.axvline(mode.f_n, color="black", linewidth=0.7, linestyle=":")
     magnitude.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
-    with written_whole(path) as file:
+    with atomic_open(path) as file:
         figure.savefig(file, dpi=130, format="png")
