@@ -20,7 +20,7 @@ from typer.core import TyperGroup
 from ..base.errors import HybridSepError, LogError, ParameterError, brief
 from ..base.version import version_text
 from .cosim import cosim, system
-from .fit import fit, tune
+from .fit import fit
 from .fmus import build, hal, header
 from .logs import backtest
 from .start import demo, example_log, init
@@ -41,10 +41,6 @@ EXAMPLES = {
     "fit": (
         "hybridsep fit my_axis.csv --Np 100",
         "hybridsep fit my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4",
-    ),
-    "tune": (
-        "hybridsep tune my_axis.csv -m my_axis/machine.toml",
-        "hybridsep tune my_axis.csv -m my_axis/machine.toml --try p=10,50 --try q=3",
     ),
     "init": ("hybridsep init machine.toml", "hybridsep init --force"),
     "demo": ("hybridsep demo --out demo", "hybridsep demo --out demo --force"),
@@ -137,7 +133,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, tune, backtest, init, example_log, demo, build, cosim, system, hal, header):
+for _command in (fit, backtest, init, example_log, demo, build, cosim, system, hal, header):
     _name = _command.__name__.replace("_", "-")
     app.command(epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(_command)
 

@@ -138,7 +138,6 @@ class PredictorSettings(Settings):
     AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period", "recall")
     """Fields of the residual model with averaging."""
 
-    TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
 
     KNOWN: ClassVar[tuple[str, ...]] = ("period", "measurement_delay")

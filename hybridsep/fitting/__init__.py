@@ -1,1 +1,1 @@
-"""From logs to FMUs: identification, choice of settings, replay, report and advice; tuning of settings."""
+"""From logs to FMUs: identification, choice of settings, replay, report and advice."""

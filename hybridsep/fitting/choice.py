@@ -48,11 +48,11 @@ def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
     return replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
 
 
-def settings_to_try(settings: PredictorSettings) -> list[PredictorSettings]:
-    """Return the settings themselves and others with the same window."""
+def settings_to_try(settings: PredictorSettings, p: Sequence[int] = ()) -> list[PredictorSettings]:
+    """Return the settings themselves and others with the same window, of numbers of lags ``p`` if some are given."""
     Np = settings.Np
     most = int(PARAMETERS["p"].maximum)
-    lags = dict.fromkeys([settings.p, *(min(max(1, round(share * Np)), most) for share in _SHARES)])
+    lags = dict.fromkeys([settings.p, *(p or (min(max(1, round(share * Np)), most) for share in _SHARES))])
     found = [replace(settings, p=p) for p in lags]
     found += [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
     return found
@@ -63,12 +63,14 @@ def choose_settings(
     recordings: Sequence[Recording],
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
+    p: Sequence[int] = (),
 ) -> tuple[PredictorSettings, tuple[Tried, ...]]:
     """Return the settings with the least error of causal replays over the training samples, and all that were tried.
 
-    The given ones, the default, are tried first, and stay unless others are better by 5 %.
+    The given ones, the default, are tried first, and stay unless others are better by 5 %; ``p`` as of
+    :func:`settings_to_try`.
     """
-    candidates, errors = settings_to_try(settings), []
+    candidates, errors = settings_to_try(settings, p), []
     for i, candidate in enumerate(candidates):
         try:
             errors.append(_trained_rms(model, candidate, recordings))

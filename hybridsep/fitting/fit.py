@@ -35,7 +35,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, advice_on
 from .build import fit_files, sha256_of, write_commands
-from .choice import Tried, choose_settings, period_finding, with_window
+from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, largest_motion
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
@@ -252,6 +252,7 @@ def fit(
     columns: Mapping[str, str] | None = None,
     axis: str | None = None,
     Np: int | None = None,
+    p: Sequence[int] = (),
     name: str = "axis",
     progress: Progress | None = None,
     **known: float,
@@ -273,6 +274,8 @@ def fit(
         in rad; its ``predict`` alone takes and gives the unit.
     Np : int, optional
         Samples of the controller's look-ahead; 0.1 s of them if left out.
+    p : sequence of int
+        Numbers of lags to choose from; some shares of ``Np`` if left out.
     name : str
         The machine's.
     progress : callable, optional
@@ -319,6 +322,7 @@ def fit(
         )
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
+    settings_to_try(default, p)  # which refuses what does not fit into the window
 
     def stage(message: str, begin: float, end: float) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
@@ -330,7 +334,7 @@ def fit(
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    settings, choice = choose_settings(model, tried, default, stage("choose p and q", 0.4, 0.7))
+    settings, choice = choose_settings(model, tried, default, stage("choose p and q", 0.4, 0.7), p)
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=stage("judge on the second half", 0.7, 0.8))
     replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))

@@ -229,7 +229,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
 def test_help_lists_the_commands_in_whole_sentences(hybridsep: Run) -> None:
     status, out, _ = hybridsep("--help")
     assert status == 0
-    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "init", "tune"))
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "init", "fit"))
     listed = out.partition("Commands:")[2].partition("An error is")[0]
     assert "From the log of an axis to its model, FMUs and a report." in listed
     assert "..." not in listed

@@ -54,7 +54,6 @@ def test_what_is_read_is_not_overwritten(
     for i, (file, what, suffix, command) in enumerate(
         (
             (log, "log", ".csv", ("backtest", log, "-m", machine, "--force")),
-            (machine, "machine file", ".toml", ("tune", log, "-m", machine)),
             (trajectory, "trajectory", ".csv", ("cosim", "--trajectory", trajectory)),
         )
     ):
@@ -92,7 +91,6 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
         ("init", "{there}"),
         ("demo", "--out", "{folder}"),
         ("fit", "{log}", "--out", "{folder}"),
-        ("tune", "{log}", "-m", MACHINE, "--out", "{there}"),
     ],
     ids=lambda arguments: f"{arguments[0]} {arguments[-2]}",
 )
@@ -103,7 +101,6 @@ def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path,
         "build": "FeedDrive.fmu",
         "demo": "summary.json",
         "init": "axis.toml",
-        "tune": "axis.toml",
         "fit": "machine.toml",
     }
     there = folder / names.get(arguments[0], "run.png" if "--figure" in arguments else "run.csv")
@@ -201,18 +198,8 @@ REFUSED = [
     ("cosim --set predictor=1", "predictor must be a table, got 1"),
     ("cosim --set predictor.p", "an entry is set as in predictor.p=20, got 'predictor.p'"),
     ("cosim --set plant.seed=1 --plant p.fmu", "is for an FMU that is built here; leave out --plant"),
-    ("tune {log} {m} --try p=5,105", "p must be 1 … Np = 100, got 105; lower p or raise Np"),
-    ("tune {log} {m} --try lambda=1e-12:1e-6", "--try lambda must be a number, got '1e-12:1e-6'"),
-    ("tune {log} {m} --try p=5,50.5", "--try p must be a whole number, got 50.5"),
-    (
-        "tune {log} {m} --try Np=5",
-        "--try must be as p=5,10,50, of p, q, lambda, effect, noise_std, ",
-    ),
-    (
-        "tune {log} {m} --set predictor.averaging=false --try effect=1e-5",
-        "has an effect with averaging only: set",
-    ),
-    ("tune {log} {m} --out x.csv", "--out must end in .toml, got 'x.csv'"),
+    ("fit {log} --p 5,lots", "--p must be whole numbers with commas, got '5,lots'"),
+    ("fit {log} --Np 20 --p 50", "p must be 1 … Np = 20, got 50"),
     ("fit {log} --out {folder} --name no-name", "name (--name) must be"),
     ("fit {log} --out {log}/deeper", "log.csv is a file, not a folder; choose another"),
 ]

@@ -22,7 +22,6 @@ def without_measurement(tmp_path: Path) -> Path:
     [
         ("fit", "--out", "deep/new"),
         ("backtest", *MACHINE, "--save", "new/run.csv", "--report", "new/page.html"),
-        ("tune", *MACHINE, "--try", "p=10", "--out", "new/tuned.toml"),
     ],
     ids=lambda command: command[0],
 )

@@ -37,7 +37,6 @@ MOVES = 3000
 MADE = {
     "README.md": "my_axis/report.html",
     "read-the-report.md": "replay.html",
-    "tune.md": "tuned.toml",
     "close-the-loop.md": "compensated.png",
 }
 """Files that pages leave."""

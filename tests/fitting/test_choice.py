@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fitting.choice import choose_settings, settings_to_try, with_window
 from hybridsep.fitting.replay import Recording, replay, split_log
@@ -43,6 +44,13 @@ def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
     assert tried[0] == settings
     assert all(one.Np == Np and one.p <= Np and one.q < Np for one in tried)
     assert len(set(tried)) == len(tried)
+
+
+def test_what_a_user_asks_for_is_tried_beside_the_default() -> None:
+    settings = with_window(PredictorSettings(), 40)
+    assert [(one.p, one.q) for one in settings_to_try(settings, [5, 30])] == [(40, 3), (5, 3), (30, 3), (40, 1)]
+    with pytest.raises(ParameterError, match="p must be 1 … Np = 40, got 41"):
+        settings_to_try(settings, [41])
 
 
 @pytest.mark.slow
