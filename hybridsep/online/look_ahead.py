@@ -23,7 +23,7 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.settings import samples_before
 from ..base.signals import Array, check_position
-from ..base.state import pack, restoring, unpack
+from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .monitor import Monitor
@@ -179,32 +179,40 @@ class LookAhead:
     """
 
     diverged: str = ""
+    _SAVED = (
+        *("k", "start", "window", "_first_scored", "_n_scored", "_sums", "_residual", "_next", "_compared"),
+        *("_ahead", "_measured"),
+    )
 
     def __init__(
         self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None, unit: str = "m"
     ) -> None:
-        self.k, self.unit = 0, unit
-        self._hold(model)
+        self.unit = unit
+        self._hold(model, 0)
         warm_up = self.predictor.settings.warm_up if t_init is None else t_init
         check_position("the start value of x_d_ahead", start, unit=unit)
-        self.start = start
-        late = self.predictor.settings.n_late
-        self._next = start  # where measurements come a sample early, that of the next sample
-        self._first_scored = self._first_compared + samples_before(warm_up, self.predictor.T_s)
-        self._n_scored, self._sums = 0, np.zeros(4)
-        self._residual = 0.0  # of the last sample measured, as published; 0 until one after the first fill is measured
-        # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
-        self._compared = np.full((4, late + self.Np), self.start)
-        # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
-        self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
+        self._at_rest(start)
+        self._first_scored += samples_before(warm_up, self.predictor.T_s)
         self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
         self.window = self.planner.plan(self._ahead.copy())
         self._compare()
 
-    def _hold(self, model: HybridPredictor | Planner) -> None:
+    def _at_rest(self, start: float) -> None:
+        """Set the state at the beginning of a run, without a warm-up, before its first window is planned."""
+        self.k, self.start, self._n_scored, self._sums = 0, start, 0, np.zeros(4)
+        self._first_scored = self._first_compared
+        self._next = start  # where measurements come a sample early, that of the next sample
+        self._residual = 0.0  # of the last sample measured, as published; 0 until one after the first fill is measured
+        # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
+        self._compared = np.full((4, self.predictor.settings.n_late + self.Np), start)
+        # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
+        self._ahead, self._measured = np.full(self.delay, start), np.full(self.Np, start)
+        self.window = PublishedWindow.at_rest(start, self.Np)
+
+    def _hold(self, model: HybridPredictor | Planner, k: int) -> None:
         self.model = model
         self.planner: WindowPlanner = (
-            _Unmodified(model, at_rest=self.k < model.Np) if isinstance(model, HybridPredictor) else model
+            _Unmodified(model, at_rest=k < model.Np) if isinstance(model, HybridPredictor) else model
         )
         self.predictor = self.planner.predictor
         self.Np, self.delay = self.predictor.Np, self.planner.preview
@@ -338,28 +346,8 @@ class LookAhead:
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""
-        meta = {
-            "unit": self.unit,
-            "start": self.start,
-            "k": self.k,
-            "first_scored": self._first_scored,
-            "n_scored": self._n_scored,
-            "n_warm_up": self.window.n_warm_up,
-            "state": int(self.window.state),
-            "n_followed": self.window.n_followed,
-            "state_before": int(self.window.state_before),
-            "diverged": self.diverged,
-        }
-        arrays = {
-            "sums": self._sums,
-            "residual": np.array([self._residual]),
-            "next": np.array([self._next]),
-            "ahead": self._ahead,
-            "measured": self._measured,
-            "compared": self._compared,
-        }
-        arrays |= {name: getattr(self.window, name) for name in PublishedWindow.SIGNALS}
-        return pack(_KIND, meta, arrays, {"model": self.model.to_bytes()})
+        arrays = arrays_of(tuple(getattr(self, name) for name in self._SAVED))
+        return pack(_KIND, {"unit": self.unit, "diverged": self.diverged}, arrays, {"model": self.model.to_bytes()})
 
     @classmethod
     def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> LookAhead:
@@ -379,20 +367,12 @@ class LookAhead:
         meta, arrays, parts = unpack(_KIND, blob)
         look_ahead = cls.__new__(cls)
         with restoring(_KIND):
-            look_ahead.k, look_ahead.start, look_ahead.unit = meta["k"], meta["start"], meta["unit"]
-            look_ahead.diverged = meta["diverged"]
-            look_ahead._hold(model_type.from_bytes(parts["model"]))
-            look_ahead._first_scored, look_ahead._n_scored = meta["first_scored"], meta["n_scored"]
-            look_ahead._sums, look_ahead._compared = arrays["sums"], arrays["compared"]
-            look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
-            look_ahead._residual, look_ahead._next = float(arrays["residual"][0]), float(arrays["next"][0])
-            look_ahead.window = PublishedWindow(
-                **{name: arrays[name] for name in PublishedWindow.SIGNALS},
-                state=meta["state"],
-                n_warm_up=meta["n_warm_up"],
-                n_followed=meta["n_followed"],
-                state_before=meta["state_before"],
-            )
+            look_ahead.unit, look_ahead.diverged = meta["unit"], meta["diverged"]
+            look_ahead._hold(model_type.from_bytes(parts["model"]), int(arrays["0"]))
+            look_ahead._at_rest(0.0)
+            like = tuple(getattr(look_ahead, name) for name in cls._SAVED)
+            for name, value in zip(cls._SAVED, restored(like, arrays), strict=True):
+                setattr(look_ahead, name, value)
         return look_ahead
 
     @property
