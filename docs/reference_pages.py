@@ -42,10 +42,11 @@ _WRITTEN = "<!-- Written by generate.py; a change here is lost. -->"
 _SECTIONS = {
     "": "The head of the file.",
     "physics": "The linear model `G_pb`: either `[[physics.mode]]` entries, eq. (15), or one "
-    "`[physics.spring_mass_damper]`, eq. (11).",
+    "`[physics.spring_mass_damper]`, eq. (11), or one `[physics.cascade]`.",
     "physics.mode": "One mode, `(beta s + alpha) / (s² + 2 zeta ω s + ω²)` with `ω = 2π f_n`; each has a "
     "`[[physics.mode]]` of its own.",
     "physics.spring_mass_damper": "Moving mass, damping and stiffness.",
+    "physics.cascade": "Gains of a position loop around a velocity loop: their closed loop is the model.",
     "predictor": "Settings of the predictor.",
     "compensator": "Settings of the compensator; where one is left out the setting of `[predictor]` is taken.",
     "plant": "A simulated drive, `feed_drive`, `stage`, or `identified`, which `fit` writes; it makes the plant FMU.",
@@ -68,6 +69,7 @@ _OWN = {
     "log.axis": "axis of a file that holds several",
     "physics.mode": "modes, at least one",
     "physics.spring_mass_damper": "instead of modes",
+    "physics.cascade": "instead of modes",
     "plant.mode": "modes of an identified plant, with the keys of the physics model's; the same modes if left out",
     "drive_limits.estimated": "whether they are estimates from the motion of a log: your drive's own are better",
     "limits.velocity": "largest velocity of the trajectory",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import ParameterError
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Limits
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, Limits
 from .options import (
     ForceOption,
     JsonOption,
@@ -40,6 +40,14 @@ def fit(
         str | None,
         typer.Option("--p", metavar="NUMBERS", help="Numbers of lags to choose from, as 5,10,50; its own if left out."),
     ] = None,
+    cascade: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GAINS",
+            help=f"Gains of the loop in SI, NAME=VALUE with commas, of {', '.join(Cascade.parameters())}: the physics "
+            "model is theirs, and the log is compared with it.",
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the axis; the log's, with --axis, if left out.")] = None,
     *,
     known: dict[str, float],
@@ -63,6 +71,8 @@ def fit(
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
     lags = [] if p is None else _numbers(p)
+    pairs = [] if cascade is None else [one.partition("=") for one in cascade.split(",")]
+    gains = {gain.strip(): value for gain, _, value in pairs} or None
     found = [read_log(path, **reading.arguments()) for path in logs]
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
@@ -80,7 +90,7 @@ def fit(
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     with progress_bar(as_json) as advance:
-        given: dict[str, Any] = {"Np": Np, "p": lags, "name": machine, **known}
+        given: dict[str, Any] = {"Np": Np, "p": lags, "cascade": gains, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
         result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:

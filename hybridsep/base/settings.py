@@ -271,6 +271,23 @@ class Limits(Settings):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Cascade(Settings):
+    """Gains of a proportional position loop around a (proportional-integral) velocity loop, with velocity feed-forward.
+
+    Of a linear axis in N and m, of a rotary one in N·m and rad; a torque constant is part of ``Kv``.
+    """
+
+    inertia: float = real(None, 1e-9, 1e9, "1", "moving mass, kg, or inertia, kg·m²", unless_given=MISSING)
+    Kp: float = real(None, 1e-3, 1e6, "1/s", "gain of the position loop", unless_given=MISSING)
+    Kv: float = real(
+        *(None, 1e-9, 1e12, "1", "force of a velocity error, N·s/m, or torque, N·m·s/rad"), unless_given=MISSING
+    )
+    Tv: float = real(0.0, 0.0, 1e3, "s", "integral time of the velocity loop; 0: it has no integrator")
+    feed_forward: float = real(0.0, 0.0, 2.0, "1", "share of the commanded velocity that is fed forward")
+    viscous: float = real(0.0, 0.0, 1e9, "1", "viscous friction, N·s/m or N·m·s/rad")
+
+
+@dataclass(frozen=True, kw_only=True)
 class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 from ..base.errors import IdentificationError, ParameterError, listed
 from ..base.files import atomic_open, atomic_open_text, plain
 from ..base.metrics import html_table, line_plot
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, PredictorSettings
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, PredictorSettings
 from ..base.signals import Array, as_samples
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
 from ..fmi.archive import build_fmu
-from ..identify.model import IdentifiedModel, machine_of
+from ..identify.model import IdentifiedModel, machine_of, of_cascade
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
 from ..logs.checks import Finding, checked
@@ -253,6 +253,7 @@ def fit(
     axis: str | None = None,
     Np: int | None = None,
     p: Sequence[int] = (),
+    cascade: Mapping[str, float] | None = None,
     name: str = "axis",
     progress: Progress | None = None,
     **known: float,
@@ -276,6 +277,9 @@ def fit(
         Samples of the controller's look-ahead; 0.1 s of them if left out.
     p : sequence of int
         Numbers of lags to choose from; some shares of ``Np`` if left out.
+    cascade : mapping, optional
+        Gains of the loop, by the names of :class:`~hybridsep.base.settings.Cascade`: the physics model is theirs, and
+        what the log says of them is among the findings of the identification.
     name : str
         The machine's.
     progress : callable, optional
@@ -296,6 +300,9 @@ def fit(
         If a log is too short to be split.
     """
     checked_name(name)
+    if unknown := set(cascade or ()) - Cascade.parameters().keys():
+        raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
+    gains = None if cascade is None else Cascade(**cascade)
     progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
@@ -328,6 +335,8 @@ def fit(
         return lambda done: progress(message, begin + (end - begin) * done)
 
     found = _identified(recordings, default, logs, stage("identify", 0.0, 0.38))
+    if gains is not None:
+        found = of_cascade(gains, [in_time(*one.training, default.n_late) for one in recordings], found, shown)
     model = found.model
     default = replace(default, input_hold=found.input_hold)
     progress("look for what repeats with the position", 0.38)

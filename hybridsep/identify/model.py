@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ..base.files import plain
+from ..base.settings import Cascade
+from ..base.signals import Array
+from ..logs.units import DisplayUnits
 from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
@@ -66,3 +72,43 @@ def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title:
         "input_hold": input_hold,
     }
     return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
+
+
+_DEAD_TIMES = 21
+"""Dead times that are tried with given gains, samples."""
+
+
+def of_cascade(
+    gains: Cascade, training: Sequence[tuple[Array, Array]], identified: IdentifiedModel, shown: DisplayUnits
+) -> IdentifiedModel:
+    """Return the model of given gains with the hold and dead time that leave least of the training samples.
+
+    Its finding compares what it leaves with the servo error and with what an ``identified`` model leaves.
+    """
+    T_s, kept = identified.T_s, [one for one in training if len(one[0])]
+    errors = {}
+    for input_hold in ("foh", "zoh"):
+        discrete = ModalModel.cascade(gains).discretise(T_s, input_hold)
+        x_pb = [one[0] + discrete.forced_response(discrete.rest(), one - one[0])[0] for one, _ in kept]
+        for late in range(_DEAD_TIMES):
+            errors[input_hold, late] = np.concatenate(
+                [x[late:] - mine[: len(x) - late] for mine, (_, x) in zip(x_pb, kept, strict=True)]
+            )
+    (input_hold, late), residual = min(errors.items(), key=lambda one: float(np.nanstd(one[1])))
+    left, servo_error = float(np.nanstd(residual)), float(np.nanstd(np.concatenate([x - x_d for x_d, x in kept])))
+    says = (
+        f"the given gains leave {shown.words(left)} of a servo error of {shown.words(servo_error)}, a model that is "
+        f"identified {shown.words(identified.rms)}"
+    )
+    return replace(
+        identified,
+        model=ModalModel.cascade(gains, late),
+        input_hold=input_hold,
+        structure="cascade of given gains",
+        parameters=tuple(Estimate(name, value, 0.0, "SI") for name, value in vars(gains).items()),
+        offset=float(np.nanmean(residual)),
+        rms=left,
+        rms_held_out=left,
+        alternatives=(),
+        findings=(says + ("" if left < servo_error else ": the log contradicts them"),),
+    )

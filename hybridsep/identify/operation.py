@@ -205,9 +205,9 @@ def _findings(
     error = float(np.std(np.concatenate([(s.y - s.u)[s.known] for s in segments])))
     if fit.structure.order and fit.rms > _LEFT * error:
         findings.append(
-            f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model leaves "
-            f"{shown.words(fit.rms)}, friction or disturbance that repeats with the command, and moves its modes by more "
-            "than their standard deviations say; record faster motion, or give the loop's gains (--cascade)"
+            f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model "
+            f"leaves {shown.words(fit.rms)}; friction, or a disturbance that repeats with the command, moves its modes "
+            "by more than their standard deviations say; record faster motion, or give the loop's gains (cascade)"
         )
     gain = float(fit.structure.gains(fit.linear)[0].sum())
     if not fit.structure.unit_gain:

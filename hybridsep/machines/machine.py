@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.errors import MachineError, ParameterError, brief, first_line, listed
 from ..base.files import data_folder
-from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
+from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
 from ..plants.plant import Drive
@@ -126,6 +126,8 @@ class Machine(Section):
         smd = self.physics.spring_mass_damper
         if smd is not None:
             return ModalModel.spring_mass_damper(smd.m, smd.c, smd.k, self.physics.dead_time)
+        if self.physics.cascade is not None:
+            return ModalModel.cascade(Cascade(**self.physics.cascade.values()), self.physics.dead_time)
         return ModalModel([Mode(**mode.values()) for mode in self.physics.mode], self.physics.dead_time)
 
     @property

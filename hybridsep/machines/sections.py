@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from ..base.errors import ParameterError, brief
 from ..base.parameters import Parameter
-from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
+from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings
 
 NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]{0,99}"
 """Names of machines; they become parts of FMUs' names, of which importers make names of files."""
@@ -19,7 +19,7 @@ _LINE = re.compile("[^\x00-\x1f\x7f\ufffe\uffff]+")
 
 _LINE_WORDS = "one line of printable text that XML 1.0 allows"
 
-_DECLARED = {**PARAMETERS, **Limits.parameters()}
+_DECLARED = {**PARAMETERS, **Limits.parameters(), **Cascade.parameters()}
 """Parameters by the names of their entries; a drive's and a trajectory's limits have the range of the compensator's."""
 
 _S = TypeVar("_S", bound="Section")
@@ -223,18 +223,33 @@ class SpringMassDamper(Section):
 
 
 @dataclass(frozen=True, kw_only=True)
+class CascadeSection(Section):
+    """Gains of :class:`~hybridsep.base.settings.Cascade`."""
+
+    inertia: float = parameter_entry("inertia")
+    Kp: float = parameter_entry("Kp")
+    Kv: float = parameter_entry("Kv")
+    Tv: float = parameter_entry("Tv", 0.0)
+    feed_forward: float = parameter_entry("feed_forward", 0.0)
+    viscous: float = parameter_entry("viscous", 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Physics(Section):
-    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
+    """``G_pb``: ``[[physics.mode]]`` entries, one ``[physics.spring_mass_damper]`` or one ``[physics.cascade]``."""
 
     mode: tuple[ModeSection, ...] = _modes_entry()
     spring_mass_damper: SpringMassDamper | None = section_entry(SpringMassDamper, None)
+    cascade: CascadeSection | None = section_entry(CascadeSection, None)
     dead_time: int = parameter_entry("dead_time", PARAMETERS["dead_time"].default)
     input_hold: str = parameter_entry("input_hold", "zoh")
 
     def check(self) -> None:
-        """Raise ParameterError unless there is one of both."""
-        if bool(self.mode) == (self.spring_mass_damper is not None):
-            raise ParameterError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
+        """Raise ParameterError unless there is one of them."""
+        if sum(map(bool, (self.mode, self.spring_mass_damper, self.cascade))) != 1:
+            raise ParameterError(
+                "give either [[physics.mode]] entries or one [physics.spring_mass_damper] or [physics.cascade]"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

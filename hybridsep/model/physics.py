@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import ModelError, ParameterError
-from ..base.settings import check
+from ..base.settings import Cascade, check
 from ..base.signals import Array
 from .discrete import BLOCK_MAX, DiscreteModel
 
@@ -114,6 +114,17 @@ class ModalModel:
                 f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m give a mode out of range: {error}"
             ) from None
         return cls((mode,), dead_time)
+
+    @classmethod
+    def cascade(cls, gains: Cascade, dead_time: int = 0) -> ModalModel:
+        """Return the closed loops of a drive, a mass with viscous friction, of given gains; ModelError if unstable."""
+        s, Tv = np.polynomial.Polynomial([0.0, 1.0]), gains.Tv
+        force = gains.Kv * (Tv * s + 1.0) if Tv else gains.Kv + 0.0 * s
+        velocity = (Tv * s if Tv else 1.0) * (gains.inertia * s + gains.viscous) + force
+        numerator, denominator = force * (gains.Kp + gains.feed_forward * s), velocity * s + force * gains.Kp
+        import control as ct
+
+        return cls.from_control(ct.tf(*(one.trim().coef[::-1] for one in (numerator, denominator))), dead_time)
 
     @classmethod
     def from_control(cls, system: control.TransferFunction | control.StateSpace, dead_time: int = 0) -> ModalModel:
