@@ -14,22 +14,14 @@
  *   hsep_defaults            | constant                                              | nothing
  *   hsep_*_size, _refused    | constant                                              | returns 0: refused
  *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
- *   hsep_predictor_sample    | n^2 / 2 times 7 operations, 2 n divisions; at a       | divergence is set, latched
- *                            | window's end Np (p + q) + n^2 / 2 on top; with averaging, |
- *                            | for each of three experts, four in a warm run,        |
- *                            | (4 + Np / 50 + late / 2) n^2, at a window's end       |
- *                            | 4 n^2 + s^3 / 6 and 6 Np tanh on top                  |
- *   hsep_compensator_sample  | as the predictor's with preview for Np but in folds;  | divergence is set, latched
- *                            | at a window's end a plan, m^3 / 6, and a bounded share|
- *                            | of its solution in each of the samples that follow    |
+ *   hsep_predictor_sample    | bounded by the parameters: README.md, Footprint       | divergence is set, latched
+ *   hsep_compensator_sample  | the same                                              | divergence is set, latched
  *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
  *   hsep_compensator_reset   | constant                                              | nothing
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
- * Costs are multiply-adds; n: features, p + q, with averaging p and a few more, 74 at least; s: 38 of them at most,
- * without lags; late: measurement_delay; m: splines in a plan, preview / spacing. With windows shorter than 20 samples
- * 4 n^2 become up to n^3 / 6. The dearest sample is bounded by the parameters, and is the same at the first and at the
- * 10^9th sample, but for a first window that begins in motion: its last sample has Np n^2 + n^3 / 6 for each expert.
+ * The dearest sample costs the same at the first and at the 10^9th sample, but for a first window that begins in motion:
+ * its last sample learns the whole window.
  */
 #ifndef HSEP_H
 #define HSEP_H
