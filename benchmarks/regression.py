@@ -1,4 +1,4 @@
-"""Benchmark of the replay's speed and accuracy against bare LAPACK and other packages' recursive regressions.
+"""Benchmark of the replay's speed and accuracy against bare LAPACK and padasip's recursive regression.
 
 Run with ``python -m benchmarks.regression``; exits with 1 if a limit is missed: replaying a log may take at most 3
 times as long as LAPACK's ``dtpqrt`` alone takes for the same rows, and padasip's RLS filter must take at least 15 times
@@ -6,10 +6,8 @@ as long for a sample.
 
 All times are from one thread, interleaved, and each ratio is the median of the ratios within a repetition. ``dtpqrt``
 is timed call by call: the copy of the rows into its work space, which it overwrites, is not counted, so that it finds
-its rows in the cache. The other packages are given the finished rows, too; slow ones get fewer samples, and their
-weights are compared with the exact ones of the samples they had. River's nearest is its Bayesian linear regression,
-whose mean is the ridge solution. A package that is missing is left out and named, with how to install it; padasip must
-be there.
+its rows in the cache. The filters are given the finished rows, too; padasip's gets fewer of many features, and its
+weights are compared with the exact ones of the samples it had.
 """
 
 from __future__ import annotations
@@ -192,31 +190,6 @@ def run_padasip(rows: Array) -> tuple[float, Array]:
     return perf_counter() - begin, rls.w
 
 
-def run_sysidentpy(rows: Array) -> tuple[float, Array]:
-    from sysidentpy.parameter_estimation import RecursiveLeastSquares
-
-    n = rows.shape[1] - 1
-    # It leaves out the first two rows; zero rows there change nothing.
-    padded = np.vstack((np.zeros((2, n + 1)), rows))
-    estimator = RecursiveLeastSquares(lam=1.0, delta=LAM)  # no forgetting, P = I/λ at first
-    begin = perf_counter()
-    w = estimator.optimize(padded[:, :n], padded[:, n:])
-    return perf_counter() - begin, w[:, 0]
-
-
-def run_river(rows: Array) -> tuple[float, Array]:
-    from river.linear_model import BayesianLinearRegression
-
-    n = rows.shape[1] - 1
-    samples = [(dict(enumerate(row[:n])), row[n]) for row in rows.tolist()]
-    model: Any = BayesianLinearRegression(alpha=LAM, beta=1.0)  # its mean is the ridge solution
-    begin = perf_counter()
-    for x, y in samples:
-        model.learn_one(x, y)
-    seconds = perf_counter() - begin
-    return seconds, np.array([model.predict_one({i: 1.0}) for i in range(n)])
-
-
 def contenders(p: int, q: int) -> tuple[list[Contender], Array]:
     """Return who is compared at these lags, the replay first, and the rows they all fit."""
     x_d, x = staircase_log(N_SAMPLES)
@@ -228,29 +201,12 @@ def contenders(p: int, q: int) -> tuple[list[Contender], Array]:
         Contender(DTPQRT, N_SAMPLES, lambda: run_dtpqrt(rows), slow=False),
         Contender("textbook P matrix", N_SAMPLES, lambda: run_covariance(rows)),
         Contender(PADASIP, few, lambda: run_padasip(rows[:few])),
-        Contender("sysidentpy RLS", few, lambda: run_sysidentpy(rows[:few])),
-        Contender("river BayesianLinearRegression", few, lambda: run_river(rows[:few])),
     ], rows
-
-
-def importable(contender: Contender, console: Console) -> bool:
-    """Run a contender once, untimed, and say how to install it if its package is missing or too old."""
-    try:
-        contender.run()
-    except ImportError as error:
-        console.print(f"{contender.name} is left out: {error}", highlight=False)
-        console.print("  to compare with it: pip install 'padasip>=1.2' 'river>=0.21' 'sysidentpy>=0.5'", markup=False)
-        if contender.name == PADASIP:
-            raise SystemExit(1) from None
-        return False
-    return True
 
 
 def compare(p: int, q: int, console: Console) -> list[str]:
     """Run one table; return the limits that were missed."""
-    everyone, rows = contenders(p, q)
-    with np.errstate(all="ignore"):
-        compared = [contender for contender in everyone if importable(contender, console)]
+    compared, rows = contenders(p, q)
     microseconds: dict[str, list[float]] = {contender.name: [] for contender in compared}
     weights: dict[str, Array] = {}
     with np.errstate(all="ignore"):  # a peer that loses its weights may overflow on the way

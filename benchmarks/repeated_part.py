@@ -4,9 +4,8 @@
 
 RMS errors of the true position, µm, over whole runs, each under other noise, of the staircase's drive, the stage with
 friction on the actual velocity and the first drives of two masses with backlash; what was learned is kept from run to
-run. Learning control is norm-optimal (N. Amann, D. H. Owens, E. Rogers, IEE Proc. Control Theory Appl. 143, 1996):
-``u ← u + (GᵀG + r)⁻¹Gᵀ(x_d − x_meas)``, ``G`` being the physics model. It begins with that model's command, knows no
-limits of the drive, and has the weight ``r`` that is best for its last run. At the higher feed its command is stretched
+run. Learning control is norm-optimal, without a Q filter; it begins with the physics model's command, knows no limits
+of the drive, and has the weight ``r`` that is best for its last run. At the higher feed its command is stretched
 in time. *Kept* is the reduction there after the runs, relative to that of the last run, both against the physics
 model's plans; *of cold*, both against the hybrid's first run.
 """
@@ -20,8 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import fftconvolve
-from scipy.sparse.linalg import LinearOperator, lsqr
 from two_mass.axis import Axis
 from two_mass.generator import SEED, Recipe
 from two_mass.loop import settings_of
@@ -29,6 +26,7 @@ from two_mass.plant import TwoMassDrive
 
 from benchmarks.averaging import with_friction_on
 from benchmarks.compensation.loops import noise_seed
+from benchmarks.learning_control import learned_commands
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
@@ -144,16 +142,10 @@ def compensated(part: Part, compensate: str, paths: Sequence[Array]) -> list[flo
 
 def learning_controlled(part: Part, weight: float) -> tuple[float, float]:
     """Return the tracking errors of the last run, and at the higher feed, m."""
-    n, start = len(part.x_d), part.x_d[0]
-    u = x_d = part.x_d - start
-    g = part.model.discretise(part.predictor.T_s, part.predictor.input_hold).impulse_response(n)
-    G = LinearOperator((n, n), lambda u: fftconvolve(g, u)[:n], lambda e: fftconvolve(g, e[::-1])[:n][::-1])
-    x_meas, root = G @ x_d, float(np.sqrt(weight)) * abs(float(g.sum()))
-    for run in range(RUNS):
-        u = u + lsqr(G, x_d - x_meas, damp=root, atol=1e-9, btol=1e-9, iter_lim=3000)[0]
-        x = simulate(part.plant, start + u, part.predictor.T_s)
-        x_meas = part.measured(x, run) - start
-    return rms(part.x_d - x), rms(faster(part.x_d) - simulate(part.plant, faster(start + u), part.predictor.T_s))
+    T_s, hold = part.predictor.T_s, part.predictor.input_hold
+    plant, x_d = part.plant, part.x_d
+    *_, last = learned_commands(part.model, T_s, hold, plant, x_d, RUNS, part.measured, weight=weight, advised=True)
+    return rms(x_d - last.x), rms(faster(x_d) - simulate(plant, faster(last.u), T_s))
 
 
 def row(index: int) -> str:

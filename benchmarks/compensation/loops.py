@@ -1,22 +1,15 @@
-"""Closed loops over a trajectory, cold and warm: in the library, or FMU against FMU through fmpy."""
+"""Closed loops of the library over a trajectory, cold and warm, disturbed too."""
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Protocol
 
-import numpy as np
-
-from hybridsep.base.settings import PARAMETERS, Limits
+from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.fmi.archive import build_fmu
-from hybridsep.fmi.spec import fmu_names
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Encoder, Plant
@@ -72,8 +65,13 @@ class HeldSensor:
         return self.value
 
 
-class Loops(Protocol):
-    """Runs a machine's drive behind its compensator."""
+def noise_seed(seed: int, run: int) -> int:
+    """Return the encoder's seed in the first, second, … run in a row."""
+    return seed + 1000 * run
+
+
+class LibraryLoops:
+    """The library's compensator and plant, with the FMU's timing."""
 
     def run(
         self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
@@ -95,21 +93,6 @@ class Loops(Protocol):
         case : Case, optional
             Disturbance of the loop.
         """
-        ...
-
-
-def noise_seed(seed: int, run: int) -> int:
-    """Return the encoder's seed in the first, second, … run in a row."""
-    return seed + 1000 * run
-
-
-class LibraryLoops:
-    """The library's compensator and plant, with the FMU's timing."""
-
-    def run(
-        self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
-    ) -> list[Run]:
-        """Return ``n`` runs in a row; see :class:`Loops`."""
         compensator = self.compensator(machine, compensate, case or Case())
         return [self.once(compensator, machine, r, seed, i, case or Case()) for i in range(n)]
 
@@ -137,79 +120,3 @@ class LibraryLoops:
             disturb=disturb,
             sensor=case.sensor,
         )
-
-
-class FmuLoops:
-    """A SepCompensator FMU against a plant FMU; a warm one starts with the weights of the library's run before.
-
-    Use it as a context manager: the FMUs are in a temporary folder.
-
-    Attributes
-    ----------
-    apart : float, m
-        Largest difference of ``x_dm`` from the library's cold runs so far.
-    """
-
-    def __init__(self) -> None:
-        self.apart = 0.0
-        self._folder = tempfile.TemporaryDirectory()
-        self._built: dict[tuple[str, ...], Path] = {}
-        self._library = LibraryLoops()
-
-    def __enter__(self) -> FmuLoops:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._folder.cleanup()
-
-    def run(
-        self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
-    ) -> list[Run]:
-        """Return ``n`` ≤ 2 runs in a row; see :class:`Loops`.
-
-        Raises
-        ------
-        ValueError
-            If the case changes the plant in mid-run: an FMU's parameters are fixed then.
-        """
-        case = case or Case()
-        if case.change is not None or n > 2:
-            raise ValueError("FMUs can be run twice in a row, and their plant cannot change in mid-run")
-        cold = self._once(machine, r, compensate, seed, 0, case, self._fmu(machine, "SepCompensator"))
-        compensator = self._library.compensator(machine, compensate, case)
-        same = self._library.once(compensator, machine, r, seed, 0, case)
-        self.apart = max(self.apart, float(np.max(np.abs(cold.x_dm - same.x_dm))))
-        if n == 1:
-            return [cold]
-        weights = Path(self._folder.name) / "trained.state"
-        compensator.predictor.save(weights)
-        trained = self._fmu(machine, "SepCompensator", weights)
-        return [cold, self._once(machine, r, compensate, seed, 1, case, trained)]
-
-    def _once(self, machine: Machine, r: Array, compensate: str, seed: int, run: int, case: Case, fmu: Path) -> Run:
-        assert machine.plant is not None
-        values: dict[str, Any] = {"compensate": PARAMETERS["compensate"].to_fmi(compensate)}
-        if case.limits is not None:
-            limits = case.limits
-            values |= {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
-        plant = {"seed": noise_seed(seed, run), "noise_std": machine.plant.noise_std * case.noise}
-        return cosimulate(
-            fmu,
-            self._fmu(machine, "FeedDrive"),
-            r,
-            controller_values=values,
-            plant_values=plant,
-            sensor=case.sensor,
-        )
-
-    def _fmu(self, machine: Machine, model: str, weights: Path | None = None) -> Path:
-        """Return an FMU of a machine; only those with weights are built anew."""
-        key = (machine.name, model, str(machine.compensator))
-        if weights is not None or key not in self._built:
-            name = next(name for name, built in fmu_names(machine).items() if built == model)
-            folder = Path(self._folder.name) / ("warm" if weights else str(len(self._built)))
-            path = build_fmu(machine, name, folder, targets=("host",), weights=weights)
-            if weights is not None:
-                return path
-            self._built[key] = path
-        return self._built[key]

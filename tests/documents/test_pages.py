@@ -14,7 +14,7 @@ DATED = ROOT / "docs" / "experiments"
 """Pages that tell of the code at their commit: names of files on them may have gone."""
 TOP = tuple(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"))
 PAGES = (*TOP, *sorted((ROOT / "plugins").glob("*/README.md")), *sorted((ROOT / "docs").rglob("*.md")))
-FOLDERS = ". hybridsep fmu_src/c fmu_src/c/core benchmarks benchmarks/step_time integrations/linuxcnc".split()  # noqa: SIM905
+FOLDERS = ". hybridsep fmu_src/c fmu_src/c/core benchmarks benchmarks/outside integrations/linuxcnc".split()  # noqa: SIM905
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")
 ELSEWHERE = re.compile(
