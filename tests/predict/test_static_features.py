@@ -93,13 +93,11 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
     np.testing.assert_allclose(found[:, column + count :] / size, differenced / size, rtol=0, atol=1e-9)
 
 
-def test_peak_velocity_looks_back_to_the_last_command() -> None:
-    static = features("zoh", 0, 3)
-    x_d, x = signals()
-    _, state = static.rows(static.rest(), ResidualWindow(x_d[:100], x_d[:100], ORIGIN, x_d[:100]), x[:100], SCALE)
-    assert static.peak_velocity(static.rest(), np.array([2e-6, 1e-6])) == pytest.approx(2e-3)
-    assert static.peak_velocity(state, x_d[99:100]) == 0.0
-    assert static.peak_velocity(state, x_d[99:100] - 3e-6) == pytest.approx(3e-3)
+def test_peak_velocity_is_of_what_the_numbers_resolve() -> None:
+    static, ulp = features("zoh", 0, 3), np.spacing(0.17)
+    assert static.peak_velocity(np.array([0.0, 2e-6, 1e-6]), 0.17) == pytest.approx(2e-3)
+    assert static.peak_velocity(np.array([0.0, 10.0 * ulp, 0.0]), 0.17) == 0.0
+    assert static.peak_velocity(np.array([0.0, 10.0 * ulp, 0.0]), 0.0) > 0.0
 
 
 def test_at_rest_only_the_constant_is_left() -> None:

@@ -298,7 +298,7 @@ class Regression(Expert):
             return None
         if kind == COMMAND_RESIDUAL:
             command, square = model.command, scales.command_square
-            p, shares, largest = command.p, command.shares, command.largest(scales.command_step)
+            p, shares, largest = command.p, command.shares, command.largest(scales.command_step or 1.0)
         else:
             p, shares, largest = settings.p, model.static.shares, scales.largest
         effect = settings.effect or math.sqrt(square)

@@ -82,6 +82,10 @@ N_FRICTION, N_STOPS, _N_PERIODIC = 6, 3, 2
 N_LASTING = N_FRICTION + N_STOPS + 2
 """Disturbances that every axis has: friction, stop operators, stiffness and damping."""
 
+_RESOLVED = 32.0
+"""Motion from one sample to the next, in units of the last place of the start, below which a command is at rest: the
+plans of an axis that stands are rounded."""
+
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
 
@@ -142,9 +146,13 @@ class StaticFeatures:
         n = self.n_disturbances
         return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1), np.zeros(N_STOPS))
 
-    def peak_velocity(self, state: StaticState, x_d: Array) -> float:
-        """Return the largest magnitude of the commanded velocity over a window, m/s."""
-        return float(np.abs(self.velocity(state, x_d)).max())
+    def peak_velocity(self, commands: Array, start: float) -> float:
+        """Return the largest magnitude of the velocity of commands ``(n,)``, m, m/s; 0 below the numbers' resolution.
+
+        ``start``, m, is what they are relative to.
+        """
+        step = float(np.abs(np.diff(commands)).max(initial=0.0))
+        return step / self.discrete.T_s if step > _RESOLVED * np.finfo(np.float64).eps * abs(start) else 0.0
 
     def spread(self, velocity_scale: float) -> Array:
         """Return the velocities of the friction's change of sign, ``(N_FRICTION,)``, m/s."""

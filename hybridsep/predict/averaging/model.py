@@ -235,12 +235,13 @@ class AveragedModel:
         static, learned, settings = self.static, self.learned, self.settings
         T_s = settings.T_s
         before = learned.velocity_scale
-        peak = static.peak_velocity(self.run.static, window.x_d)
+        x_d = np.append(self.run.static.x_d, window.x_d)
+        peak = static.peak_velocity(x_d, window.start)
         n_windows = self.evidence[MODEL_RESIDUAL].earlier.n_rows / settings.Np
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
-            peak = max(float(np.abs(np.diff(window.path[settings.n_late :])).max(initial=0.0)) / T_s, before)
+            peak = max(static.peak_velocity(window.path[settings.n_late :], window.start), before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
@@ -249,11 +250,11 @@ class AveragedModel:
         if not static.is_planned and settings.Np > 1 and self.command_square > 0.0:
             # A controller solves for the command's expert one sample before the window, as far as its commands are
             # known.
-            known = window.x_d[: settings.n_late + settings.Np - 1]
-            early = max(learned.largest_step, static.peak_velocity(self.run.static, known) * T_s)
+            known = x_d[: settings.n_late + settings.Np]
+            early = max(learned.largest_step, static.peak_velocity(known, window.start) * T_s)
             if early > 0.0 or step == 0.0:
                 command_step, command_square = early, self.command_square
-        largest = np.maximum(largest, np.abs(rows).max(axis=0))
+        largest = np.maximum(largest, np.abs(rows).max(axis=0)) if velocity > 0.0 else np.ones(static.n)
         return FeatureScales(velocity, largest, step, command_step, command_square)
 
     def solved(self, scales: FeatureScales) -> dict[Regression, SolvedExpert]:

@@ -10,7 +10,8 @@
 static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const hsep_real path[], hsep_int n_path)
 {
     const hsep_real before = self->learned.velocity_scale;
-    hsep_real peak = hsep_disturbances_peak_velocity(hsep_averaged_disturbances(self), x_d, self->n);
+    const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    hsep_real peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
     hsep_warm_start *evidence = hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL);
     const hsep_real n_windows = hsep_warm_start_earlier(evidence)->n_rows / (hsep_real)self->Np;
     hsep_real most = HSEP_AVERAGING_VELOCITY_JUMP * hsep_fmax(n_windows, 1.0) * before;
@@ -20,7 +21,7 @@ static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const h
         for (hsep_int j = 0; j + 1 < n_path; j++) {
             peak = hsep_fmax(peak, hsep_fabs(path[j] - path[j + 1]));
         }
-        peak = hsep_fmax(peak / self->T_s, before);
+        peak = hsep_fmax(hsep_disturbances_resolved(disturbances, peak) / self->T_s, before);
         most = before;
     }
     const int outgrown = peak > hsep_fmax(most, HSEP_FEATURES_LEAST_VELOCITY);
@@ -42,7 +43,7 @@ static int averaged_scale(
     }
     for (hsep_int k = 0; k < self->n; k++, rows += self->n_static) {
         for (hsep_int i = 0; i < self->n_static; i++) {
-            const hsep_real size = hsep_fabs(rows[i]);
+            const hsep_real size = self->forecast_scale > 0.0 ? hsep_fabs(rows[i]) : 1.0; /* nothing has moved */
             largest[i] = size > largest[i] ? size : largest[i];
         }
     }
@@ -61,7 +62,7 @@ HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_re
     const hsep_int kind = hsep_averaged_kind_of(self, expert);
     const int of_command = kind == HSEP_COMMAND_RESIDUAL, is_early = of_command && averaged_is_early(self);
     const hsep_real square = is_early ? self->early_square : self->learned.scales[kind].largest_square;
-    const hsep_real step = is_early ? self->early_step : self->forecast_step;
+    const hsep_real most = is_early ? self->early_step : self->forecast_step, step = most > 0.0 ? most : 1.0;
     const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_expert *solved = hsep_averaged_expert(self, expert);

@@ -247,7 +247,8 @@ HSEP_API void hsep_averaged_follow(
 
 HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak)
 {
-    const hsep_real step = peak / self->T_s * self->T_s; /* as that of the window is computed */
+    const hsep_real resolved = hsep_disturbances_resolved(hsep_averaged_disturbances(self), peak);
+    const hsep_real step = resolved / self->T_s * self->T_s; /* as that of the window is computed */
     self->early_step = hsep_fmax(hsep_fmax(self->learned.largest_step, self->forecast_step), step);
     self->settled = 1;
     if (self->followed + 1 != self->Np || !(self->early_square > 0.0)) {

@@ -75,6 +75,12 @@ HSEP_API void hsep_disturbances_begin_in_motion(
     }
 }
 
+HSEP_API hsep_real hsep_disturbances_resolved(const hsep_disturbances *self, hsep_real step)
+{
+    const hsep_real epsilon = 2.0 / HSEP_EXACT;
+    return step > HSEP_FEATURES_RESOLVED * epsilon * hsep_fabs(self->origin) ? step : 0.0;
+}
+
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n)
 {
     hsep_real largest = 0.0, last = self->before.x_d;
@@ -82,7 +88,7 @@ HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self
         largest = hsep_fmax(largest, hsep_fabs(x_d[j] - last));
         last = x_d[j];
     }
-    return largest / self->T_s;
+    return hsep_disturbances_resolved(self, largest) / self->T_s;
 }
 
 /* Filter the disturbances first ... first + count - 1, whose n samples are side by side in u, and put the results and
