@@ -51,20 +51,15 @@ class LibraryController:
     controller : HybridPredictor or SepCompensator
     t_init : float, optional
         Warm-up, s; its own if left out.
-
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    kind : ControllerType
-    T_s : float
-        Sampling interval, s; an FMU's, like the next three, is known after :meth:`initialise`.
-    Np, delay, late : int
-        Samples in a window; samples by which it delays the trajectory, and by which it is told that measurements are
-        late.
     """
 
-    name: str = "the controller"
+    name: str = "the controller"  # in error messages
+    # Sampling interval, s; samples in a window, by which it delays the trajectory, and by which it is told that
+    # measurements are late: an FMU's are known after :meth:`initialise`
+    T_s: float
+    Np: int
+    delay: int
+    late: int
 
     def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
         self._controller, self._t_init = controller, t_init
@@ -134,23 +129,13 @@ class OwnController:
 
 
 class LibraryDrive:
-    """A plant and its encoder.
+    """A plant and its encoder."""
 
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    T_s : float, optional
-        Sampling interval, s; None if it can be any.
-    plant : object
-        Passed to ``disturb``.
-    """
-
-    name: str = "the plant"
-    T_s: float | None = None
+    name: str = "the plant"  # in error messages
+    T_s: float | None = None  # sampling interval, s; None if it can be any
 
     def __init__(self, plant: Plant, encoder: Encoder) -> None:
-        self.plant: Any = plant
+        self.plant: Any = plant  # passed to ``disturb``
         self._encoder = encoder
 
     def initialise(self, start: float) -> None:
