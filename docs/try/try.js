@@ -2,14 +2,29 @@
 "use strict";
 
 const UNITS = { // factor to m or rad; name of its errors' unit, and their factor
-  m: [1, "µm", 1e6], mm: [1e-3, "µm", 1e6], "µm": [1e-6, "µm", 1e6], in: [0.0254, "µm", 1e6],
-  rad: [1, "µrad", 1e6], deg: [Math.PI / 180, "mdeg", 180e3 / Math.PI],
+  m: [1, "µm", 1e6], mm: [1e-3, "µm", 1e6], um: [1e-6, "µm", 1e6], nm: [1e-9, "µm", 1e6], in: [0.0254, "µm", 1e6],
+  rad: [1, "µrad", 1e6], mrad: [1e-3, "µrad", 1e6], urad: [1e-6, "µrad", 1e6],
+  deg: [Math.PI / 180, "mdeg", 180e3 / Math.PI], rev: [2 * Math.PI, "mrev", 500 / Math.PI],
 };
-const TIMES = { s: 1, ms: 1e-3, "µs": 1e-6 };
-const NAMES = { // in small letters, by precedence; hybridsep/logs/names.py has more of them
-  t: "t time timestamp zeit",
-  x_d: "x_d xd x_ref x_cmd x_set x_des reference setpoint command commanded pos_cmd des_pos",
-  x: "x_meas x x_m x_act measured actual feedback pos_act act_pos enc_pos",
+const ANGLES = ["rad", "mrad", "urad", "deg", "rev"];
+const TIMES = { s: 1, ms: 1e-3, us: 1e-6, ns: 1e-9, min: 60 };
+const SPELLINGS = { // as hybridsep/logs/units.py
+  meter: "m", metre: "m", meters: "m", metres: "m", micron: "um", microns: "um", inch: "in", '"': "in", "°": "deg",
+  degree: "deg", degrees: "deg", radian: "rad", radians: "rad", turn: "rev", turns: "rev", revolution: "rev",
+  sec: "s", second: "s", seconds: "s", msec: "ms", usec: "us", millimeter: "mm", millimeters: "mm", millimetre: "mm",
+  micrometer: "um", micrometre: "um", millisecond: "ms", milliseconds: "ms", microsecond: "us", microseconds: "us",
+};
+const SUFFIXES = ["mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns"];
+const THOUSANDS = /^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/;
+const TURN = 2 * Math.PI;
+const NAMES = { // in small letters, by precedence, as hybridsep/logs/names.py
+  t: "t time timestamp time_stamp zeit",
+  x_d: "x_d xd x_ref xref x_cmd x_set x_des reference setpoint set_point command commanded " +
+    "position_commanded commanded_position pos_cmd cmd_pos pos_ref pos_set ctrl_pos des_pos q_d " +
+    "sollposition lagesollwert",
+  x: "x_meas x x_m x_act measured measurement actual position_measured measured_position actual_position " +
+    "position_actual pos_meas pos_act act_pos enc_pos feedback q_meas process_value istposition " +
+    "lageistwert",
 };
 const DEAD_TIMES = 21; // samples: 0 to 20 are tried
 const ARX_LAGS = [20, 40];
@@ -23,36 +38,120 @@ const pause = () => new Promise((done) => setTimeout(done));
 /** What is wrong with a log, for the user. */
 class LogError extends Error {}
 
-/** Names and rows of texts of a CSV; lines that begin with # are comments. */
-function parse(text) {
-  const lines = text.split(/\r?\n/).filter((line) => line.trim() && !line.startsWith("#"));
-  const separator = [";", "\t", ","].find((one) => lines[0]?.includes(one));
-  const cells = lines.map((line) => line.split(separator).map((cell) => cell.trim().replace(/^"(.*)"$/, "$1")));
-  if (!separator || cells[0].every((cell) => !isNaN(cell.replace(",", "."))))
-    throw new LogError("the first row must name the columns, such as t,x_d,x");
-  return { names: cells[0], rows: cells.slice(1), decimal: separator === "," ? "." : "," };
+/** Cells of a line, without blanks and quotation marks around them. */
+function split(line, separator) {
+  const cells = line.includes('"') ? line.match(new RegExp(`("[^"]*"|[^${separator}"])*(${separator}|$)`, "g")).slice(0, -1)
+    .concat(line.endsWith(separator) ? [""] : []) : line.split(separator);
+  return cells.map((cell) => cell.replace(new RegExp(`${separator}$`), "").trim().replace(/^["'](.*)["']$/, "$1").trim());
 }
 
-/** A name without its unit, in small letters; and the unit: x [mm], x (mm) or x_mm. */
-const plain = (name) => name.toLowerCase().replace(/(\s*[\[(].*|_(mm?|[uµ]m|[mu]?s))$/, "").replace(/[\s.-]+/g, "_");
-const stated = (name) => /[\[(_]([^\[(_]+?)[\])]?$/.exec(name)?.[1].replace(/[uμ](?=[ms])/, "µ").replace("°", "deg");
+/** Names, units and rows of texts of a CSV; what a comma in a number stands for, null where it is an error. */
+function parse(text) {
+  const lines = text.replace(/^\ufeff/, "").split(/\r?\n/).filter((line) => line.trim() && !/^\s*(#|%|\/\/|!)/.test(line));
+  const separator = [";", "\t", ","].find((one) => lines[0]?.includes(one));
+  const cells = separator ? lines.map((line) => split(line, separator)) : [[]];
+  if (!separator || cells[0].every((cell) => !isNaN(cell.replace(",", "."))))
+    throw new LogError("the first row must name the columns, such as t,x_d,x");
+  const below = (cells[1] ?? []).map((cell) => cell.replace(/^[[(]|[\])]$/g, ""));
+  const has_units = below.some(factor_of) && below.every((cell) => factor_of(cell) || ["", "-", "1"].includes(cell));
+  const rows = cells.slice(has_units ? 2 : 1), written = rows.flat().filter((cell) =>
+    cell && (isFinite(cell.replace(",", ".")) || THOUSANDS.test(cell)));
+  const commas = written.filter((cell) => cell.includes(",")), points = written.some((cell) => cell.includes("."));
+  const thousands = commas.length && commas.every((cell) => THOUSANDS.test(cell)) &&
+    (points || commas.some((cell) => cell.split(",").length > 2));
+  return { names: cells[0], units: has_units ? below : [], rows, comma: thousands ? "" : points ? null : "." };
+}
 
-function column({ names, rows, decimal }, j, factor) {
+/** Spelling of a unit as the tables have it; the factor of a unit to SI, if it is one of position or time. */
+const spelled = (text) => (one => SPELLINGS[one] ?? one)(text.trim().toLowerCase().replace(/[µμ]/g, "u"));
+const factor_of = (text) => UNITS[spelled(text)]?.[0] ?? TIMES[spelled(text)];
+
+/** A name without its unit, and the unit as it is written: x [mm], x (mm), x / mm, x in mm, x, mm or x_mm. */
+function stated(name) {
+  const brackets = /^(.*?)\s*(?:\[([^[\]]*)\]|\(([^()]*)\))\s*$/.exec(name);
+  if (brackets) {
+    const [, before, square, round] = brackets, text = (square || round || "").trim();
+    if (/^\d+$/.test(square ?? "") && name[before.length] === "[") return [name, ""];
+    if (["", "-", "1"].includes(text)) return [before, ""];
+    return square !== undefined || factor_of(text.split("/")[0]) ? [before, text] : [name, ""];
+  }
+  const slash = /^(.*?\S)\s*(?:\/|\bin\b)\s*(\S+)\s*$/.exec(name);
+  if (slash && factor_of(slash[2])) return slash.slice(1);
+  const suffix = /^(.*?[^_\s,])(?:_|\s*,\s*)([^_\s,]+)$/.exec(name);
+  return suffix && SUFFIXES.includes(spelled(suffix[2])) ? suffix.slice(1) : [name, ""];
+}
+const plain = (name) => stated(name)[0].trim().toLowerCase().replace(/[\s.-]/g, "_");
+const unit_of = (log, j) => log.units[j] || stated(log.names[j])[1];
+
+function column({ names, rows, comma }, j, factor) {
   return Float64Array.from(rows, (row, i) => {
-    const cell = (row[j] ?? "").replace(decimal, ".");
-    if (cell === "" || !isFinite(cell))
-      throw new LogError(`row ${i + 1}, ${names[j]}: "${cell}" is no number; hybridsep fit reads logs with gaps`);
-    return factor * cell;
+    const cell = row[j] ?? "", bad = cell.includes(",") && (comma === null || (comma === "" && !THOUSANDS.test(cell)));
+    const number = cell.replaceAll(",", comma ?? "");
+    if (bad || number === "" || !isFinite(number))
+      throw new LogError(`row ${i + 1}, ${names[j]}: "${cell}" is no number; ` +
+        (/\d[.,]\d/.test(cell) ? "write numbers without separators of thousands" : "hybridsep fit reads logs with gaps"));
+    return factor * number;
   });
 }
 
-/** Sampling interval of times, s. */
-function interval(t) {
-  const steps = t.slice(1).map((one, i) => one - t[i]), T_s = steps.slice().sort()[steps.length >> 1];
-  const wrong = steps.findIndex((step) => !(T_s > 0 && Math.abs(step - T_s) <= 0.5 * T_s));
-  if (wrong < 0) return (t[t.length - 1] - t[0]) / steps.length;
+/** Sampling interval, s, of times in a unit, which is no guess: without one they must be plausible in seconds. */
+function interval(times, name, unit) {
+  const factor = unit ? TIMES[spelled(unit)] : 1;
+  if (!factor) throw new LogError(`time '${name}' must be in one of ${Object.keys(TIMES).join(", ")}, its unit is '${unit}'`);
+  const steps = times.slice(1).map((one, i) => factor * (one - times[i])), sorted = steps.slice().sort();
+  const T_s = sorted[sorted.length >> 1], still = steps.filter((step) => !(step > 0)).length;
+  if (still > 0.05 * steps.length)
+    throw new LogError(`time '${name}' is rounded too coarsely, ${(100 * still / steps.length).toPrecision(3)} % of the ` +
+      "times are not above the one before; choose no time, and say the interval between the rows");
+  if (!unit && steps.length >= 9 && (T_s === 1 || !(T_s >= 2e-6 && T_s <= 0.5)))
+    throw new LogError(`column '${name}' ${T_s === 1 ? "counts samples: it is an index, or a time in ms" :
+      `has an interval of ${T_s.toPrecision(6)}, no axis's in s`}; choose no time, or name its unit in the file, '${name} [ms]'`);
+  const wrong = steps.findIndex((step) => !(Math.abs(step - T_s) <= 0.5 * T_s));
+  if (wrong < 0) return factor * (times[times.length - 1] - times[0]) / steps.length;
   const [here, usual] = [steps[wrong], T_s].map((one) => Number(one.toPrecision(4)));
   throw new LogError(`row ${wrong + 2}: the time changes by ${here} s, elsewhere by ${usual} s; cut the log there`);
+}
+
+const travel = (x) => x.reduce((a, b) => Math.max(a, b)) - x.reduce((a, b) => Math.min(a, b));
+
+/** A position without the jumps of one that counts modulo a turn. */
+function unwrapped(x) {
+  if (travel(x) > 1.05 * TURN) return x;
+  let turns = 0;
+  return x.map((one, k) => {
+    if (k && Math.abs(one - x[k - 1]) > TURN / 2) turns -= Math.round((one - x[k - 1]) / TURN);
+    return one + turns * TURN;
+  });
+}
+
+/** Samples of the chosen columns, in m or rad: {x_d, x, T_s, unit}; in `chosen.unit` what states none. */
+function samples(log, chosen) {
+  const names = [chosen.x_d, chosen.x].map((j) => spelled(unit_of(log, j) || chosen.unit));
+  const wrong = names.findIndex((name) => !UNITS[name]);
+  if (wrong >= 0)
+    throw new LogError(`column '${log.names[[chosen.x_d, chosen.x][wrong]]}' must be a position in one of ` +
+      `${Object.keys(UNITS).join(", ")}; its unit is '${names[wrong]}'`);
+  if (ANGLES.includes(names[0]) !== ANGLES.includes(names[1]))
+    throw new LogError(`commanded and measured position are in ${names.join(" and ")}; both must be lengths or both angles`);
+  let [x_d, x] = [chosen.x_d, chosen.x].map((j, i) => column(log, j, UNITS[names[i]][0]));
+  const still = [["commanded", x_d], ["measured", x]].filter(([, one]) => travel(one) === 0).map(([name]) => name);
+  if (still.length)
+    throw new LogError(`no motion: the ${still.join(" and the ")} position never change${still.length > 1 ? "" : "s"}: an ` +
+      "axis at rest shows neither its model nor its errors");
+  if (x.every((one, k) => one === x_d[k]))
+    throw new LogError("same column: the measured position is the commanded one in every sample");
+  if (ANGLES.includes(names[0])) {
+    [x_d, x] = [x_d, x].map(unwrapped);
+    const off = x.map((one, k) => one - x_d[k]).sort()[x.length >> 1], turns = TURN * Math.round(off / TURN);
+    x = x.map((one) => one - turns);
+  }
+  const gain = travel(x) / travel(x_d);
+  if (!(gain >= 0.1 && gain <= 5))
+    throw new LogError(`scale: the measured position moves ${gain.toPrecision(4)} times as far as the commanded one; ` +
+      "state the unit of each column in its name, such as 'x [mm]'");
+  const t = chosen.t === "" ? null : column(log, chosen.t, 1);
+  const T_s = t ? interval(t, log.names[chosen.t], unit_of(log, chosen.t)) : chosen.T_s;
+  return { x_d, x, T_s, unit: UNITS[names[0]] };
 }
 
 /** The mode (ω² + βs) / (s² + 2ζωs + ω²) over a zero-order hold, from rest at the first command, with the β of least
@@ -201,8 +300,8 @@ function score(x, predicted, begin, end) {
 function plot({ x, Np, first, predictions, unit: [, unit, factor] }, what) {
   const n = Math.ceil(x.length / Np), names = Object.keys(predictions), lines = names.map((name) =>
     Array.from({ length: n }, (_, i) => factor * score(x, predictions[name], i * Np, (i + 1) * Np)[what]));
-  const shown = lines.flat().filter((e) => e > 0);
-  const low = shown.reduce((a, b) => Math.min(a, b)), high = shown.reduce((a, b) => Math.max(a, b));
+  const high = lines.flat().reduce((a, b) => (b > a ? b : a), 1e-9), shown = lines.flat().filter((e) => e >= high / 1e3);
+  const low = shown.reduce((a, b) => Math.min(a, b)); // an error of 0 makes no axis of 15 decades
   const X = (i) => (60 + 830 * i / n).toFixed(1), half = X(first / Np);
   const Y = (e) => (280 - 270 * Math.log(Math.max(e, low) / low) / Math.log(high / low)).toFixed(1);
   let svg = `<path d="M${half} 10V280"/><text x="${half}" y="300" text-anchor="middle">scored from here</text>` +
@@ -234,9 +333,8 @@ async function run() {
   shown = null;
   try {
     if (!at("form").checkValidity()) throw new LogError("choose commanded and measured position, and their unit");
-    const unit = UNITS[at("unit").value], [x_d, x] = ["x_d", "x"].map((id) => column(log, value(id), unit[0]));
-    const T_s = t ? interval(column(log, t, TIMES[stated(log.names[t])] ?? 1)) : 1e-3 * value("T_s");
-    const given = { x_d, x, T_s, unit, Np: value("Np"), p: value("p") }, found = await predict(given, say);
+    const chosen = { x_d: value("x_d"), x: value("x"), t, T_s: 1e-3 * value("T_s"), unit: at("unit").value };
+    const given = { ...samples(log, chosen), Np: value("Np"), p: value("p") }, found = await predict(given, say);
     shown = { ...given, ...found };
     show((performance.now() - begun) / 1e3);
   } catch (error) {
@@ -271,7 +369,8 @@ async function open(file) {
     at(role).replaceChildren(...none, ...log.names.map((name, j) => new Option(name, j)));
     at(role).value = place ?? "";
   }
-  at("unit").value = stated(log.names[at("x_d").value] ?? "") ?? "";
+  const units = ["x_d", "x"].map((id) => (at(id).value === "" ? "" : unit_of(log, at(id).value)));
+  at("unit").value = spelled(units[0] || units[1]);
   at("form").hidden = false;
   return run();
 }

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from ..base.errors import ParameterError, brief
 from ..base.files import plain
-from ..base.metrics import rms_ratio, shown_figure
+from ..base.metrics import in_unit, rms_ratio, shown_figure
 
 if TYPE_CHECKING:
     from ..cosim.run import Run
@@ -66,7 +66,7 @@ def print_run(run: Run, as_json: bool, title: str, unit: str, limits: Mapping[st
 
     summary = run.summary()
     if as_json:
-        named = {name.replace("_um", f"_u{unit}").replace("_m_s", f"_{unit}_s"): one for name, one in summary.items()}
+        named = in_unit(summary, unit)
         print_json({**named, **({"verdict": str(verdict_of(run))} if run.kind == PREDICTOR else limits or {})})
         return
     if run.kind != PREDICTOR:

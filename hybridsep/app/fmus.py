@@ -12,7 +12,7 @@ import typer
 from ..base.errors import ParameterError
 from ..base.files import DEFAULT_MACHINE
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .options import ForceOption, MachineOption, TargetOption, UnitOption, WeightsOption
+from .options import ForceOption, MachineOption, SetOption, TargetOption, UnitOption, WeightsOption
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -26,6 +26,7 @@ def build(
         list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machine's if left out.")
     ] = None,
     machine: MachineOption = DEFAULT_MACHINE,
+    entries: SetOption = None,
     flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
     fmi: Annotated[
         str,
@@ -84,7 +85,7 @@ def build(
         raise ParameterError(f"{wrong[0]} is for native FMUs; with --flavour {flavour} leave it out")
     if controller is not None and controller not in _CONTROLLERS:
         raise ParameterError(f"--for must be {' or '.join(_CONTROLLERS)}, got {controller}")
-    axis = load_machine(machine)
+    axis = load_machine(machine, entries or ())
     models = _models(axis, fmus or [], flavour, target or [], fmi)
     if controller is not None:  # whose sources open no files
         if fmus and "ReferenceTrajectory" in models.values():

@@ -53,6 +53,7 @@ def backtest(
 
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
+    from ..base.metrics import in_unit
     from ..evaluate.backtest import replayed_run
     from ..fitting.advice import Judged, advice_on, extent, whole_log_words
     from ..fitting.replay import Recording, knew, replay
@@ -111,7 +112,7 @@ def backtest(
     own, found = scores.verdict, replayed.verdict()
     verdict = str(replace(found, n_rejected=own.n_rejected, n_missing=own.n_missing, n_samples=own.n_samples))
     if as_json:
-        figures = {name.replace("_um", f"_u{axis.unit}"): value for name, value in scores.summary().items()}
+        figures = in_unit(scores.summary(), axis.unit)
         more = {"findings": findings_table(findings), "advice": advice_on(judged), "controller": judged.controller}
         print_json({**figures, "judged": replayed.figures(), "verdict": verdict, **more})
         return

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .signals import Array
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from .shown_figure import ShownFigure
 
 
 @dataclass(frozen=True)
@@ -150,11 +150,11 @@ def html_table(title: str, figures: Mapping[str, Any]) -> str:
     return f"<table><caption>{escape(title)}</caption>{rows}</table>"
 
 
-def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> Figure:
+def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> ShownFigure:
     """Return a figure of lines over ``x``."""
-    from matplotlib.figure import Figure
+    from .shown_figure import ShownFigure
 
-    figure = Figure(figsize=(8.0, 3.5), layout="constrained")
+    figure = ShownFigure(figsize=(8.0, 3.5), layout="constrained")
     axes = figure.subplots()
     for name, y in lines.items():
         axes.plot(x, y, label=name, linewidth=1.0)
@@ -162,6 +162,11 @@ def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) 
     axes.legend()
     axes.grid(alpha=0.3)
     return figure
+
+
+def in_unit(figures: Mapping[str, Any], unit: str) -> dict[str, Any]:
+    """Return figures by names of the SI unit of the positions: those in µm are in µrad of a rotary axis."""
+    return {name.replace("_um", f"_u{unit}").replace("_m_s", f"_{unit}_s"): one for name, one in figures.items()}
 
 
 def _shown(value: Any) -> str:

@@ -83,6 +83,7 @@ def cosimulate(
     SignalError
         If ``r`` is empty or not finite.
     """
+    unit = r.unit if isinstance(r, Log) else "m"
     command = as_samples(r.x_d if isinstance(r, Log) else r, "r")
     as_samples(command[:1], "r", 1)
     ahead: FmuController | LibraryController | OwnController
@@ -143,7 +144,7 @@ def cosimulate(
     found.setdefault("x_dm", found["x_d"])
     t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
     found |= {"t": t, "state": state[delay:]}
-    return Run(kind, **found, T_s=T_s, Np=ahead.Np, n_rejected=n_rejected, measurement_delay=ahead.late)
+    return Run(kind, **found, T_s=T_s, Np=ahead.Np, n_rejected=n_rejected, measurement_delay=ahead.late, unit=unit)
 
 
 def _refuse(given: object, message: str) -> None:

@@ -17,6 +17,7 @@ from ..base.metrics import (
     batch_rms,
     hold,
     html_table,
+    in_unit,
     largest,
     line_plot,
     one_line,
@@ -93,6 +94,8 @@ class Run:
         Measurements that were missing or not plausible, as far as the controller tells.
     measurement_delay : int
         Samples by which measurements arrived late at the controller; −1: a sample early, and it held them.
+    unit : {"m", "rad"}
+        Unit of the positions, of a log that says so; figures that are called ``_um`` are µrad then.
     """
 
     kind: ControllerType
@@ -109,6 +112,7 @@ class Run:
     Np: int
     n_rejected: int = 0
     measurement_delay: int = 0
+    unit: str = "m"
 
     def __repr__(self) -> str:
         """Return the main figures in one line."""
@@ -123,12 +127,12 @@ class Run:
             lines = {"physics model": self.x_meas - self.x_pb, "hybrid": self.x_meas - self.x_h}
         else:
             lines = {"tracking error": self.error, "change of the command": self.change}
-        return line_plot(self.t, {name: 1e6 * line for name, line in lines.items()}, "t [s]", "[µm]")
+        return line_plot(self.t, {name: 1e6 * line for name, line in lines.items()}, "t [s]", f"[µ{self.unit}]")
 
     def _figures(self) -> dict[str, float | int]:
         summary = self.summary()
         names = ("rms_pb_um", "rms_hold_um", "rms_h_um", "tracking_rms_um", "tracking_max_um", "change_max_um")
-        return {name: summary[name] for name in ("n_samples", *names) if name in summary}
+        return in_unit({name: summary[name] for name in ("n_samples", *names) if name in summary}, self.unit)
 
     @property
     def active(self) -> NDArray[np.bool_]:

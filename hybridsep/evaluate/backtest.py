@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
-from ..base.metrics import Score, batch_rms, hold, html_table, line_plot, one_line
+from ..base.metrics import Score, batch_rms, hold, html_table, in_unit, line_plot, one_line
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples, check_same_index
 from ..base.threads import one_blas_thread
 from ..cosim.run import PREDICTOR, Run
@@ -50,6 +50,7 @@ class Backtest:
     batch_rms_pb: Array
     batch_rms_hold: Array
     batch_rms_h: Array
+    unit: str = "m"  # of the positions, or rad, of a log that says so
 
     @property
     def n_batches(self) -> int:
@@ -71,11 +72,11 @@ class Backtest:
         """Return a matplotlib figure of the RMS errors of each window, µm."""
         errors = {"physics model": self.batch_rms_pb, "hold": self.batch_rms_hold, "hybrid": self.batch_rms_h}
         lines = {name: 1e6 * rows for name, rows in errors.items()}
-        return line_plot(np.arange(float(self.n_batches)), lines, "window", "RMS prediction error [µm]")
+        return line_plot(np.arange(float(self.n_batches)), lines, "window", f"RMS prediction error [µ{self.unit}]")
 
     def _figures(self) -> dict[str, float | int]:
         names = ("n_samples", "n_batches", "rms_pb_um", "rms_hold_um", "rms_h_um")
-        return {name: self.summary()[name] for name in names}
+        return in_unit({name: self.summary()[name] for name in names}, self.unit)
 
 
 @one_blas_thread
@@ -111,6 +112,7 @@ def backtest(
     """
     if is_table(x_d):
         x_d = read_log(cast("Table", x_d), T_s=predictor.T_s)
+    unit = x_d.unit if isinstance(x_d, Log) else "m"
     if isinstance(x_d, Log):
         if abs(x_d.T_s - predictor.T_s) > 0.01 * predictor.T_s:
             raise SignalError(f"the log has T_s = {x_d.T_s:g} s, the predictor {predictor.T_s:g} s; they must agree")
@@ -156,11 +158,11 @@ def backtest(
         parts.append(np.concatenate((rows[1:], compared - rows[1:4], [rows[0], compared, np.arange(len(x)) % Np])))
     x_pb, x_hold, x_h, x_h_std, published, *_ = signals = np.concatenate(parts, axis=1)
     active, errors, (arrived, compared, place) = published > 0.0, signals[5:8], signals[8:]
-    batches = [np.concatenate([batch_rms(part[i], Np) for part in parts]) for i in (5, 6, 7)]
+    of_pb, of_hold, of_h = (np.concatenate([batch_rms(part[i], Np) for part in parts]) for i in (5, 6, 7))
     made_of = (arrived, compared, signals[:3], place.astype(np.int64), Np)
     verdict = judge(*made_of, n_rejected=n_rejected, n_missing=int(np.isnan(measured).sum()))
     scores = Score.of(errors), Score.of(errors[:, active])
-    return Backtest(*scores, verdict, x_pb, x_hold, x_h, x_h_std, active, *batches)
+    return Backtest(*scores, verdict, x_pb, x_hold, x_h, x_h_std, active, of_pb, of_hold, of_h, unit)
 
 
 def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int, *, measurement_delay: int = 0) -> Run:

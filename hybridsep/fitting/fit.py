@@ -180,7 +180,7 @@ class Fit:
             for line in self.tracking.lines(judged.shown):
                 report.paragraph(line)
         if fmus:
-            write_use(report, fmus[0], judged.T_s, judged.replay.Np)
+            write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
         report.write(path)
 

@@ -17,6 +17,7 @@ from ..identify.model import IdentifiedModel
 from ..identify.validation import FrequencyResponse, ResidualTest, frequency_response, model_response, residual_test
 from ..logs.checks import Finding
 from ..logs.log import Log
+from ..logs.units import stated_unit
 from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
 from .choice import WORTH, Tried
 
@@ -259,13 +260,18 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
             report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
 
 
-def write_use(report: Report, fmu: str, T_s: float, Np: int) -> None:
+def write_use(report: Report, fmu: str, T_s: float, Np: int, log: Log) -> None:
     """Write how the FMU of a predictor in a file of that name is used.
 
-    ``T_s`` is the sampling interval, s, ``Np`` the samples of the look-ahead.
+    ``T_s`` is the sampling interval, s, ``Np`` the samples of the look-ahead, ``log`` the one that it replays.
     """
     report.heading("Use it")
-    report.code(_REPLAY.format(fmu=fmu, T_s=T_s, Np=Np))
+    reading = f'log = hybridsep.read_log("{log.path.name}", columns={dict(zip(("x_d", "x"), log.columns, strict=True))}'
+    unit = "" if stated_unit(log.columns[0])[1] else log.file_unit
+    reading += "".join(f", {name}={value!r}" for name, value in (("unit", unit), ("T_s", log.T_recorded)) if value)
+    of_file = f"import hybridsep\n\n{reading})\nx_d, x_meas = log.x_d, log.x_meas"
+    in_memory = f"# x_d, x_meas: the arrays of the fit in {log.unit}, one sample every {T_s!r} s"
+    report.code(_REPLAY.format(fmu=fmu, T_s=T_s, Np=Np, log=of_file if log.path.suffix else in_memory))
     report.paragraph(
         f"In a simulation tool: co-simulation with a step of {T_s:g} s. x_d_ahead is the trajectory, as many samples "
         "early as the look-ahead is long; wire x_d to the drive, and its measured position to x_meas: the FMU is the "
@@ -277,8 +283,7 @@ _REPLAY = """\
 import numpy as np
 from fmpy import simulate_fmu
 
-# x_d, x_meas: commanded and measured positions of a log, m or rad, one sample every {T_s!r} s:
-# log = hybridsep.read_log("my_axis.csv"); x_d, x_meas = log.x_d, log.x_meas
+{log}
 signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_meas", float)])
 signals["time"] = {T_s!r} * np.arange(len(signals))
 signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...

@@ -97,6 +97,10 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 0
     assert "HybridPredictorPy_emps.fmu" in out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
+    given = ("--set", "predictor.p=7", "--flavour", "python", "--out", tmp_path / "set")
+    assert hybridsep("build", "HybridPredictorPy_emps", "-m", "emps", *given)[0] == 0
+    description = fmpy.read_model_description(str(tmp_path / "set" / "HybridPredictorPy_emps.fmu"))
+    assert {one.name: one.start for one in description.modelVariables}["p"] == "7"
 
 
 @pytest.mark.slow

@@ -11,7 +11,9 @@ from hybridsep.base.metrics import (
     batch_rms,
     coverage,
     hold,
+    in_unit,
     largest,
+    line_plot,
     peak_derivatives,
     reduction_percent,
     rms,
@@ -71,3 +73,10 @@ def test_peak_derivatives_of_a_cubic() -> None:
     assert acceleration == pytest.approx(6 - 6 * T_s)
     assert jerk == pytest.approx(6.0, rel=1e-6)
     assert peak_derivatives(t[:1], T_s) == (0.0, 0.0, 0.0)
+
+
+def test_a_notebook_shows_a_figure_and_units_are_the_axis_own() -> None:
+    figure = line_plot(np.arange(3.0), {"error": np.zeros(3)}, "t [s]", "error [µm]")
+    assert figure._repr_png_().startswith(b"\x89PNG")  # what IPython asks a value for
+    named = in_unit({"rms_h_um": 1.0, "peak_velocity_m_s": 2.0, "n": 3}, "rad")
+    assert named == {"rms_h_urad": 1.0, "peak_velocity_rad_s": 2.0, "n": 3}

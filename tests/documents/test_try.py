@@ -140,7 +140,7 @@ LINES = [f"{2 * k};{k % 7},5;{k % 5}" for k in range(1000)]
             "row 601: the time changes by 0.202 s, elsewhere by 0.002 s",
         ),
         (["t_ms;command_mm;x_meas", *LINES[:900]], "900 rows are too few"),
-        (["t;command_mm;x_meas", *LINES], "T_s is out of its range"),
+        (["t;command_mm;x_meas", *LINES], "column 't' has an interval of 2.00000, no axis's in s"),
     ],
 )
 def test_a_log_that_cannot_be_predicted_is_refused(tab: Tab, lines: list[str], message: str) -> None:
