@@ -36,7 +36,15 @@ from ..predict.window import Prediction
 from .advice import Judged, advice_on
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
-from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, largest_motion
+from .compensation import (
+    LIMITS_WORDS,
+    Tracking,
+    drive_limits,
+    estimated_limits,
+    expected_tracking,
+    largest_motion,
+    taught,
+)
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -90,7 +98,7 @@ class Fit:
     tracking : Tracking, optional
         Tracking errors to be expected; None without limits of the drive.
     trained : bytes
-        The predictor, saved after the logs.
+        The predictor, saved after the logs; with limits of the drive as a compensator begins best.
     """
 
     logs: tuple[Log, ...]
@@ -262,7 +270,7 @@ def fit(
 
     The first half of each log is for training: the physics model is identified from it, and settings are chosen by
     causal replays of it. Then the whole is replayed, causally; its second half is the test. What the predictor has
-    learned at the end is what it begins with.
+    learned at the end is what it begins with; with limits of the drive it learns the logs once more, for a compensator.
 
     Parameters
     ----------
@@ -358,6 +366,7 @@ def fit(
         estimate = stage("tracking error with compensation", 0.95, 1.0)
         (fastest, *_), largest = largest_motion(recordings, T_s)
         tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest, fastest)
+        predictor = taught(machine, recordings, fastest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,

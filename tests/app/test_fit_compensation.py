@@ -6,6 +6,7 @@ import gzip
 import json
 import re
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import DisplayUnits
 from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.predict.averaging.model import AveragedModel
+from hybridsep.predict.predictor import HybridPredictor
 
 LIMITS = ("--v_max", 0.3, "--a_max", 30, "--j_max", 2e4)
 
@@ -81,6 +84,16 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
         # The same axis, whose friction does change with the command.
         assert tracking[model]["rms"] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
         assert tracking[model]["rms"] < 0.6 * tracking["none"]["rms"]
+    warm = cosimulate(
+        out / "SepCompensator_axis.fmu",
+        stage(),
+        x_d,
+        controller_values={"compensate": 2},
+        encoder=Encoder(5e-7, seed=2),
+    )
+    assert warm.tracking_rms < run.tracking_rms
+    learned = cast(AveragedModel, HybridPredictor.load(out / "trained.state").residual).learned
+    assert learned.velocity_scale == pytest.approx(0.05 * np.abs(np.diff(x_d)).max() / T_S)
     half = len(x) // 2
     rival = FirInverse.fitted([(x_d[:half], x[:half])], 50)
     assert rival is not None
