@@ -23,7 +23,7 @@ class ResidualWindow(NamedTuple):
     start: float  # m: initial position
     # (m,), m: commands as they came, as far as they are known, relative to ``start``: behind a compensator they are
     # more than the window's, and not modified but for those that are late
-    path: Array
+    raw_commands: Array
 
 
 class FeatureScales(NamedTuple):

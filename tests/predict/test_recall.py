@@ -22,7 +22,7 @@ def heard(path: Array, residuals: Array, Np: int, ahead: int = 0) -> Memory:
     """Return a memory that has heard a path window by window, ``ahead`` samples before it was measured."""
     memory = Memory.init(SIZE, Np)
     for k in range(0, len(path) - ahead, Np):
-        memory = memory.hear(path[k : k + Np + ahead], Np).remember(residuals[k : k + Np])
+        memory = memory.append_commands(path[k : k + Np + ahead], Np).remember(residuals[k : k + Np])
     return memory
 
 
@@ -62,7 +62,7 @@ def test_a_path_that_is_known_further_ahead_is_heard_once() -> None:
 
 def test_a_memory_shorter_than_a_window_recalls_nothing() -> None:
     for memory in (Memory.init(20, 20), Memory.init(0, 20)):
-        residuals, _, alike = memory.hear(np.arange(20.0), 20).remember(np.ones(20)).recalled(20)
+        residuals, _, alike = memory.append_commands(np.arange(20.0), 20).remember(np.ones(20)).recalled(20)
         assert alike == 0.0
         np.testing.assert_array_equal(residuals, 0.0)
 
@@ -90,7 +90,7 @@ def test_a_repeated_part_is_predicted_by_its_first_time() -> None:
 def test_another_run_begins_at_rest_and_remembers() -> None:
     rng = np.random.default_rng(7)
     path, residuals = np.cumsum(rng.normal(size=200)), rng.normal(size=200)
-    again = heard(path, residuals, 20).restart().hear(path[:20], 20)
+    again = heard(path, residuals, 20).restart().append_commands(path[:20], 20)
     found, before, alike = again.recalled(20)
     np.testing.assert_array_equal(found, residuals[:20])
     assert before == 0.0
@@ -103,17 +103,17 @@ def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None
     path, residuals = np.cumsum(rng.normal(size=140)), rng.normal(size=100)
     memory = Memory.init(SIZE, 20)
     for k in range(0, 100, 20):
-        memory = memory.hear(path[k : k + 60], 20).remember(residuals[k : k + 20])
+        memory = memory.append_commands(path[k : k + 60], 20).remember(residuals[k : k + 20])
     path -= path[0]
     memory = memory.restart()
     for k in range(0, 60, 20):
-        memory = memory.hear(path[k : k + 20], 20).remember(residuals[k : k + 20])
-    recalled, before, _ = memory.hear(path[60:80], 20).recalled(20)
+        memory = memory.append_commands(path[k : k + 20], 20).remember(residuals[k : k + 20])
+    recalled, before, _ = memory.append_commands(path[60:80], 20).recalled(20)
     np.testing.assert_array_equal(recalled, residuals[60:80])
     assert before == residuals[59]
 
 
 def test_another_run_begins_without_a_residual() -> None:
-    memory = Memory.init(SIZE, 20).hear(np.arange(20.0), 20).remember(np.full(20, 3.0)).restart()
+    memory = Memory.init(SIZE, 20).append_commands(np.arange(20.0), 20).remember(np.full(20, 3.0)).restart()
     assert memory.residuals[-1] == 0.0
     np.testing.assert_array_equal(memory.residuals[-21:-1], 3.0)

@@ -241,7 +241,7 @@ class AveragedModel:
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
-            peak = max(static.peak_velocity(window.path[settings.n_late :], window.start), before)
+            peak = max(static.peak_velocity(window.raw_commands[settings.n_late :], window.start), before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
@@ -281,8 +281,8 @@ class AveragedModel:
             As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
         x, held = window.x_pb, {} if like is None else like.predictions
-        memory = self.run.memory.hear(window.path, self.settings.Np) if like is None else like.memory
-        recalled = memory.recalled(len(window.path))
+        memory = self.run.memory.append_commands(window.raw_commands, self.settings.Np) if like is None else like.memory
+        recalled = memory.recalled(len(window.raw_commands))
         rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:

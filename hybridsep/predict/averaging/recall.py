@@ -51,7 +51,7 @@ class Memory:
         residuals = np.append(self.residuals[1:], 0.0)[: len(self.residuals)]  # also with no memory
         return Memory(commands, residuals, np.zeros_like(self.distances), 0.0, 0)
 
-    def hear(self, path: Array, Np: int) -> Memory:
+    def append_commands(self, path: Array, Np: int) -> Memory:
         """Return the memory that knows the commands ahead, ``(m,)``, m."""
         n, new = len(self.residuals), path[self.n_ahead :]
         stride = len(self.commands) - n

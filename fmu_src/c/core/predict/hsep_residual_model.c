@@ -95,10 +95,10 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self)
     }
 }
 
-HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command)
+HSEP_API void hsep_residual_append_command(hsep_residual_model *self, hsep_real command)
 {
     if (self->averaged) {
-        hsep_recall_hear(hsep_averaged_recall(hsep_residual_averaged(self)), command);
+        hsep_recall_append_command(hsep_averaged_recall(hsep_residual_averaged(self)), command);
     }
 }
 

@@ -48,7 +48,7 @@ HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
 
 /* Take in the command that comes next, as it came, m, relative to the start. */
-HSEP_API void hsep_residual_hear(hsep_residual_model *self, hsep_real command);
+HSEP_API void hsep_residual_append_command(hsep_residual_model *self, hsep_real command);
 
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);

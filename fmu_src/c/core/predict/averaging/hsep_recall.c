@@ -42,7 +42,7 @@ static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last)
     }
 }
 
-HSEP_API void hsep_recall_hear(hsep_recall *self, hsep_real command)
+HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command)
 {
     const hsep_int part = self->heard % self->stride, size = self->size;
     hsep_real *before = hsep_at(self, self->commands) + self->oldest;

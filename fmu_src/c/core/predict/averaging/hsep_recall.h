@@ -37,7 +37,7 @@ HSEP_ASSERT_WORDS(hsep_recall, 16);
 HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
-HSEP_API void hsep_recall_hear(hsep_recall *self, hsep_real command);
+HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command);
 
 /* Take in the residuals of the window, (Np,), m, newest first. */
 HSEP_API void hsep_recall_remember(hsep_recall *self, const hsep_real e[]);
