@@ -20,8 +20,8 @@
  *   hsep_compensator_reset   | constant                                              | nothing
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
- * The dearest sample costs the same at the first and at the 10^9th sample, but for a first window that begins in motion:
- * its last sample learns the whole window.
+ * The dearest sample costs the same at the first and at the 10^9th sample, but for a first window that begins in
+ * motion: its last sample learns the whole window.
  */
 #ifndef HSEP_H
 #define HSEP_H

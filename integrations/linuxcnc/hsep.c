@@ -342,7 +342,7 @@ static int axis_meet(axis_data *self)
     return self->begun;
 }
 
-/* Let out be the feedback of an axis that is not driven, and where it is missing the command: no position that is old. */
+/* Let out be the feedback of an axis that is not driven, and where it is missing the command: no old position. */
 static void axis_wait(axis_data *self, double delayed)
 {
     axis_change(self, (self->missing > 0 ? self->command : self->measured) - delayed);
