@@ -47,8 +47,8 @@ _CHANGED = ("acceleration", "jerk", "change_max")
 FACTORS = (0.5, 1.0, 2.0)
 """By which each limit is changed, one at a time, to say what it costs."""
 
-_GAIN, _COST = 0.05, 0.01
-"""Relative gain from which on a limit twice as large is advised, and cost up to which half of one is."""
+_GAIN = 0.05
+"""Relative gain from which on a limit twice as large is advised."""
 
 COSTS_MAX = 4000
 """Leading samples over which that is tried: eight runs."""
@@ -123,8 +123,8 @@ class LimitCosts:
         if self.advised:
             entries = {one.name: entry for entry, one in DRIVE_LIMIT_ENTRIES.items()}
             paste = (f"{option.format(name=one, entry=entries[one])}{v:.4g}" for one, v in self.advised.items())
-            left = _words(self.advised_error, shown)
-            lines.append(f"If the drive allows it: {' '.join(paste)}, with which about {left} is left.")
+            left, today = _words(self.advised_error, shown), _words(next(iter(self.effects.values()))[1.0], shown)
+            lines.append(f"If the drive allows it: {' '.join(paste)}, with which about {left} is left of {today}.")
         return lines
 
 
@@ -148,22 +148,20 @@ def limit_costs(
 ) -> LimitCosts:
     """Return what each limit of the drive costs, of the tracking errors with other settings.
 
-    A limit twice as large is advised where that takes away a part of the error, ``change_max`` of half the size where
-    that costs nothing.
+    A limit twice as large is advised where that takes away a part of the error, and all of them together do.
     """
     now, wanted, effects = error_of(settings), settings, {}
     for i, entry in enumerate(_CHANGED[: 2 if settings.change_max is None else 3], start=1):
         errors = {one: now if one == 1.0 else error_of(_scaled(settings, entry, one)) for one in FACTORS}
-        half, two = errors[0.5].rms, errors[2.0].rms
-        if two < (1.0 - _GAIN) * now.rms:
+        if errors[2.0].rms < (1.0 - _GAIN) * now.rms:
             wanted = _scaled(wanted, entry, 2.0)
-        elif entry == "change_max" and half < (1.0 + _COST) * now.rms:
-            wanted = _scaled(wanted, entry, 0.5)
         effects[DRIVE_LIMIT_ENTRIES[entry].name] = errors
         progress(i / len(_CHANGED))
     before, after = settings.to_fmi(), wanted.to_fmi()
     advised = {name: float(after[name]) for name in effects if after[name] != before[name]}
-    return LimitCosts(effects, advised, error_of(wanted) if advised else now)
+    advised_error = error_of(wanted) if advised else now
+    gains = advised_error.rms < (1.0 - _GAIN) * now.rms
+    return LimitCosts(effects, advised if gains else {}, advised_error)
 
 
 @dataclass(frozen=True)

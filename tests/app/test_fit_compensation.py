@@ -16,12 +16,13 @@ from places import LOOPS
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.errors import ParameterError
-from hybridsep.base.metrics import rms
+from hybridsep.base.metrics import ErrorSize, rms
+from hybridsep.base.settings import CompensatorSettings, Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import FACTORS, binding_words, drive_limits, expected_tracking
+from hybridsep.fitting.compensation import FACTORS, binding_words, drive_limits, expected_tracking, limit_costs
 from hybridsep.fitting.replay import Recording
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.identify.model import machine_of
@@ -132,6 +133,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     assert found.costs.advised_error.rms == two
     said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))))
     assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
+    assert f" is left of {1e6 * one:.4g} µm" in said
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
     assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
     assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: what is that fast cannot" in said
@@ -168,3 +170,26 @@ def test_all_three_limits_are_needed() -> None:
     assert found == {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "change_max": 1e-4}
     with pytest.raises(ParameterError, match=r"limits v_max, a_max, j_max; a_max, j_max are missing"):
         drive_limits({"v_max": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("sizes", "advised"),
+    [
+        ({"change_max": {0.5: 1.0, 1.0: 1.0, 2.0: 1.0}}, []),  # half of it costs nothing, and gains nothing
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, ["change_max"]),
+        ({"acceleration": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}, "change_max": {0.5: 3.0, 1.0: 1.0, 2.0: 0.9}}, []),
+    ],
+)
+def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], advised: list[str]) -> None:
+    """Alone and together: in the last case both leave as much as today."""
+    settings = CompensatorSettings(limits=Limits(0.1, 1.0, 10.0), change_max=1e-3)
+
+    def error_of(tried: CompensatorSettings) -> ErrorSize:
+        assert tried.limits is not None
+        assert tried.change_max is not None
+        factors = {"acceleration": tried.limits.acceleration, "change_max": tried.change_max / 1e-3}
+        changed = [(name, factor) for name, factor in factors.items() if factor != 1.0]
+        size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
+        return ErrorSize(size, size)
+
+    assert list(limit_costs(settings, error_of, lambda _: None).advised) == advised
