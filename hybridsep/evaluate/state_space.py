@@ -19,6 +19,9 @@ from ..base.signals import Array
 _LAGS, _ORDERS = 40, range(1, 9)
 """Samples of the past that the state is of, and orders that are tried."""
 
+_JUDGING = 5000
+"""Last samples of each record on which the orders are compared."""
+
 _BLOCK = 4096
 """Rows that are factorised at once."""
 
@@ -74,7 +77,8 @@ def identified(records: Sequence[tuple[Array, Array]], Np: int) -> StateSpace | 
     if len(R) < R.shape[1]:
         return None
     n_rows = sum(int((~np.isnan(y)).sum()) for _, y in records)
-    return min(_of_orders(R, n_rows), key=lambda one: _misfit(one, records, Np), default=None)
+    judging = [(u[-_JUDGING:], y[-_JUDGING:]) for u, y in records]
+    return min(_of_orders(R, n_rows), key=lambda one: _misfit(one, judging, Np), default=None)
 
 
 def _of_orders(R: Array, n_rows: int) -> list[StateSpace]:
