@@ -1,6 +1,7 @@
 """``hybridsep fit`` over logs of several machines, judged on their second halves beside what needs no hybrid.
 
     python -m benchmarks.fit [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
+    python -m benchmarks.fit --recordings FOLDER --method my_module:MyMethod
 
 RMS of the second half, which is held out, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
 the first half by least squares, and its last residual held over the window; the physics model's last residual held;
@@ -8,6 +9,10 @@ ARX of 20 and 40 lags, frozen after the first half / refitted before each window
 its offset; the hybrid that the first half trained. The ratio is to the best of the others, and the advice is what
 ``fit`` prints. Below the table stands in how many rows the hybrid is recommended, and in how many of these another is
 better by 2 %.
+
+An open benchmark: ``--method`` is one of your own, a class like :class:`Method`, whose RMS and largest error on the
+same samples are printed below each row, relative to the best of all others. It may see the first half of a log, and of
+the second each window behind its prediction; licences of recordings are beside them.
 """
 
 from __future__ import annotations
@@ -15,10 +20,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from math import nan
 from pathlib import Path
+from typing import Protocol
+
+import numpy as np
 
 from hybridsep.base.errors import HybridSepError
+from hybridsep.base.metrics import ErrorSize
+from hybridsep.base.signals import Array
 from hybridsep.evaluate.verdict import ALIKE
 from hybridsep.fitting.fit import fit
 from hybridsep.logs.log import Log, read_log
@@ -32,6 +43,29 @@ COPIES = ("xl330_kp100_raw_jitter.csv",)
 COLUMNS = ("lag + hold", "hold", "ARX20", "ARX40", "physics", "hybrid", "best of the others", "ratio", "advice")
 
 
+class Method(Protocol):
+    """Method of your own; positions are in m, or rad."""
+
+    def fit(self, x_d: Array, x: Array, T_s: float, Np: int) -> None:
+        """Learn from the first half, ``(n,)`` each, sampled every ``T_s``, s; windows will have ``Np`` samples."""
+
+    def predict(self, x_d: Array) -> Array:
+        """Return the positions of the next window, of whose commands, ``(Np,)``, it may know all."""
+
+    def update(self, x: Array) -> None:
+        """Learn the positions measured in the window that was predicted, ``(Np,)``, NaN where missing."""
+
+
+def errors_of(method: Method, x_d: Array, x: Array, T_s: float, Np: int) -> Array:
+    """Return the errors of a method over the second half of a log, from its first whole window on, ``(m,)``, m."""
+    first, predicted = -(-round(0.5 * len(x)) // Np) * Np, list[Array]()
+    method.fit(x_d[:first], x[:first], T_s, Np)
+    for k in range(first, len(x), Np):
+        predicted.append(np.asarray(method.predict(x_d[k : k + Np])))
+        method.update(x[k : k + Np])
+    return np.asarray(x[first:] - np.concatenate(predicted))
+
+
 @dataclass(frozen=True)
 class Row:
     """Log judged with one window."""
@@ -39,6 +73,7 @@ class Row:
     name: str
     Np: int
     rms: dict[str, float]  # name of a prediction → RMS, 1e-6 of the unit; infinite where it diverged
+    largest: dict[str, float]  # and largest error of those that did not
     advice: str
 
     @property
@@ -69,6 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
     parser.add_argument("--recordings", type=Path, help="folder with recorded logs, CSV")
     parser.add_argument("--windows", type=int, nargs="+", default=WINDOWS, help="samples in a window, Np")
+    parser.add_argument("--method", help="a method of your own: its module, a colon, its class")
     given = parser.parse_args(arguments)
     print(f"| log | Np | {' | '.join(COLUMNS)} |\n|---|{'---|' * (len(COLUMNS) + 1)}")
     rows = []
@@ -77,9 +113,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
             try:
                 rows.append(row(log, Np))
                 print(rows[-1], flush=True)
+                if given.method is not None:
+                    print(own(given.method, log, rows[-1]), flush=True)
             except HybridSepError as error:
                 print(f"| {log.path.name} | {Np} | {error} |", flush=True)
     print(f"\n{summary(rows)}")
+
+
+def own(method: str, log: Log, judged: Row) -> str:
+    """Return the line of a method of one's own: errors relative to the best of a row."""
+    module, _, name = method.partition(":")
+    made: Method = getattr(import_module(module), name)()
+    size = ErrorSize.of(errors_of(made, log.x_d, log.x_meas, log.T_s, judged.Np))
+    best, least = min(judged.rms.values()), min(judged.largest.values())
+    ratios = f"RMS {1e6 * size.rms / best:.3f}, largest {1e6 * size.largest / least:.3f} × the best"
+    return f"| {name} | {judged.Np} | {ratios} |"
 
 
 def logs(emps: Path | None, recordings: Path | None) -> Iterator[Log]:
@@ -94,8 +142,12 @@ def logs(emps: Path | None, recordings: Path | None) -> Iterator[Log]:
 def row(log: Log, Np: int) -> Row:
     """Return a row of the table."""
     found = fit(log, Np=Np, name=machine_name(log.path))
-    rms = {one.name: 1e6 * one.rms for one in found.judged.replay.scored()}
-    return Row(log.path.stem, Np, rms, found.advice)
+    scored = found.judged.replay.scored()
+    rms, largest = (
+        {one.name: 1e6 * one.rms for one in scored},
+        {one.name: 1e6 * float(np.nanmax(np.abs(one.errors))) for one in scored if not one.diverged},
+    )
+    return Row(log.path.stem, Np, rms, largest, found.advice)
 
 
 def summary(rows: Sequence[Row]) -> str:

@@ -102,9 +102,17 @@ def judged_figures(judged: dict[str, Any]) -> Figures:
     }
 
 
+def published(folder: Path, chromium: str) -> Made:
+    """Make the pictures of machines that others published; their figures are the commands' tables."""
+    for name in ("xiao", "arms"):
+        run(folder, "-m", f"benchmarks.outside.{name}", "--picture", f"{name}.png")
+    return {f"{name}.png": folder / f"{name}.png" for name in ("xiao", "arms")}, {}
+
+
 MAKERS: dict[tuple[str, ...], Callable[[Path, str], Made]] = {
     ("staircase.png", "staircase_compensated.png", "spiral_y.png", "spiral_contour.png"): demonstration,
     ("fit_report.png",): fitted,
+    ("xiao.png", "arms.png"): published,
 }
 
 

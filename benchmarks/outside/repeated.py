@@ -17,7 +17,7 @@ from itertools import product
 
 import numpy as np
 
-from benchmarks.averaging import with_friction_on
+from benchmarks.averaging import circle, with_friction_on
 from benchmarks.learning_control import learned_commands
 from benchmarks.outside import belt, xiao
 from benchmarks.outside.controller import Controller
@@ -26,7 +26,6 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.plant import Encoder, Plant, simulate
-from hybridsep.plants.trajectory import spiral
 
 PASSES = 10
 WEIGHTS, CUT_OFFS = (0.1, 0.01), (15.0, 50.0)
@@ -65,11 +64,11 @@ def xiao_part() -> Part:
 
 
 def stage_part() -> Part:
-    """Return the spiral of the stage's X axis, whose friction follows the motion."""
+    """Return three circles of the stage's X axis, whose friction follows the motion."""
     machine = with_friction_on(load_machine("als25010_x"), "motion")
     assert machine.plant is not None
     plant, noise_std = machine.new_plant(), machine.plant.noise_std
-    return Part("stage X, friction on the motion", "µm", 1e6, machine, plant, spiral()[0], noise_std)
+    return Part("stage X, friction on the motion", "µm", 1e6, machine, plant, circle()[0], noise_std)
 
 
 PARTS: dict[str, Callable[[], Part]] = {"belt": belt_part, "xiao": xiao_part, "stage": stage_part}
