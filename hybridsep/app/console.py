@@ -125,7 +125,7 @@ def print_contours(figures: Mapping[str, Mapping[str, float]], as_json: bool, ti
     for column in ("RMS", "99.9 %", "largest"):
         table.add_column(column, justify="right")
     for key, found in figures.items():
-        table.add_row(CASES[key][0], *map(shown_figure, found.values()))
+        table.add_row(CASES.get(key, ("FIR inverse", ""))[0], *map(shown_figure, found.values()))
     console.print(table)
 
 

@@ -48,6 +48,14 @@ def fit(
             "model is theirs, and the log is compared with it.",
         ),
     ] = None,
+    in_position: Annotated[
+        float | None,
+        typer.Option(
+            "--in_position",
+            min=0.0,
+            help="Window, m or rad, within which a move has settled: the report says how long that takes.",
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the axis; the log's, with --axis, if left out.")] = None,
     *,
     known: dict[str, float],
@@ -92,7 +100,7 @@ def fit(
     with progress_bar(as_json) as advance:
         given: dict[str, Any] = {"Np": Np, "p": lags, "cascade": gains, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
-        result.build(folder, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
+        result.build(folder, in_position=in_position, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in result.findings.items()}
         written = {what: str(path) for what, path in files.items()}
@@ -166,7 +174,12 @@ def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
         known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
         unit = found.machine.unit
         rates = f"in {unit}/s, {unit}/s² and {unit}/s³"
+        factor, own = found.judged.shown.position
+        here = [
+            f"{factor * value:.4g} {own}/s{power}" for (_, value), power in zip(names, ("", "²", "³"), strict=False)
+        ]
         lines.append(f"  # a compensator FMU for the drive; the limits are estimates: put in your drive's, {rates}")
+        lines += [f"  # (these are {', '.join(here)})"] if own != unit else []
         lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")
     native = files.get("native FMU")
     if native is None:

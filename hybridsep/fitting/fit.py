@@ -51,6 +51,7 @@ from .report import (
     begun_report,
     write_findings,
     write_identification,
+    write_moves,
     write_settings,
     write_use,
     write_validation,
@@ -162,8 +163,10 @@ class Fit:
         t: Array = self.machine.T_s * np.arange(float(errors.shape[1]))
         return line_plot(t, lines, "t [s]", f"error x − x̂ [{unit}]")
 
-    def report(self, path: str | Path, fmus: Sequence[str] = ()) -> None:
+    def report(self, path: str | Path, fmus: Sequence[str] = (), *, in_position: float | None = None) -> None:
         """Write the report, one HTML file that needs nothing else, also about FMUs with these names of files.
+
+        With a window ``in_position``, m or rad, it says how long moves take to settle within it, and which are worst.
 
         Raises
         ------
@@ -179,6 +182,8 @@ class Fit:
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
             "second half." + (_SETTLING if settled else ""),
         )
+        if in_position is not None:
+            write_moves(report, judged, in_position)
         write_findings(report, self.logs, self.findings)
         write_identification(report, self.identification, judged)
         write_validation(report, self.identification, judged)
@@ -198,11 +203,13 @@ class Fit:
         *,
         fmus: bool = True,
         report: bool = True,
+        in_position: float | None = None,
         progress: Progress | None = None,
     ) -> dict[str, Path]:
         """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
 
-        ``fmus`` and ``report`` say whether they are among them; ``progress`` is told a message and the fraction done.
+        ``fmus`` and ``report`` say whether they are among them; ``in_position`` is the report's; ``progress`` is
+        told a message and the fraction done.
         """
         progress = progress or (lambda _message, _done: None)
         if Path(out).exists() and not Path(out).is_dir():
@@ -221,7 +228,7 @@ class Fit:
             progress(f"build the {what}", i / len(archives))
             build_fmu(self.machine, path.stem, path.parent, weights=files["trained predictor"])
         if report:
-            self.report(files["report"], [path.name for path in archives.values() if fmus])
+            self.report(files["report"], [path.name for path in archives.values() if fmus], in_position=in_position)
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
         written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
         with atomic_open_text(files["results"]) as file:

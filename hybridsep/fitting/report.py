@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,6 +235,53 @@ def _write_spectra(report: Report, judged: Judged) -> None:
     lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
     report.heading("Spectra of the errors")
     report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
+
+
+class Move(NamedTuple):
+    """Move of a log, from its first sample to the next move's."""
+
+    start: float  # s, from the beginning of the piece
+    largest: float  # largest servo error, m
+    settling: float  # s from the end of the command until the error stays within the window; inf where it never does
+
+
+_REST = 10
+"""Samples without a change of the command that end a move."""
+
+
+def moves_of(x_d: Array, x: Array, T_s: float, in_position: float) -> list[Move]:
+    """Return the moves of a command and its measured positions, ``(n,)``, m, NaN where missing."""
+    changes = np.flatnonzero(np.diff(x_d) != 0.0)
+    if not len(changes):
+        return []
+    ends = np.append(np.flatnonzero(np.diff(changes) > _REST), len(changes) - 1)
+    firsts, lasts = changes[np.append(0, ends[:-1] + 1)], changes[ends] + 1
+    error, found = np.abs(x_d - x), []
+    for first, last, until in zip(firsts, lasts, np.append(firsts[1:], len(x_d)), strict=True):
+        outside = np.flatnonzero(error[last:until] > in_position)
+        late = 0.0 if not len(outside) else T_s * (outside[-1] + 1.0) if outside[-1] + 1 < until - last else math.inf
+        found.append(Move(T_s * float(first), float(np.nanmax(error[first:until], initial=0.0)), late))
+    return found
+
+
+def write_moves(report: Report, judged: Judged, in_position: float) -> None:
+    """Write how long the moves of the test samples take to settle within a window, m, and the five worst."""
+    pieces = judged.replay.modelled(tested=True)
+    moves = [one for x_d, x, _ in pieces for one in moves_of(x_d, x, judged.T_s, in_position)]
+    if not moves:
+        return
+    report.heading("Moves as recorded")
+    settled = [1e3 * one.settling for one in moves if math.isfinite(one.settling)]
+    times = f"{np.median(settled):.3g} ms in the median, {max(settled):.3g} ms at most" if settled else "none did"
+    report.paragraph(
+        f"Of {len(moves)} moves {len(settled)} settled within {judged.shown.words(in_position)} before the next: "
+        f"{times}."
+    )
+    worst = sorted(moves, key=lambda one: -one.largest)[:5]
+    report.table(
+        ["begins [s]", "largest servo error", "settles [ms]"],
+        [[f"{one.start:.3f}", judged.shown.words(one.largest), f"{1e3 * one.settling:.3g}"] for one in worst],
+    )
 
 
 def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from html import unescape
@@ -105,6 +106,14 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, built: di
         row = page.partition(f"<td>{name}</td>")[2].partition("</tr>")[0]
         assert ("± " in row) == free
         assert ("<td>fixed</td>" in row) != free
+
+
+def test_the_report_says_how_long_moves_take_to_settle(fitted: Fit, tmp_path: Path) -> None:
+    fitted.report(tmp_path / "with.html", in_position=50e-6)
+    fitted.report(tmp_path / "without.html")
+    page, other = ((tmp_path / name).read_text(encoding="utf-8") for name in ("with.html", "without.html"))
+    assert re.search(r"Of \d+ moves \d+ settled within 50 µm before the next: [\d.]+ ms in the median", page)
+    assert "Moves as recorded" not in other
 
 
 def test_the_reports_script_replays_the_log(
@@ -240,6 +249,8 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
     assert status == 0, err
     assert "jumps of a whole turn, the first at sample " in err
     assert "put in your drive's, in rad/s, rad/s² and rad/s³" in out
+    shown, limit = re.search(r"these are (\S+) deg/s, \S+ deg/s², \S+ deg/s³.*?--v_max (\S+)", out, re.DOTALL).groups()  # type: ignore[union-attr]
+    assert float(shown) == pytest.approx(np.degrees(float(limit)), rel=1e-3)
     assert json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]["rms_h"] < 12e-6 * scale
 
 

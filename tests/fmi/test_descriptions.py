@@ -74,6 +74,16 @@ def test_the_internal_step_is_named_where_it_is_fixed(fmus: BuiltFmus) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", GROUPS)
+def test_all_inputs_are_real(fmus: BuiltFmus, name: str) -> None:
+    """Masters set every input by setReal; a compensator's reset is a tunable parameter, which may be set in a run."""
+    variables = variables_of(fmus(name))
+    assert {one.type for one in variables.values() if one.causality == "input"} <= {"Real", "Float64"}
+    if name.startswith("SepCompensator"):
+        reset = variables["reset"]
+        assert (reset.type, reset.causality, reset.variability) == ("Boolean", "parameter", "tunable")
+
+
 @pytest.mark.parametrize(("new", "old"), each_kind(list(zip(FMI3, NATIVE, strict=True))))
 def test_the_twins_have_the_same_interface(fmus: BuiltFmus, new: str, old: str) -> None:
     """Names, causalities, units, ranges and starts; windows are arrays of Np samples, and there is the time."""
