@@ -168,15 +168,7 @@ def even(path: Path) -> tuple[Array, Array, float]:
 
 
 def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:
-    """Return the first-order lag with whole samples of dead time that fits a recording best by least squares.
-
-    Parameters
-    ----------
-    x_d, x : (n,) array, m
-        Commanded and measured positions.
-    T_s : float
-        Sampling interval, s.
-    """
+    """Return the first-order lag with whole samples of dead time that fits a recording best by least squares."""
     lag = fitted_lag([(x_d, x)])
     omega = 1.0 / (lag.tau * T_s)
     # 1/(τs + 1) = (ω² + ω s)/(s + ω)²

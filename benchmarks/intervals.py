@@ -1,6 +1,6 @@
 """Coverage of the intervals ``x_h ± z·x_h_std`` of the predictor with averaging.
 
-    python -m benchmarks.intervals [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1] [--cache FILE]
+    python -m benchmarks.intervals [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1]
 
 Percent of the measured positions within the intervals of 50, 90 and 95 %, over the whole window and over each third of
 it: of the warm runs of ``benchmarks/averaging.py``, and pooled over cold runs of random drives.
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.averaging import cases
-from benchmarks.random_drives import GENERATORS, read_positions
+from benchmarks.random_drives import GENERATORS
 from hybridsep.base.metrics import coverage
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
@@ -33,7 +33,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--n", type=int, default=0, help="number of random drives")
     parser.add_argument("--generator", choices=tuple(GENERATORS), default="modal", help="of the random drives")
     parser.add_argument("--seed", type=int, help="the generator's own if left out")
-    parser.add_argument("--cache", type=Path, help="file (.npz) of positions that benchmarks.random_drives has written")
     chosen = parser.parse_args(arguments)
     print(f"{'% within 50, 90, 95 %':40}" + "".join(f"{part:>22}" for part in THIRDS))
     for name, error, std in warm_runs(chosen.emps):
@@ -41,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if chosen.n:
         pooled = [
             np.concatenate(parts, axis=1)
-            for parts in zip(*random_runs(chosen.n, chosen.generator, chosen.seed, chosen.cache), strict=True)
+            for parts in zip(*random_runs(chosen.n, chosen.generator, chosen.seed), strict=True)
         ]
         print(row(f"{chosen.n} random drives, cold", *pooled))
 
@@ -55,12 +54,11 @@ def warm_runs(emps: Path | None) -> Iterator[tuple[str, Array, Array]]:
         yield (case.name, *run(predictor, case.x_d, case.x_meas[1]))
 
 
-def random_runs(n: int, name: str, seed: int | None, cache: Path | None) -> Iterator[tuple[Array, Array]]:
+def random_runs(n: int, name: str, seed: int | None) -> Iterator[tuple[Array, Array]]:
     """Yield errors and standard deviations, m, of the cold runs of random drives."""
     generator = GENERATORS[name]
     seed = generator.seed if seed is None else seed
-    x = read_positions(cache, name, seed, n) if cache else None
-    for drive in generator.drives_at(range(n), generator.true_positions(range(n), seed=seed) if x is None else x, seed):
+    for drive in generator.drives_at(range(n), generator.true_positions(range(n), seed=seed), seed):
         yield run(HybridPredictor(drive.model, drive.settings), drive.x_d, drive.x_meas)
 
 

@@ -82,15 +82,6 @@ def exact_weights(rows: Array, lam: float, repetitions: int = 1) -> NDArray[np.l
 
     Householder QR in ``numpy.longdouble`` (64-bit mantissa on x86) of the rows, taken ``repetitions`` times, on top
     of ``√λ·I``; repeating rows m times is the same as taking them times ``√m``.
-
-    Parameters
-    ----------
-    rows : (m, n + 1) array
-        Features and target.
-    lam : float
-        Ridge penalty, m².
-    repetitions : int
-        Repetitions of the rows.
     """
     n = rows.shape[1] - 1
     R = np.zeros((n, n + 1), dtype=np.longdouble)

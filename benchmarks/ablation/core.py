@@ -60,12 +60,7 @@ _Filled = TypeVar("_Filled", PredictorPart, AveragingPart)
 
 
 class CoreVariant:
-    """C core with changes.
-
-    Parameters
-    ----------
-    changes : Changes
-    """
+    """C core with changes."""
 
     def __init__(self, changes: Changes) -> None:
         self.changes = changes

@@ -78,20 +78,7 @@ class LibraryLoops:
     ) -> list[Run]:
         """Return ``n`` runs in a row, each warm after the first.
 
-        Parameters
-        ----------
-        machine : Machine
-            With the settings of its ``[compensator]``.
-        r : (n,) array, m
-            Commanded positions.
-        compensate : {"off", "physics", "hybrid"}
-            As in :class:`~hybridsep.base.settings.CompensatorSettings`.
-        seed : int
-            Noise seed; each run has another one, :func:`noise_seed`.
-        n : int
-            Runs.
-        case : Case, optional
-            Disturbance of the loop.
+        ``r``, (n,), m, are commanded positions; each run has another noise, by :func:`noise_seed`.
         """
         compensator = self.compensator(machine, compensate, case or Case())
         return [self.once(compensator, machine, r, seed, i, case or Case()) for i in range(n)]

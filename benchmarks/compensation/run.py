@@ -12,14 +12,12 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from benchmarks.compensation.loops import Case, LibraryLoops, paper_machine
 from hybridsep.base.metrics import largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
-from hybridsep.base.signals import Array
 from hybridsep.cosim.contour import contours_of
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import PAPER_SETTINGS, Machine, machine_from_table
@@ -52,9 +50,6 @@ class Report:
 UM = 1e6
 STAGE_SHARES = (1 / 2, 2 / 3)
 """Largest error of the hybrid's warm runs on either axis, relative to the physics model's."""
-
-AFTER_REVERSAL = 100
-"""Samples after a reversal of the command that are counted apart on the stage."""
 
 LESS_THAN_5_PERCENT_WORSE = 1.05
 
@@ -153,7 +148,7 @@ def stage_rows(report: Report, loops: LibraryLoops, seeds: range) -> None:
             pairs = [loops.run(used, r, "hybrid", s, 2) for s in seeds]
             found[f"{name} cold"].append([pair[0] for pair in pairs])
             found[f"{name} warm"].append([pair[1] for pair in pairs])
-    for axis, r in enumerate(commands):
+    for axis in range(len(commands)):
         label, figures = "XY"[axis], {name: mean_rms(found[name][axis]) for name in STAGE_CASES}
         physics, keeping = figures["physics"], figures["physics, no_reversal"]
         for name, figure in figures.items():
@@ -162,25 +157,10 @@ def stage_rows(report: Report, loops: LibraryLoops, seeds: range) -> None:
                 report.most(f"{label}  {name}", figure, STAGE_SHARES[axis] * physics, shares)
             else:
                 report.line(f"{label}  {name}", figure, note=shares)
-        near = after_reversals(r)
-        for name in ("physics", "physics, no_reversal", "hybrid warm"):
-            errors = np.array([loop.error for loop in found[name][axis]])
-            outside = UM * rms(errors[:, ~near])
-            share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
-            note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
-            report.line(f"   {name}, away from reversals", outside, note=note)
     for name, (x, y) in found.items():
         of_x, of_y = ({str(seed): run for seed, run in enumerate(runs)} for runs in (x, y))
         contours = contours_of(of_x, of_y).values()
         report.line(f"contour error, {name}", UM * rms([contour.error for contour in contours]))
-
-
-def after_reversals(r: Array) -> Any:
-    """Return which samples follow a reversal of the command closely, ``(n,)`` of bool."""
-    near = np.zeros(len(r), dtype=np.bool_)
-    for k in np.flatnonzero(np.diff(np.sign(np.gradient(r))) != 0):
-        near[k : k + AFTER_REVERSAL] = True
-    return near
 
 
 def robustness_rows(report: Report, loops: LibraryLoops, seeds: range) -> None:

@@ -179,15 +179,7 @@ def program(
 
 
 def sizes(target: Target, kind: str, folder: Path) -> Sizes:
-    """Return the sizes of the functions that a predictor or a compensator needs, linked alone.
-
-    Parameters
-    ----------
-    target : Target
-    kind : {"predictor", "compensator"}
-    folder : Path
-        Where it is built; made.
-    """
+    """Return the sizes of the functions that a predictor or a compensator needs, linked alone."""
     folder.mkdir(parents=True)
     found = []
     for define in ([f"-DKIND={kind}"], []):
