@@ -220,15 +220,15 @@ def passes(name: str, duration: float) -> dict[str, Array]:
         controller = Controller(machine, compensate, trained)
         return cosimulate(controller, XiaoDrive(axis), np.tile(r, PASSES), encoder=Encoder(NOISE_STD, 2)).x
 
-    remembers = of_gains(name).changed("predictor", {"recall": 2 * len(r)})
+    gains, of_fit = (one.changed("predictor", {"recall": 2 * len(r)}) for one in (of_gains(name), found.machine))
     learning = learned_commands(axis.model(), T_S, "foh", XiaoDrive(axis), r, PASSES, noisy, cut_off=120.0)
     return {
         "off": np.tile(simulate(XiaoDrive(axis), r, T_S), PASSES),
         "physics, from the gains": run(of_gains(name), "physics"),
         "hybrid, cold, from the gains": run(of_gains(name), "hybrid"),
-        "the same, which remembers a pass": run(remembers, "hybrid"),
-        "hybrid, cold, from fit": run(found.machine, "hybrid"),
-        "hybrid, trained by fit": run(found.machine, "hybrid", found.predictor()),
+        "the same, which remembers a pass": run(gains, "hybrid"),
+        "from fit, which remembers a pass": run(of_fit, "hybrid"),
+        "and trained by fit": run(of_fit, "hybrid", found.predictor()),
         "learning control": np.concatenate([one.x for one in learning]),
     }
 
