@@ -189,38 +189,32 @@ class NpzSource(_GivenSource):
         return head.startswith(b"PK\x03\x04") and name.endswith(b".npy")
 
 
-class MatSource(ArraysSource):
+class MatSource(_GivenSource):
     """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; in structs they are called ``struct.field``.
 
-    A complex vector ``H`` is there as ``H.real`` and ``H.imag`` too.
+    A complex vector ``H`` is there as ``H.real`` and ``H.imag`` too, a column of a matrix as ``name[0]``.
     """
 
     format = "MATLAB"
     endings = (".mat",)
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
         from scipy import io  # a quarter of a second, which a text need not wait
 
         with _reading(path, "a MATLAB file"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of names that occur twice: the last one counts, as in MATLAB
             variables = [item for item in io.loadmat(path).items() if not item[0].startswith("__")]
-            self._variables = _by_columns({name: value for one in variables for name, value in _fields(*one)})
-        self.names = list(self._variables)
+        found = {name: value for one in variables for name, value in _fields(*one)}
+        for name, value in found.items():
+            if not isinstance(value, np.ndarray) or value.dtype.names is not None:
+                kind = type(value).__name__ if not isinstance(value, np.ndarray) else "structs"
+                found[name] = LogError(f"{path}: column {brief(name)} must be a full matrix, got {kind}")
+        super().__init__(path, found)
 
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it has the text of version 5; version 4 has none, and is known by the file's name."""
         return head.startswith(b"MATLAB 5.0 MAT-file")
-
-    def column(self, name: str) -> Array:
-        """Return a variable's values."""
-        value = self._variables[name]
-        if not isinstance(value, np.ndarray) or value.dtype.names is not None:
-            kind = type(value).__name__ if not isinstance(value, np.ndarray) else "structs"
-            raise LogError(f"{self.path}: column {brief(name)} must be a full matrix, got {kind}")
-        _check(self.path, name, value)
-        return value.astype(np.float64).ravel()
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
