@@ -175,7 +175,10 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{role} NAME" for role in names)
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    return LogError(f"{source.path}: {which} missing, the file has {listed(source.names)}; name {it}: {options}{other}")
+    of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}"
+    of_python += ", or T_s=SECONDS" if "t" in names else ""
+    there = listed(source.names)
+    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}{of_python}")
 
 
 def _stated(source: Source, name: str) -> str:

@@ -260,3 +260,10 @@ def test_units_that_are_none(unit: Any) -> None:
 def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any], message: str) -> None:
     with pytest.raises(HybridSepError, match=message):
         hybridsep.fit(None, **known)  # type: ignore[arg-type]
+
+
+def test_messages_name_pythons_arguments_too() -> None:
+    with pytest.raises(LogError, match=r"name it: --x NAME; in Python by columns=\{'x': NAME\}$"):
+        read_log({"x_d": X_D, "goal": X}, T_s=1e-3)
+    with pytest.raises(LogError, match=r"in Python by columns=\{'t': NAME\}, or T_s=SECONDS$"):
+        hybridsep.fit({"x_d": X_D, "x": X})
