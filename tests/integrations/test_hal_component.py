@@ -271,10 +271,10 @@ def test_nothing_but_numbers_is_written(folder: Path) -> None:
         assert np.isfinite(component.step(cmd, fb, active=active)).all()
     assert component.step(math.nan, 3.0, active=False)[OUT] == pytest.approx(3.0)
     assert component.step(4.0, 3.0, active=False)[OUT] == pytest.approx(3.0)
-    assert component.step(4.0, math.nan, active=False)[OUT] == pytest.approx(3.0)
+    assert component.step(4.0, math.nan, active=False)[OUT] == pytest.approx(4.0)  # nothing that is old
     shown = np.array([component.step(4.0, math.nan) for _ in range(2000)])
     assert np.isfinite(shown).all()
-    assert np.max(np.abs(np.diff(shown[:, OUT], prepend=3.0))) <= V
+    assert np.max(np.abs(np.diff(shown[:, OUT], prepend=4.0))) <= V
     assert shown[-1, OUT] == pytest.approx(4.0)
     late = Component(load_machine(X, PREVIEW), folder)
     shown = np.array([late.step(4.0 if k else math.nan, 3.0) for k in range(500)])
