@@ -109,8 +109,7 @@ VARIANTS: Mapping[str, Changes] = {
     "last lag as the first": constants(last_lag=1.0),
     "noise at first the least one": constants(first_noise=1e-6),
     "least noise the first one": constants(least_noise=0.01),
-    "predictions hardly bounded": constants(bound=100.0, bound_of_command=100.0),
-    "A bounded as all others": constants(bound_of_command=1.2),
+    "predictions hardly bounded": constants(bound=100.0),
     "no shrinking": {
         AVERAGING + "hsep_experts.c": [
             (

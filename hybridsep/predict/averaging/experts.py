@@ -314,7 +314,7 @@ class Regression(Expert):
         square = scale.largest_square
         if kind == COMMAND_RESIDUAL:
             square *= at.growth**2
-            most = CONSTANTS.bound_of_command * (at.growth * scale.largest)
+            most = CONSTANTS.bound * (at.growth * scale.largest)
             rows = model.command.rows(model.run.commands, at.window.x_d)
         return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
 

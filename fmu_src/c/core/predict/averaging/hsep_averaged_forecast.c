@@ -116,7 +116,7 @@ static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hse
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_expert *expert = hsep_averaged_expert(self, i);
         if (self->predicted[i] && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL) {
-            hsep_expert_begin(expert, past_of_command, square, HSEP_AVERAGING_BOUND_OF_COMMAND * most);
+            hsep_expert_begin(expert, past_of_command, square, HSEP_AVERAGING_BOUND * most);
         } else if (self->predicted[i]) {
             hsep_expert_begin(expert, past, of_physics->largest_square, self->bound);
         }
