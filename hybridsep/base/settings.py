@@ -291,9 +291,10 @@ class Cascade(Settings):
 class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 
-    ``preview`` is ``2·Np`` or 200, whichever is more, if left out, and ``spacing`` 2 for each 100 samples of ``Np``, as
-    a plan costs the cube of its splines, or the next smaller divisor of ``Np``. The differences of ``x_dm`` keep the
-    drive's ``limits``, if there are any; ``no_reversal`` has no effect without them, and plans of a model with
+    What is left out is in the drive's time: ``preview`` is what its model needs to follow
+    (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of it, or the next smaller divisor
+    of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d`` do not,
+    by what these take more. ``no_reversal`` has no effect without them, and plans of a model with
     ``averaging`` follow the friction and may turn. ``change_max``, None for no bound, is about twice the servo error
     without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
@@ -341,22 +342,36 @@ class CompensatorSettings(Settings):
         nonzero=1e-5,
     )
 
-    def for_window(self, Np: int) -> CompensatorSettings:
+    def window(self, look_ahead: int) -> int:
+        """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
+
+        It is at least 10, as short ones leave a controller no time to plan, and a multiple of ``spacing``.
+        """
+        preview, spacing = self.preview or look_ahead, self.spacing or max(1, round((self.preview or look_ahead) / 100))
+        most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
+        return spacing * min(most, max(-(-10 // spacing), round(preview / 10 / spacing)))
+
+    def for_window(self, Np: int, look_ahead: int) -> CompensatorSettings:
         """Return these settings for windows of ``Np`` samples, defaults filled in.
+
+        Parameters
+        ----------
+        Np : int
+        look_ahead : int
+            Samples that the drive needs, for a ``preview`` that is left out.
 
         Raises
         ------
         ParameterError
             If ``preview`` or ``spacing`` does not fit ``Np``.
         """
-        usual = self.parameters()
         spacing, preview = self.spacing, self.preview
-        if preview is None:
-            preview = min(max(2 * Np, int(usual["preview"].default)), int(usual["preview"].maximum))
         if spacing is None:
-            short = int(usual["spacing"].default)
-            most = max(short, min(Np // 100 * short, (preview - Np - PLAN_END) // 4))
+            most = max(1, round((preview or look_ahead) / 100))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
+        if preview is None:  # enough behind a window that is longer than a tenth of it, too
+            preview = max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END)
+            preview = min(preview, int(self.parameters()["preview"].maximum))
         problems = []
         if Np % spacing:
             problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")

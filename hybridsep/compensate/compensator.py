@@ -72,7 +72,8 @@ class SepCompensator:
         predictor.settings.check_planning()
         predictor.plan_ahead()
         self.predictor = predictor
-        self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
+        look_ahead = predictor.model.look_ahead(predictor.T_s, predictor.settings.input_hold)
+        self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead)
         assert settings.preview is not None
         assert settings.spacing is not None
         self.preview, self.spacing = settings.preview, settings.spacing

@@ -1,11 +1,11 @@
-"""Plan on the averaged model, by Newton steps that follow the slope of its disturbances.
+"""Plan on the averaged model, by a Newton step that follows the slope of its disturbances.
 
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
-of the linearised model (Gauss-Newton), and goes to its minimum, or less far if only that lowers the cost. The first
-samples of a plan follow the last plan, and the plan is made while they act. Steps, their lengths and the steps of the
-solver are limited, so that the work fits into these samples. Predictions are shrunk by their variance, so where the
-model knows nothing the plan is the physics model's.
+friction that follows the command changes its sign with the command's velocity. A Gauss-Newton step solves the quadratic
+programme of the model linearised at the better of the remainder of the last plan and the physics model's plan, and goes
+to its minimum, or less far if only that lowers the cost: the next window's step goes on from there. The first samples of a plan follow the last plan, and the
+plan is made while they act; the steps of the solver are limited, so that the work fits into these samples. Predictions
+are shrunk by their variance, so where the model knows nothing the plan is the physics model's.
 
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
 of the stack, and the shrinking by the variance, are held constant:
@@ -30,10 +30,10 @@ from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, ExpertPredicti
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
-from .qp import Bounds, Tolerance, solve, solve_again
+from .qp import Bounds, Tolerance, solve
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "is_better"]
+__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "PlannedPoint", "is_better"]
 
 _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
@@ -288,25 +288,20 @@ def _left(prediction: ExpertPrediction) -> Array:
     return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.shrinkage.copy(), where=unshrunk != 0.0))
 
 
-_SOLVED = (5, 5, 3, 3)
-"""Solver steps at most, of the physics model's plan and of the programme of each Newton step: from the second one on a
-bounded one begins where the last one ended."""
-
-TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, _SOLVED[0])
-"""Of the solver: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
+TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
+"""Of the solver, for the physics model's plan and the Newton step: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
 small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
 within the bounds."""
 
-_REACHES = (0.1, 0.01, 0.0)
-"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
-that changes nearby."""
+_REACH = 0.01
+"""Reach of friction's slope, relative to the model's velocity scale: a tangent is blind to a sign that changes
+nearby."""
 
 _LENGTHS = (1.0, 0.3)
 """Lengths of a step that are tried, relative to the way to the minimum."""
 
-_GAIN, _LEAST_GAIN = 1e-3, 1e-9
-"""Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
-rounding tells apart are equal."""
+_LEAST_GAIN = 1e-9
+"""Relative gain below which a plan is no better than another: costs that rounding tells apart are equal."""
 
 
 def is_better(cost: float, other: float) -> bool:
@@ -315,18 +310,18 @@ def is_better(cost: float, other: float) -> bool:
 
 
 @dataclass(frozen=True)
-class _Point:
-    """Coefficients ``(3 + n_free,)``; prediction, position and third differences, ``(preview,)``, and cost, m²."""
+class PlannedPoint:
+    """Plan with what the model predicts under it."""
 
-    coefficients: Array
+    coefficients: Array  # (3 + n_free,), m
     prediction: AveragedForecast
-    x_h: Array
-    third: Array
-    cost: float
+    x_h: Array  # (preview,), m, relative to the start
+    third: Array  # (preview,), m, third differences of δ
+    cost: float  # m²
 
 
 class AveragedPlanner:
-    """Cost of the plans of one window on the averaged model.
+    """Plans of one window on the averaged model.
 
     Parameters
     ----------
@@ -346,19 +341,23 @@ class AveragedPlanner:
         self._basis, self._jerk_weight, self._model, self._x_d = basis, jerk_weight, model, x_d
         self._third_before = np.diff(np.concatenate((delta_before, np.zeros(len(x_d)))), 3)
 
-    def cost(self, coefficients: Array) -> float:
-        """Return the cost of a plan, m²; not finite if its prediction overflows."""
-        return self._at(coefficients).cost
+    def point(self, coefficients: Array) -> PlannedPoint:
+        """Return a plan with its cost, which is not finite if its prediction overflows."""
+        return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
 
-    def cost_of_previous(self, previous_plan: Array) -> float:
-        """Return the cost of the remainder of the last plan, m²."""
-        return self._point(previous_plan, self._model.of_previous_plan).cost
+    def previous(self, previous_plan: Array) -> PlannedPoint:
+        """Return the remainder of the last plan."""
+        return self._point(previous_plan, self._model.of_previous_plan)
 
-    def plan(self, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
-        """Return the coefficients of the best plan found from the remainder of the last plan, and its cost, m².
+    def step(
+        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array
+    ) -> PlannedPoint:
+        """Return the plan behind a Newton step; the start itself, if none is better.
 
         Parameters
         ----------
+        start : PlannedPoint
+            Where the model is linearised.
         previous_plan : (3 + n_free,) array, m
             Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
         bounds : Bounds
@@ -368,37 +367,21 @@ class AveragedPlanner:
             Free splines filtered by ``G_pb``.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
-        here, last = self._point(previous_plan, self._model.of_previous_plan), None
-        for reach, steps in zip(_REACHES, _SOLVED[1:], strict=True):
-            W = self._model.slope(here.prediction, splines, passed, reach)
-            at = here.coefficients[N_DECIDED:]
-            P = W.T @ W + self._jerk_weight * (third.T @ third)
-            target = self._x_d - here.x_h + W @ at
-            v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
-            cost, tolerance = PlanCost.regular(P, v), TOLERANCE._replace(steps=steps)
-            found = (
-                solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
-                if last is None
-                else solve_again(cost, bounds, previous_plan[N_DECIDED:], n_pinned, at, last, tolerance)
-            )
-            if found is None:
-                break
-            last = found.ending
-            ends = (np.concatenate((previous_plan[:N_DECIDED], at + length * (found.x - at))) for length in _LENGTHS)
-            best = next((end for end in map(self._at, ends) if is_better(end.cost, here.cost)), None)
-            if best is None:
-                break
-            gain, here = here.cost - best.cost, best
-            if gain < _GAIN * (gain + here.cost):
-                break
-        return here.coefficients, here.cost
+        decided, at = np.split(start.coefficients, [N_DECIDED])
+        W = self._model.slope(start.prediction, splines, passed, _REACH)
+        P = W.T @ W + self._jerk_weight * (third.T @ third)
+        target = self._x_d - start.x_h + W @ at
+        v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
+        cost = PlanCost.regular(P, v)
+        found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=TOLERANCE)
+        if found is None:
+            return start
+        ends = (np.concatenate((decided, at + length * (found.x - at))) for length in _LENGTHS)
+        return next((end for end in map(self.point, ends) if is_better(end.cost, start.cost)), start)
 
-    def _at(self, coefficients: Array) -> _Point:
-        return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
-
-    def _point(self, coefficients: Array, prediction: AveragedForecast) -> _Point:
+    def _point(self, coefficients: Array, prediction: AveragedForecast) -> PlannedPoint:
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(prediction)
         error = self._x_d - x_h
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
-        return _Point(coefficients, prediction, x_h, third, cost)
+        return PlannedPoint(coefficients, prediction, x_h, third, cost)

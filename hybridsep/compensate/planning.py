@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -319,23 +319,27 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.preview)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
-        physics = self.affine_plan(g, free, preview, self.limits(preview, change=change), TOLERANCE)
+        # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
+        relative = replace(preview, command=path)
+        physics = self.affine_plan(g, free, relative, self.limits(preview, change=change), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if predictor.k < predictor.n_init or not model.has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
-            of_physics, is_away, values = planner.cost(physics), False, self.basis.values[: self.Np]
+            last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
+            is_last = is_better(last.cost, of_physics.cost)
             if most is SepState.HYBRID and not self.paused:
-                bounds = self.limits(preview, may_turn=True, change=change)
-                hybrid, cost = planner.plan(previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
-                if is_better(cost, of_physics):
-                    deltas, error = (values @ hybrid, values @ physics), math.sqrt(cost / self.preview)
+                bounds, start = self.limits(preview, may_turn=True, change=change), last if is_last else of_physics
+                hybrid = planner.step(start, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
+                if is_better(hybrid.cost, of_physics.cost):
+                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.preview)
+                    deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
-                        return ChosenPlan(SepState.HYBRID, hybrid, scales)
-            if is_better(planner.cost_of_previous(previous_plan), of_physics):
+                        return ChosenPlan(SepState.HYBRID, hybrid.coefficients, scales)
+            if is_last:
                 return ChosenPlan(SepState.OFF, previous_plan, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
 

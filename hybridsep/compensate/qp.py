@@ -2,7 +2,7 @@
 
 The limits are linear inequality constraints on the plan's coefficients. Rows are normalised by their limits. The
 remainder of the last plan is always feasible: it kept the limits when it was made. Where ``x_d`` itself exceeds a
-limit, the bound is relaxed to the remainder's value.
+limit, as a command does that is held or rounded, what it takes is added to the limit.
 
 ``min ½ xᵀPx − vᵀx`` subject to ``low ≤ A x ≤ high`` is solved in a bounded number of steps by Mehrotra's
 predictor-corrector method (S. Mehrotra, SIAM J. Optim. 2 (1992); J. Nocedal and S. J. Wright, *Numerical Optimization*,
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.ndimage import maximum_filter1d
 
 from ..base.settings import Limits
 from ..base.signals import Array
@@ -27,12 +28,10 @@ __all__ = [
     "EXACT",
     "Bounds",
     "DriveBounds",
-    "Ending",
     "Minimum",
     "Tolerance",
     "minimise",
     "solve",
-    "solve_again",
 ]
 
 _FIRST_SLACK = 0.3
@@ -40,9 +39,6 @@ _FIRST_SLACK = 0.3
 
 _FIRST_MU = 10.0
 """Initial complementarity μ, as a share of the cost per bound: with 1 the longest plans take 4 to 8 steps more."""
-
-_SLACK_AGAIN, _MU_AGAIN = 0.03, 0.1
-"""Both for a programme that follows one with the same bounds and nearly the same cost: it needs half as many steps."""
 
 _REGULARISATION = 1e-14
 """Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""
@@ -82,27 +78,6 @@ differences in rounding between two implementations stay small. 12 steps on aver
 random parameters took all of them."""
 
 
-class Ending(NamedTuple):
-    """Where a programme ended, for another one with the same bounds and nearly the same cost.
-
-    Attributes
-    ----------
-    z : (2m,) array, m²
-        Multipliers of the lower bounds, then of the upper ones.
-    cost : float, m²
-        Scale of the cost.
-    inner : (n,) array or None
-        Iterate that was farthest inside the bounds without their margin; None if none was inside.
-    beyond : float
-        By how much it exceeds the worst bound with it, in the bounds' unit; the margin if none was inside.
-    """
-
-    z: Array
-    cost: float
-    inner: Array | None
-    beyond: float
-
-
 class Minimum(NamedTuple):
     """Minimiser of a quadratic programme.
 
@@ -112,13 +87,13 @@ class Minimum(NamedTuple):
         Not finite if the problem's data are not.
     steps : int
         Of the solver.
-    ending : Ending, optional
-        None if no bound is active.
+    inner : (n,) array, optional
+        Iterate that was farthest inside the bounds without their margin; None if none was inside.
     """
 
     x: Array
     steps: int
-    ending: Ending | None = None
+    inner: Array | None = None
 
 
 def minimise(
@@ -128,7 +103,7 @@ def minimise(
     low: Array,
     high: Array,
     start: Array,
-    cost: float | Ending,
+    cost: float,
     tolerance: Tolerance = EXACT,
 ) -> Minimum:
     """Return the minimiser of ``½ xᵀPx − vᵀx`` subject to ``low ≤ rows @ x ≤ high``.
@@ -144,18 +119,15 @@ def minimise(
         ``low < high``.
     start : (n,) array
         Initial iterate.
-    cost : float or Ending
-        Scale of the cost, > 0, for the tolerance; or the end of a programme that is nearly the same, whose solution
-        ``start`` is near.
+    cost : float
+        Scale of the cost, > 0, for the tolerance.
     tolerance : Tolerance
     """
     # As B x ≥ b, with slacks s = B x − b > 0 and multipliers z > 0, s z → 0
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
     x, m = start.copy(), len(rows)
-    last = cost if isinstance(cost, Ending) else Ending(np.zeros(len(b)), cost, None, tolerance.margin)
-    least, first_mu = (_SLACK_AGAIN, _MU_AGAIN) if isinstance(cost, Ending) else (_FIRST_SLACK, _FIRST_MU)
-    s, share = np.maximum(B @ x - b, least), last.cost / len(b)
-    z, inner, beyond = np.maximum(last.z, first_mu * share / s), last.inner, last.beyond
+    s, share = np.maximum(B @ x - b, _FIRST_SLACK), cost / len(b)
+    z, inner, beyond = _FIRST_MU * share / s, None, tolerance.margin
     # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
     rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
     steps = 0
@@ -187,7 +159,7 @@ def minimise(
         lengths = _step_length(s, ds), _step_length(z, dz)
         alpha_p, alpha_d = (1.0 if alpha >= 1.0 else _TAU * alpha for alpha in lengths)
         x, s, z = x + alpha_p * dx, s + alpha_p * ds, z + alpha_d * dz
-    return Minimum(x, steps, Ending(z, last.cost, inner, beyond))
+    return Minimum(x, steps, inner)
 
 
 @dataclass(frozen=True)
@@ -233,6 +205,9 @@ _ROUNDING = 1e-9
 _INTERIOR = 1e-10
 """Width of the feasible interval, as a share of a limit, where the last plan lies on a bound: an interior-point method
 needs an interior."""
+
+_EXCEEDED = 1.0 + 1e-6
+"""Difference of the commanded position, in limits, that exceeds one: what is less may be rounding."""
 
 _MOVES = 1e-12
 """Smallest step of the commanded position that counts as motion, m per sample: above its rounding."""
@@ -292,7 +267,7 @@ class DriveBounds:
         *,
         no_reversal: bool = False,
     ) -> None:
-        self._no_reversal = no_reversal
+        self._no_reversal, self._near = no_reversal, 4 * basis.spacing
         self._scales: list[tuple[int, float]] = []
         if limits is not None:
             bounds = limits.velocity * T_s, limits.acceleration * T_s**2, limits.jerk * T_s**3
@@ -319,7 +294,8 @@ class DriveBounds:
         Parameters
         ----------
         x_d : (preview,) array, m
-            Commanded positions.
+            Commanded positions. Within the length of a spline of where they exceed a limit, it is widened by what they
+            take of it.
         x_d_before, delta_before : (3,) arrays, m
             Last three commanded positions before the plan, and last three changes of them.
         previous_plan : (3 + n_free,) array, m
@@ -338,7 +314,8 @@ class DriveBounds:
         offset = offset + self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
         at_rest = self._free @ previous_plan[N_DECIDED:]
         most = np.repeat([(1.0 - _ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
-        least = -most
+        own = np.concatenate((np.zeros(0), *(self._own(x_d, x_d_before, *scale) for scale in self._scales)))
+        least, most = np.minimum(own, 0.0) - most, np.maximum(own, 0.0) + most
         if self._no_reversal and not may_turn:
             steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
             for i, (order, _) in enumerate(self._scales):
@@ -347,6 +324,14 @@ class DriveBounds:
                     most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
         low, high = np.minimum(least - offset, at_rest - _INTERIOR), np.maximum(most - offset, at_rest + _INTERIOR)
         return Bounds(rows=self._free, low=low, high=high)
+
+    def _own(self, x_d: Array, before: Array, order: int, bound: float) -> Array:
+        """Return differences of ``x_d``, of an order ≥ 1, in limits, near those that exceed it; 0 elsewhere."""
+        if order == 0:
+            return np.zeros(len(x_d))
+        own = np.diff(np.concatenate((before, x_d)), order)[3 - order :] / bound
+        width = 2 * self._near + 1
+        return np.where(maximum_filter1d(np.abs(own), width, mode="constant") > _EXCEEDED, own, 0.0)
 
 
 def solve(
@@ -387,32 +372,8 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    return _bounded(
-        cost, bounds, previous_plan, n_pinned, previous_plan, _cost_scale(cost, c, previous_plan, n_kept), tolerance
-    )
-
-
-def solve_again(
-    cost: PlanCost,
-    bounds: Bounds,
-    previous_plan: Array,
-    n_pinned: int,
-    start: Array,
-    last: Ending,
-    tolerance: Tolerance,
-) -> Minimum:
-    """Return the minimiser of a cost near that of the last plan, which the same bounds bound.
-
-    Parameters
-    ----------
-    cost, bounds, previous_plan, n_pinned, tolerance
-        As in :func:`solve`, with ``always``.
-    start : (n,) array, m
-        Where the last plan ended.
-    last : Ending
-        Of the last plan.
-    """
-    return _bounded(cost, bounds, previous_plan, n_pinned, start, last, tolerance)
+    scale = _cost_scale(cost, c, previous_plan, n_kept)
+    return _bounded(cost, bounds, previous_plan, n_pinned, scale, tolerance)
 
 
 def _unbounded(cost: PlanCost, previous_plan: Array, n_pinned: int) -> Array | None:
@@ -436,20 +397,12 @@ def _bounded(
     bounds: Bounds,
     previous_plan: Array,
     n_pinned: int,
-    start: Array,
-    scale: float | Ending,
+    scale: float,
     tolerance: Tolerance,
 ) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
 
-    Parameters
-    ----------
-    cost, bounds, previous_plan, n_pinned, tolerance
-        As in :func:`solve`.
-    start : (n,) array, m
-        Initial iterate.
-    scale : float or Ending
-        :func:`_cost_scale`, m², or the end of a programme that is nearly the same.
+    Parameters are those of :func:`solve`; ``scale`` is :func:`_cost_scale`, m².
     """
     pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
@@ -460,13 +413,11 @@ def _bounded(
         rows[touched],
         (bounds.low - taken)[touched] + tolerance.margin,
         (bounds.high - taken)[touched] - tolerance.margin,
-        start[n_pinned:],
+        previous_plan[n_pinned:],
         scale,
         tolerance,
     )
-    assert found.ending is not None
-    inner = found.ending.inner
-    start = previous_plan if inner is None else np.concatenate((pinned, inner))
+    start = previous_plan if found.inner is None else np.concatenate((pinned, found.inner))
     best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():
         return found._replace(x=previous_plan)

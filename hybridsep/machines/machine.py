@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -104,7 +105,7 @@ class Machine(Section):
 
         A delay of the predictor's is refused where a compensator is made: the file may be for a predictor alone.
         """
-        problems, Np = [], {**self.predictor, **self.compensator}.get("Np", PredictorSettings().Np)
+        problems = []
         try:
             settings = self.compensator_predictor
             if "measurement_delay" in self.compensator:
@@ -112,13 +113,11 @@ class Machine(Section):
         except ParameterError as error:
             problems.append(str(error))
         try:
-            self._compensation().for_window(Np)
+            _ = self.compensator_settings
         except ParameterError as error:
             problems.append(str(error))
         if problems:
-            inherited = [name for name in ("Np", "p", "q") if name not in self.compensator]
-            origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
-            raise ParameterError(f"compensator: {'; '.join(problems)}{origin}")
+            raise ParameterError(f"compensator: {'; '.join(dict.fromkeys(problems))}")
 
     @property
     def model(self) -> ModalModel:
@@ -144,14 +143,20 @@ class Machine(Section):
 
     @property
     def compensator_predictor(self) -> PredictorSettings:
-        """Settings of the compensator's own predictor: the predictor's where the section has none."""
-        own = self._compensator_entries(PredictorSettings)
-        return PredictorSettings(**{**self.predictor, **own}, **self._sampling)
+        """Settings of the compensator's own predictor: the predictor's where the section has none.
+
+        Its window is a tenth of the preview, :meth:`~hybridsep.base.settings.CompensatorSettings.window`, with as many
+        of the predictor's lags as fit into it.
+        """
+        own, predictor = self._compensator_entries(PredictorSettings), self.predictor_settings
+        Np = own.setdefault("Np", self._compensation().window(self._look_ahead))
+        shorter = {"p": min(predictor.p, Np), "q": min(predictor.q, Np - 1)}
+        return PredictorSettings(**{**self.predictor, **shorter, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
-        return self._compensation().for_window(self.compensator_predictor.Np)
+        return self._compensation().for_window(self.compensator_predictor.Np, self._look_ahead)
 
     def changed(self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]) -> Machine:
         """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
@@ -220,6 +225,11 @@ class Machine(Section):
             **self.compensator_settings.to_fmi(),
             "dead_time": self.physics.dead_time,
         }
+
+    @cached_property
+    def _look_ahead(self) -> int:
+        """Samples that the drive needs ahead."""
+        return self.model.look_ahead(self.T_s, self.physics.input_hold)
 
     @property
     def _sampling(self) -> dict[str, Any]:

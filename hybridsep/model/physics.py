@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -21,6 +22,9 @@ from .discrete import BLOCK_MAX, DiscreteModel
 
 if TYPE_CHECKING:
     import control
+
+_LOOK_AHEAD_MAX = 2000
+"""Longest preview of a compensator, samples."""
 
 MODES_MAX = 100
 """Largest number of modes; the discrete model's tables grow with its square."""
@@ -151,6 +155,24 @@ class ModalModel:
     def dc_gain(self) -> float:
         """Static gain ``G_pb(0)``; 1 for a drive without steady-state error."""
         return float(sum(mode.alpha / mode.omega**2 for mode in self.modes))
+
+    def look_ahead(self, T_s: float, input_hold: str = "zoh") -> int:
+        """Return the samples ahead that a compensator needs to plan, :data:`_LOOK_AHEAD_MAX` at most.
+
+        A change of the command must act within its plan: three times the time in which the response to a step, dead
+        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode, and 40 samples.
+
+        Parameters
+        ----------
+        T_s, input_hold
+            As those of :meth:`discretise`.
+        """
+        discrete = self.discretise(T_s, input_hold)
+        step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))
+        reached = np.abs(step) >= 0.95 * abs(self.dc_gain)
+        rise = int(np.argmax(reached)) if reached.any() else len(step)
+        period = 1.0 / min(mode.f_n for mode in self.modes) / T_s
+        return min(_LOOK_AHEAD_MAX, max(40, 3 * rise, math.ceil(1.5 * period)))
 
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.

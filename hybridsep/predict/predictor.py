@@ -271,9 +271,9 @@ class HybridPredictor:
         )
 
     def physics_operator(self, n: int) -> tuple[Array, Array]:
-        """Return the first column of ``G_pb``, m/m, and its free response, m, ``(n,)`` each; the start is known."""
-        g_pb, free, start = self._physics_from_rest(n)
-        return g_pb, free[len(self.state.late) :] + start * (1.0 - np.cumsum(g_pb))
+        """Return the first column of ``G_pb``, m/m, and its free response, relative to the start, m, ``(n,)`` each."""
+        g_pb, free, _ = self._physics_from_rest(n)
+        return g_pb, free[len(self.state.late) :]
 
     def _physics_from_rest(self, n: int) -> tuple[Array, Array, float]:
         """Return the first column of ``G_pb``, its free response from the late samples on, and the start."""

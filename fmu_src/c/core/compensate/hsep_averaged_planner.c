@@ -6,13 +6,10 @@
 #include <stddef.h>
 #include <string.h>
 
-static const hsep_real averaged_planner_reaches[] = {HSEP_NEWTON_REACHES};
 static const hsep_real averaged_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
-static const hsep_int averaged_planner_solved[] = {HSEP_NEWTON_SOLVED};
+static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE};
 
-HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
-HSEP_ASSERT(solved, sizeof averaged_planner_solved == (1 + HSEP_AVERAGED_STEPS) * sizeof(hsep_int));
 
 /* Whether a plan costs less than another; not if it is NaN. */
 static int averaged_planner_better(hsep_real cost, hsep_real other)
@@ -106,17 +103,14 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     hsep_planner_open(task->planner, task->x_d);
 }
 
-/* Linearise at the best plan, which was predicted last, the remainder of the last plan before the physics model's. */
+/* Linearise at the best plan so far, which was predicted last. */
 static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     const hsep_real *e_h = hsep_at(self, self->e_h);
     hsep_real *target = hsep_at(self, self->target);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
-    if (self->steps == 0) {
-        averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n);
-    }
-    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
+    hsep_linearised_at(linearised, task->model, command, x_pb, HSEP_NEWTON_REACH);
     for (hsep_int k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
         const hsep_int j = self->preview - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -180,23 +174,15 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
     self->spline = end;
 }
 
-/* Begin to solve a programme, of the physics model's plan, 0, or of a Newton step, again where the last one's was
- * bounded; return whether it has a plan. */
-static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int programme)
+/* Begin to solve a programme, of the physics model's plan or of the Newton step; return whether it has a plan. */
+static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    hsep_tolerance tolerance = {HSEP_NEWTON_TOLERANCE};
-    hsep_plan_status status = HSEP_PLAN_BOUNDED;
+    hsep_tolerance tolerance = averaged_planner_tolerance;
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
 #endif
-    tolerance.steps = averaged_planner_solved[programme];
-    if (self->bounded) { /* so it is again */
-        hsep_planner_bound(task->planner, hsep_at(self, self->best), 0.0, &tolerance);
-    } else {
-        status = hsep_planner_solve(task->planner, 1, &tolerance);
-    }
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
     self->solving = status == HSEP_PLAN_BOUNDED;
-    self->bounded = self->solving && programme > 0;
     return status != HSEP_PLAN_FAILED;
 }
 
@@ -205,14 +191,12 @@ static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averag
 static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
-    const hsep_real cost = averaged_planner_cost(self, task, c), gain = self->cost - cost;
+    const hsep_real cost = averaged_planner_cost(self, task, c);
     self->tries++;
     if (averaged_planner_better(cost, self->cost)) {
-        self->gains = !(gain < HSEP_NEWTON_GAIN * (gain + cost));
         self->tries = HSEP_AVERAGED_TRIES;
         self->cost = cost;
         averaged_planner_copy(self, best, c);
-        averaged_planner_copy(self, c, hsep_at(self, self->rest));
     } else if (self->tries < HSEP_AVERAGED_TRIES) {
         const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
@@ -236,10 +220,9 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
 /* Take the plan whose cost is lowest. */
 static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_real cost = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
-    hsep_int plan = averaged_planner_better(self->unchanged, cost) ? self->rest : self->of_physics;
-    self->planned = plan == self->of_physics;
-    if (self->follows && averaged_planner_better(self->cost, cost)) {
+    hsep_int plan = self->is_last ? self->rest : self->of_physics;
+    self->planned = !self->is_last;
+    if (self->follows && averaged_planner_better(self->cost, self->cost_of_physics)) {
         if (averaged_planner_runs_away(self, task)) {
             self->paused = self->pause;
             self->pause *= 2;
@@ -319,10 +302,9 @@ static hsep_real averaged_planner_vary(
     return (hsep_real)count * work->sample + (hsep_real)((count + apart - 1) / apart) * work->row;
 }
 
-/* Bound on the work that is left of a plan where it begins, or behind so many Newton steps. */
+/* Bound on the work that is left of a plan where it begins, or behind the Newton step. */
 static hsep_real averaged_planner_left(
-    const hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work,
-    hsep_int steps)
+    const hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
 {
     const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, n = self->n, pinned = self->n_pinned;
@@ -330,25 +312,21 @@ static hsep_real averaged_planner_left(
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
     if (self->place == 0 && self->judges) {
-        left += (hsep_real)(window - first + behind) * work->sample +
+        left += 2.0 * work->predict + (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
     if (self->place == 0 && self->planned) {
         left += 9.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
-                (hsep_real)averaged_planner_solved[0] * parts;
+                (hsep_real)averaged_planner_tolerance.steps * parts;
     }
-    if (self->follows && steps < HSEP_AVERAGED_STEPS) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->solve +
-                           2.0 * HSEP_AVERAGED_TRIES * work->predict;
+    if (self->place == 0 && self->follows) {
+        left += work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor + work->solve +
+                (hsep_real)averaged_planner_tolerance.steps * parts + 2.0 * (1 + HSEP_AVERAGED_TRIES) * work->predict;
         for (hsep_int j = pinned; j < n; j += HSEP_PHYSICS_ABREAST) {
-            newton += hsep_linearised_work(linearised, task->model, j * spacing);
-        }
-        left += work->factor; /* of the first programme that is bounded: those behind it need none */
-        for (; steps < HSEP_AVERAGED_STEPS; steps++) {
-            left += newton + (hsep_real)averaged_planner_solved[1 + steps] * parts;
+            left += hsep_linearised_work(linearised, task->model, j * spacing);
         }
     }
-    return left + (self->judges ? 2.0 * work->predict : 0.0);
+    return left;
 }
 
 /* Cut a plan: what follows costs so much, and is done when averaged_planner_go_on is called again; place: another one
@@ -374,7 +352,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        self->left = averaged_planner_left(self, task, &work, 0);
+        self->left = averaged_planner_left(self, task, &work);
 
         /* The remainder of the last plan, with the variances of all plans */
         while (self->judges && self->samples < all) {
@@ -382,7 +360,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             (void)averaged_planner_vary(self, task, &work, rest);
         }
         if (self->judges) {
-            self->cost = self->unchanged = averaged_planner_cost(self, task, rest);
+            self->cost = averaged_planner_cost(self, task, rest);
         }
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
@@ -397,7 +375,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         }
         if (self->planned) {
             AVERAGED_PLANNER_YIELD(5, work.solve);
-            self->planned = (hsep_int)averaged_planner_solve(self, task, 0);
+            self->planned = (hsep_int)averaged_planner_solve(self, task);
             while (self->solving) {
                 AVERAGED_PLANNER_YIELD(6, work.step);
                 self->solving = !hsep_planner_advance(planner);
@@ -407,65 +385,74 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
 
-        /* Newton steps from the remainder of the last plan, as long as they gain */
+        /* The better of the two */
+        self->samples = 0;
+        if (self->judges) {
+            AVERAGED_PLANNER_YIELD(7, work.predict);
+            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(8, work.predict);
+            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
+            self->cost_of_physics = averaged_planner_cost(self, task, of_physics);
+            self->is_last = averaged_planner_better(self->cost, self->cost_of_physics);
+            self->samples = 0;
+        }
+        if (self->follows && !self->is_last) {
+            self->cost = self->cost_of_physics;
+        } else if (self->follows) { /* it was predicted before */
+            AVERAGED_PLANNER_YIELD(9, work.predict);
+            averaged_planner_predict(self, task, rest, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(10, work.predict);
+            averaged_planner_predict(self, task, rest, all - self->samples, 0);
+        }
+
+        /* A Newton step from there */
+        self->tries = HSEP_AVERAGED_TRIES;
         if (self->follows) {
-            averaged_planner_copy(self, hsep_at(self, self->best), rest);
+            averaged_planner_copy(self, hsep_at(self, self->best), self->is_last ? rest : of_physics);
             averaged_planner_copy(self, c, rest);
             hsep_planner_follow_friction(planner);
-        }
-        self->gains = self->follows;
-        for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
-            self->left = averaged_planner_left(self, task, &work, self->steps);
-            self->gains = 0;
-            AVERAGED_PLANNER_YIELD(7, work.linearise);
+            AVERAGED_PLANNER_YIELD(11, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = self->n_pinned; self->spline < self->n;) {
-                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
+                AVERAGED_PLANNER_YIELD(12, hsep_linearised_work(linearised, task->model, self->spline * spacing));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = self->n_pinned; self->spline < self->n;) {
                 AVERAGED_PLANNER_YIELD(
-                    9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
+                    13, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, task);
             }
-            AVERAGED_PLANNER_YIELD(10, self->bounded ? 3.0 * work.number : work.factor);
+            AVERAGED_PLANNER_YIELD(14, work.factor);
             hsep_planner_complete(planner, self->n_pinned);
-            if (!self->bounded && !hsep_planner_factor(planner, 1)) { /* a bounded one is solved again without it */
-                break;
-            }
-            AVERAGED_PLANNER_YIELD(11, work.solve);
-            if (!averaged_planner_solve(self, task, 1 + self->steps)) {
-                break;
-            }
+            self->tries = hsep_planner_factor(planner, 1) ? 0 : HSEP_AVERAGED_TRIES;
+        }
+        if (self->tries == 0) {
+            AVERAGED_PLANNER_YIELD(15, work.solve);
+            self->tries = averaged_planner_solve(self, task) ? 0 : HSEP_AVERAGED_TRIES;
             while (self->solving) {
-                AVERAGED_PLANNER_YIELD(12, work.step);
+                AVERAGED_PLANNER_YIELD(16, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
-            for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
-                self->samples = 0;
-                AVERAGED_PLANNER_YIELD(13, work.predict);
-                averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
-                AVERAGED_PLANNER_YIELD(14, work.predict);
-                averaged_planner_predict(self, task, c, all - self->samples, 0);
-                averaged_planner_judge(self, task);
-            }
+        }
+        while (self->tries < HSEP_AVERAGED_TRIES) {
+            self->samples = 0;
+            AVERAGED_PLANNER_YIELD(17, work.predict);
+            averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(18, work.predict);
+            averaged_planner_predict(self, task, c, all - self->samples, 0);
+            averaged_planner_judge(self, task);
         }
 
         /* The best of them */
-        self->left = averaged_planner_left(self, task, &work, HSEP_AVERAGED_STEPS);
-        self->samples = 0;
+        self->left = averaged_planner_left(self, task, &work);
         if (self->judges) {
-            AVERAGED_PLANNER_YIELD(15, work.predict);
-            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(16, work.predict);
-            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
             averaged_planner_compare(self, task);
         }
 
         /* The window under the plan, and its variances */
         for (self->samples = 0; self->samples < self->late + self->Np;) {
             AVERAGED_PLANNER_YIELD(
-                17, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
+                19, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
             (void)averaged_planner_vary(self, task, &work, c);
         }
         break;
@@ -493,7 +480,7 @@ HSEP_API void hsep_averaged_planner_begin(
 {
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->place = self->bounded = self->solving = 0;
+    self->place = self->solving = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);

@@ -40,18 +40,15 @@ typedef struct {
 /* Of the sides: B = A, B = -A. */
 static const hsep_real slacks_sign[2] = {1.0, -1.0};
 
-/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. again: whether z are
- * those of a programme with the same bounds and nearly the same cost. */
-static void slacks_begin(const slacks *self, hsep_real cost, int again)
+/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. */
+static void slacks_begin(const slacks *self, hsep_real cost)
 {
-    const hsep_real least = again ? HSEP_QP_SLACK_AGAIN : HSEP_QP_FIRST_SLACK;
-    const hsep_real mu = (again ? HSEP_QP_MU_AGAIN : HSEP_QP_FIRST_MU) * cost;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
             for (int i = 0; i < 2; i++) {
                 const slacks_side *side = &self->side[i];
-                side->s[r] = hsep_fmax(slacks_sign[i] * (self->Ax[r] - side->b[r]), least);
-                side->z[r] = hsep_fmax(again ? side->z[r] : 0.0, mu / side->s[r]);
+                side->s[r] = hsep_fmax(slacks_sign[i] * (self->Ax[r] - side->b[r]), HSEP_QP_FIRST_SLACK);
+                side->z[r] = HSEP_QP_FIRST_MU * cost / side->s[r];
                 side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
             }
         }
@@ -319,11 +316,8 @@ HSEP_API void hsep_interior_begin(
     self->tolerance = *tolerance;
     self->steps = self->part = 0;
     interior_arrays a = interior_open(self, splines);
-    const int again = !(cost > 0.0);
-    if (!again) {
-        self->cost = cost / a.slacks.sides;
-        self->beyond = tolerance->margin;
-    }
+    self->cost = cost / a.slacks.sides;
+    self->beyond = tolerance->margin;
     /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
      * would outgrow P. */
     hsep_real largest = 0.0;
@@ -333,7 +327,7 @@ HSEP_API void hsep_interior_begin(
     }
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
     hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
-    slacks_begin(&a.slacks, self->cost, again);
+    slacks_begin(&a.slacks, self->cost);
 }
 
 /* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its

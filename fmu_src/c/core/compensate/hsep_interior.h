@@ -49,8 +49,7 @@ typedef struct {
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
 /* Begin with x and the bounds as they are. P: the triangle of n - first rows; cost: scale of the cost, m2, > 0, for the
- * tolerance. 0: begin as near a minimum as one of a programme with the same bounds and nearly the same cost is, with
- * its multipliers and its scale of the cost; the splines that are free are the same. */
+ * tolerance. */
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance);

@@ -11,24 +11,21 @@
 /* hybridsep/compensate/qp.py */
 #define HSEP_QP_FIRST_SLACK 0.3
 #define HSEP_QP_FIRST_MU 10.0
-#define HSEP_QP_SLACK_AGAIN 0.03
-#define HSEP_QP_MU_AGAIN 0.1
 #define HSEP_QP_REGULARISATION 1e-14
 #define HSEP_QP_TAU 0.995
 #define HSEP_QP_STEPS 24
 #define HSEP_QP_EXACT 1e-15, 1e-09, 1e-11, 24
 #define HSEP_QP_ROUNDING 1e-09
 #define HSEP_QP_INTERIOR 1e-10
+#define HSEP_QP_EXCEEDED 1.000001
 #define HSEP_QP_MOVES 1e-12
 
 /* hybridsep/compensate/newton.py */
 #define HSEP_NEWTON_AT_STOP 0.999999
 #define HSEP_NEWTON_APART 4
-#define HSEP_NEWTON_SOLVED 5, 5, 3, 3
 #define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5
-#define HSEP_NEWTON_REACHES 0.1, 0.01, 0.0
+#define HSEP_NEWTON_REACH 0.01
 #define HSEP_NEWTON_LENGTHS 1.0, 0.3
-#define HSEP_NEWTON_GAIN 0.001
 #define HSEP_NEWTON_LEAST_GAIN 1e-09
 
 /* hybridsep/compensate/planning.py */

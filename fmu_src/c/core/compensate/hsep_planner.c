@@ -27,6 +27,7 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     self->jerk_weight = parameters->jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
+    self->own = hsep_take(&end, HSEP_ORDERS * preview);
     self->moves = hsep_take(&end, preview);
     self->third = hsep_take(&end, preview);
     self->P = hsep_take(&end, hsep_triangle(n));
@@ -58,12 +59,45 @@ HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
+/* Rows of x_d, in shares, where one within the length of a spline exceeds its limit; 0 elsewhere. */
+static void planner_own(hsep_planner *self, const hsep_real x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int preview = splines->preview, near = 4 * splines->spacing;
+    hsep_real *own = hsep_at(self, self->own), now[HSEP_ORDERS] = {0.0};
+    for (int i = 0; i < 3; i++) {
+        hsep_differ(now, self->x_d_before[i]);
+    }
+    for (hsep_int k = 0; k < preview; k++) {
+        hsep_differ(now, x_d[k]);
+        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+            own[order * preview + k] = now[order] * splines->share[order];
+        }
+    }
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        hsep_real *row = own + order * preview;
+        hsep_int done = 0;
+        for (hsep_int k = 0; k < preview; k++) {
+            if (hsep_fabs(row[k]) > HSEP_QP_EXCEEDED) {
+                for (; done + near < k; done++) {
+                    row[done] = 0.0;
+                }
+                done = k + near + 1;
+            }
+        }
+        for (; done < preview; done++) {
+            row[done] = 0.0;
+        }
+    }
+}
+
 HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     hsep_real last = self->x_d_before[2], now[HSEP_ORDERS] = {0.0};
+    planner_own(self, x_d);
     for (int i = 0; i < 3; i++) {
         hsep_differ(now, self->x_d_before[i] + self->delta_before[i]);
     }
@@ -83,8 +117,10 @@ HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real
 {
     const hsep_int preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
+    const hsep_real own = hsep_at_const(self, self->own)[r];
     *most = (1.0 - HSEP_QP_ROUNDING) * (r < preview ? self->change : 1.0);
-    *least = -*most;
+    *least = -*most + hsep_fmin(own, 0.0);
+    *most += hsep_fmax(own, 0.0);
     if (r >= preview && r < 2 * preview) { /* velocities */
         const hsep_real moves = hsep_at_const(self, self->moves)[r - preview];
         *least = moves > 0.0 ? 0.0 : *least;
@@ -226,8 +262,17 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     }
 }
 
-HSEP_API void hsep_planner_bound(
-    hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance)
+HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
+{
+    const hsep_int first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
+    hsep_real *factor = hsep_at(self, self->factor);
+    memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
+    return hsep_cholesky_rows(factor, n, 0, n, NULL);
+}
+
+/* Begin a bounded plan at this cost, from the remainder of the last plan. The pinned samples stay as they are, and its
+ * bounds are what they leave. cost: as hsep_interior_begin has it. */
+static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int first = self->n_pinned, preview = splines->preview;
@@ -243,16 +288,8 @@ HSEP_API void hsep_planner_bound(
         low[r] = least - other + tolerance->margin;
         high[r] = most - other - tolerance->margin;
     }
-    memcpy(problem.x, start + HSEP_N_DECIDED + first, (size_t)(splines->n - first) * sizeof(hsep_real));
+    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(hsep_real));
     hsep_interior_begin(interior, splines, hsep_planner_quadratic(self, first), first, cost, tolerance);
-}
-
-HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
-{
-    const hsep_int first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
-    hsep_real *factor = hsep_at(self, self->factor);
-    memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
-    return hsep_cholesky_rows(factor, n, 0, n, NULL);
 }
 
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
@@ -293,7 +330,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
     if (!pinned) {
         hsep_planner_pin(self);
     }
-    hsep_planner_bound(self, hsep_at(self, self->c), cost, tolerance);
+    planner_bound(self, cost, tolerance);
     return HSEP_PLAN_BOUNDED;
 }
 

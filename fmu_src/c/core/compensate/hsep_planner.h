@@ -37,6 +37,7 @@ typedef struct {
     /* Offsets in words from the beginning of the struct */
     hsep_int c;      /* (3 + n,) m, coefficients */
     hsep_int total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
+    hsep_int own;    /* (4 preview,) rows of x_d where one nearby exceeds its limit, else 0; order 0: 0 */
     hsep_int moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
     hsep_int third;  /* (preview,) m, third differences of what is decided */
     hsep_int P;      /* triangle of n rows */
@@ -44,7 +45,7 @@ typedef struct {
     hsep_int splines, interior;
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 19);
+HSEP_ASSERT_WORDS(hsep_planner, 20);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -107,12 +108,6 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
  * solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
-/* Begin a bounded plan at this cost, from the coefficients start, (3 + n,), m. The pinned samples stay as they are, and
- * its bounds are what they leave. cost: as hsep_interior_begin has it, 0 where the last plan, which was bounded at a
- * cost near this one, ended at start. */
-HSEP_API void hsep_planner_bound(
-    hsep_planner *self, const hsep_real start[], hsep_real cost, const hsep_tolerance *tolerance);
-
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
@@ -129,8 +124,9 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
 /* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
 HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[]);
 
-/* Bounds of a row, in shares. The remainder of the last plan is always feasible, with a small margin: an
- * interior-point method needs an interior. */
+/* Bounds of a row, in shares. Where x_d itself exceeds a limit within the length of a spline, as a command that is held
+ * or rounded does, what it takes is added to the limit. The remainder of the last plan is always feasible, with a small
+ * margin: an interior-point method needs an interior. */
 HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most);
 
 /* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
