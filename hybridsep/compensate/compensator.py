@@ -7,8 +7,9 @@ and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview (recedin
 samples only the splines that begin in the first window are applied, then the next plan follows from new measurements.
 
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
-Every spline ends within its plan, so a plan returns to ``x_d`` and its remainder keeps the limits. The next plan starts
-from that remainder: there is always a feasible plan, and where no other can be computed the remainder is followed.
+Every spline ends within its plan, so a plan returns to ``x_d`` behind the horizon over which its error counts, and its
+remainder keeps the limits. The next plan starts from that remainder: there is always a feasible plan, and where no
+other can be computed the remainder is followed.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class SepCompensator:
         assert settings.preview is not None
         assert settings.spacing is not None
         self.preview, self.spacing = settings.preview, settings.spacing
-        self._basis = SplineBasis(self.preview, self.spacing)
+        self._basis = SplineBasis(self.preview, self.spacing, Np)
         bounds = self._bounds(settings)
         self._planning: Planning
         if predictor.settings.averaging:
@@ -222,7 +223,7 @@ class SepCompensator:
         chosen = self._planning.choose(predictor, preview, compensate)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
+        prediction = predictor.predict(x_dm, path=command[: self._basis.horizon], scales=chosen.scales)
         self._pending = PendingPlan(
             chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.runs_away
         )

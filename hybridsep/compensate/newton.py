@@ -3,9 +3,10 @@
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. A Gauss-Newton step solves the quadratic
 programme of the model linearised at the better of the remainder of the last plan and the physics model's plan, and goes
-to its minimum, or less far if only that lowers the cost: the next window's step goes on from there. The first samples of a plan follow the last plan, and the
-plan is made while they act; the steps of the solver are limited, so that the work fits into these samples. Predictions
-are shrunk by their variance, so where the model knows nothing the plan is the physics model's.
+to its minimum, or less far if only that lowers the cost; the next window's step goes on from there. The first samples
+of a plan follow the last plan, and the plan is made while they act; the steps of the solver are limited, so that the
+work fits into these samples. Predictions are shrunk by their variance, so where the model knows nothing the plan is the
+physics model's.
 
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
 of the stack, and the shrinking by the variance, are held constant:
@@ -110,16 +111,16 @@ class DisturbanceSlopes(NamedTuple):
 
 
 class PlanModel:
-    """Averaged model with the weights of this instant, as a function of the commands of a preview.
+    """Averaged model with the weights of this instant, as a function of the commands of a horizon.
 
     Parameters
     ----------
     model : AveragedModel
-        Where the measurements end, which is the beginning of the preview unless they are late.
+        Where the measurements end, which is the beginning of the horizon unless they are late.
     state : (n_state,) array
         State of ``G_pb`` there.
     late : (n_late,) array, m
-        Commands between there and the preview, relative to the start.
+        Commands between there and the horizon, relative to the start.
     start : float, m
     x_d, path : (n,) array, m
         Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
@@ -145,7 +146,7 @@ class PlanModel:
         self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
-        """Return the preview under commands ``x_d``, and what is late before it."""
+        """Return the horizon under commands ``x_d``, and what is late before it."""
         command = np.concatenate((self._late, x_d))
         x_pb, _ = self._discrete.forced_response(self._state, command)
         return ResidualWindow(command, x_pb, self._start, self._path)
@@ -166,11 +167,11 @@ class PlanModel:
         return not fastest <= factor * self._model.learned.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
-        """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
+        """Predict the horizon, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
         return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)
 
     def position(self, at: AveragedForecast) -> Array:
-        """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
+        """Return ``x_h`` of :meth:`predict` over the horizon, ``(n,)``, m."""
         return (at.window.x_pb + at.e_h)[len(self._late) :]
 
     def slope(self, at: AveragedForecast, changes: Array, passed: Array, reach: float) -> Array:
@@ -289,9 +290,10 @@ def _left(prediction: ExpertPrediction) -> Array:
 
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
-"""Of the solver, for the physics model's plan and the Newton step: a plan is judged by the model itself, and taken if it is better than the others. With a margin as
-small as rounding an end that exceeds a bound by a millionth would be no plan; with a larger one there may be none
-within the bounds."""
+"""Of the solver, for the physics model's plan and the Newton step: a plan is judged by the model itself, and taken if it
+is better than the others. With a margin as small as rounding an end that exceeds a bound by a millionth would be no
+plan; with a larger one there may be none within the bounds.
+"""
 
 _REACH = 0.01
 """Reach of friction's slope, relative to the model's velocity scale: a tangent is blind to a sign that changes
@@ -315,7 +317,7 @@ class PlannedPoint:
 
     coefficients: Array  # (3 + n_free,), m
     prediction: AveragedForecast
-    x_h: Array  # (preview,), m, relative to the start
+    x_h: Array  # (horizon,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
     cost: float  # m²
 
@@ -328,8 +330,8 @@ class AveragedPlanner:
     basis : SplineBasis
     jerk_weight : float
     model : PlanModel
-        Of the preview that the window begins.
-    x_d : (preview,) array, m
+        Of the horizon that the window begins.
+    x_d : (horizon,) array, m
         Commanded positions, relative to the start.
     delta_before : (3,) array, m
         Last three values of δ.
@@ -339,11 +341,11 @@ class AveragedPlanner:
         self, basis: SplineBasis, jerk_weight: float, model: PlanModel, x_d: Array, delta_before: Array
     ) -> None:
         self._basis, self._jerk_weight, self._model, self._x_d = basis, jerk_weight, model, x_d
-        self._third_before = np.diff(np.concatenate((delta_before, np.zeros(len(x_d)))), 3)
+        self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
 
     def point(self, coefficients: Array) -> PlannedPoint:
         """Return a plan with its cost, which is not finite if its prediction overflows."""
-        return self._point(coefficients, self._model.predict(self._x_d + self._basis.values @ coefficients))
+        return self._point(coefficients, self._model.predict(self._x_d + self._basis.delta(coefficients)))
 
     def previous(self, previous_plan: Array) -> PlannedPoint:
         """Return the remainder of the last plan."""
@@ -363,10 +365,10 @@ class AveragedPlanner:
         bounds : Bounds
         n_pinned : int
             Coefficients that the plan does not change.
-        passed : (preview, n_free) array
+        passed : (horizon, n_free) array
             Free splines filtered by ``G_pb``.
         """
-        splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
+        splines, third = self._basis.values[: self._basis.horizon, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         decided, at = np.split(start.coefficients, [N_DECIDED])
         W = self._model.slope(start.prediction, splines, passed, _REACH)
         P = W.T @ W + self._jerk_weight * (third.T @ third)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -176,17 +176,19 @@ class Planning(ABC):
         """
 
     def affine_plan(
-        self, g: Array, free: Array, preview: Preview, bounds: Bounds, tolerance: Tolerance = EXACT
+        self, g: Array, free: Array, x_d: Array, preview: Preview, bounds: Bounds, tolerance: Tolerance = EXACT
     ) -> Array | None:
-        """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""
+        """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none.
+
+        ``x_d``, ``(horizon,)``, m, counts from where ``free`` does.
+        """
         previous_plan = preview.previous_plan
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
-        cost = self.basis.cost(
-            g, free, preview.command, previous_plan[:N_DECIDED], preview.delta_before, self.settings.jerk_weight
-        )
+        decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
+        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
-        return None if found is None else np.concatenate((previous_plan[:N_DECIDED], found.x))
+        return None if found is None else np.concatenate((decided, found.x))
 
     def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
@@ -211,11 +213,11 @@ class PaperPlanning(Planning):
             return ChosenPlan(SepState.OFF, preview.previous_plan, None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
-            operator = predictor.operator(self.preview)  # Eq. (3)
+            operator = predictor.operator(self.basis.horizon)  # Eq. (3)
         for state in candidates:
             hybrid = state is SepState.HYBRID
             g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
-            found = self.affine_plan(g, free, preview, bounds)
+            found = self.affine_plan(g, free, preview.command[: self.basis.horizon], preview, bounds)
             if found is not None:
                 return ChosenPlan(state, found, None)
         return ChosenPlan(SepState.OFF, preview.previous_plan, None)
@@ -312,16 +314,15 @@ class AveragedPlanning(Planning):
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
         assert predictor.start is not None
-        path = preview.command - predictor.start
+        path = preview.command[: self.basis.horizon] - predictor.start
         model = self._model(predictor, path, preview)
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
-        g, free = predictor.physics_operator(self.preview)
+        g, free = predictor.physics_operator(self.basis.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        relative = replace(preview, command=path)
-        physics = self.affine_plan(g, free, relative, self.limits(preview, change=change), TOLERANCE)
+        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if predictor.k < predictor.n_init or not model.has_learned:
@@ -334,7 +335,7 @@ class AveragedPlanning(Planning):
                 bounds, start = self.limits(preview, may_turn=True, change=change), last if is_last else of_physics
                 hybrid = planner.step(start, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
-                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.preview)
+                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.basis.horizon)
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
@@ -360,5 +361,5 @@ class AveragedPlanning(Planning):
         assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.values @ preview.previous_plan
+            x_d = path + self.basis.delta(preview.previous_plan)
             return PlanModel(averaged, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)

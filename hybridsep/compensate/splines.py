@@ -3,7 +3,9 @@
 ``δ(k) = Σ_j c_j B(k/spacing − j)`` on a uniform knot grid that continues from window to window. ``B`` is non-zero over
 four knot intervals, so three splines that began before a plan overlap it, with coefficients that are already decided.
 The last spline ends four samples before the plan does: after the plan the command is ``x_d`` itself, in position and
-in its first three differences.
+in its first three differences. The tracking error counts over the horizon, the first three quarters of a plan: a drive
+that lags needs a change for as long as it moves, and while the plan returns to ``x_d`` it must lack it. The next plan
+comes long before.
 """
 
 from __future__ import annotations
@@ -27,6 +29,11 @@ N_DECIDED = 3
 
 _END = PLAN_END
 """Samples without change at the end of a plan, which the settings leave room for."""
+
+_RETURN = 25
+"""Share of a plan behind its horizon, percent: with none, plans of a servo with a lag of 54 ms leave twice the error,
+and where the horizon is 1.5 times the time to 95 % of a step, as with 50, one of twelve drives of modes is made worse.
+"""
 
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""
@@ -72,11 +79,14 @@ class SplineBasis:
         Samples of the plan.
     spacing : int
         Samples between knots.
+    Np : int
+        Samples of the window that begins the plan; the horizon is at least as long.
     """
 
-    def __init__(self, preview: int, spacing: int) -> None:
+    def __init__(self, preview: int, spacing: int, Np: int) -> None:
         width = 4 * spacing
         self.preview, self.spacing = preview, spacing
+        self.horizon = max(Np, preview - preview * _RETURN // 100)
         self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
         # Tails of the splines at −3, −2, −1 spacings, then the free splines
@@ -87,19 +97,23 @@ class SplineBasis:
         # Differences over the plan; the three samples before it enter by `before`
         self.third: Array = np.diff(extended, 3, axis=0)
 
+    def delta(self, coefficients: Array) -> Array:
+        """Return the change of the command over the horizon, ``(horizon,)``, m."""
+        return np.asarray(self.values[: self.horizon] @ coefficients)
+
     def filtered(self, g: Array) -> Array:
-        """Return the free splines filtered by the impulse response ``g``, ``(preview, n_free)``."""
+        """Return the free splines filtered by the impulse response ``g``, ``(horizon, n_free)``."""
         # Time-invariance: one spline is filtered, the others are its shifts
-        return _shifts(np.asarray(lfilter(g, [1.0], self._spline)), self.n_free, self.spacing)
+        return _shifts(np.asarray(lfilter(g, [1.0], self._spline[: self.horizon])), self.n_free, self.spacing)
 
     def cost(self, g: Array, free: Array, x_d: Array, decided: Array, before: Array, jerk_weight: float) -> PlanCost:
         """Return ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
 
         Parameters
         ----------
-        g, free : (preview,) arrays
+        g, free : (horizon,) arrays
             First column of ``G``, and the free response, m; eq. (3).
-        x_d : (preview,) array, m
+        x_d : (horizon,) array, m
             Commanded positions.
         decided : (3,) array, m
             Decided coefficients.
@@ -110,7 +124,7 @@ class SplineBasis:
         """
         delta = self.values[:, :N_DECIDED] @ decided
         # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
-        target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta))
+        target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta[: self.horizon]))
         third_decided = np.diff(np.concatenate((before, delta)), 3)
         W, D = self.filtered(g), self.third[:, N_DECIDED:]
         P = W.T @ W + jerk_weight * (D.T @ D)
@@ -152,6 +166,5 @@ def _padded(samples: Array, n: int) -> Array:
 
 def _shifts(samples: Array, n: int, spacing: int) -> Array:
     """Return ``samples`` delayed by 0, spacing, 2·spacing … as ``n`` columns of the same length."""
-    length = len(samples)
-    windows = sliding_window_view(np.concatenate((np.zeros(length), samples)), length)
-    return np.ascontiguousarray(windows[length - spacing * np.arange(n)].T)
+    windows = sliding_window_view(np.concatenate((np.zeros(n * spacing), samples)), len(samples))
+    return np.ascontiguousarray(windows[n * spacing - spacing * np.arange(n)].T)

@@ -27,9 +27,10 @@
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 typedef struct {
-    hsep_int preview, p, Np;
+    hsep_int horizon, p, Np; /* the error counts in the samples of the horizon; behind it a plan returns to x_d */
     hsep_int late;        /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_int n, n_pinned; /* splines of a plan, and the first ones, which stay as they were */
+    hsep_int n, n_pinned; /* splines of a plan, the first ones, which stay as they were, */
+    hsep_int acting;      /* and those that begin within the horizon */
     hsep_int place;       /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;      /* whether the averaged model judges plans, */
     hsep_int follows;     /* and whether it may plan */
@@ -50,9 +51,9 @@ typedef struct {
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
-    hsep_int command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
-    hsep_int x_pb;       /* (preview + late,) m, their prediction by the physics model, */
-    hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
+    hsep_int command;    /* (horizon + late,) m, commands predicted last, relative to the start, newest first */
+    hsep_int x_pb;       /* (horizon + late,) m, their prediction by the physics model, */
+    hsep_int e_h;        /* (horizon + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
     hsep_int W;          /* changes of x_h by the splines that are not pinned: of spline j from sample j spacing on,
                           * behind each other */
@@ -61,13 +62,13 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 33);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 34);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
     hsep_averaged *model;
     hsep_planner *planner;
-    const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
+    const hsep_real *spline; /* (horizon,) m/m, a spline filtered by the physics model */
     const hsep_real *x_d;    /* (preview,) m, commanded positions */
     /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
      * the last residuals measured, (p,) m, likewise */
@@ -93,9 +94,9 @@ HSEP_API void hsep_averaged_planner_begin(
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
+ * Cost: of a plan at most, with n splines that are not pinned and all = horizon + late samples, m^2 / 2 multiply-adds
  * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
- * of the physics model's programme; a Newton step of n preview p / 2 for each expert, n^2 preview / 4, 2 predictions,
+ * of the physics model's programme; a Newton step of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
  * and 5 steps of its programme. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
  * (m + 60) for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);

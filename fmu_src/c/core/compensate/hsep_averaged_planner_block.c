@@ -11,17 +11,20 @@ static hsep_real averaged_planner_lay_out(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
-    const hsep_real preview = (hsep_real)planner->preview, all = (hsep_real)parameters->n,
+    const hsep_int horizon = hsep_planner_horizon(planner->preview, planner->Np);
+    const hsep_int within = (horizon + planner->spacing - 1) / planner->spacing, acting = n < within ? n : within;
+    const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const hsep_int n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_real columns = (hsep_real)(n - n_pinned), coefficients = HSEP_N_DECIDED + (hsep_real)n;
-    const hsep_real longest = preview - (hsep_real)(planner->spacing * n_pinned);
+    const hsep_real columns = (hsep_real)(acting - n_pinned);
+    const hsep_real longest = (hsep_real)(horizon - planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_averaged_planner);
-    self->preview = planner->preview;
+    self->horizon = horizon;
     self->late = hsep_late(parameters->settings);
     self->p = parameters->settings->p;
     self->Np = planner->Np;
     self->n = n;
+    self->acting = acting;
     self->n_pinned = n_pinned;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
@@ -29,7 +32,7 @@ static hsep_real averaged_planner_lay_out(
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (hsep_real)self->p);
-    self->target = hsep_take(&end, preview);
+    self->target = hsep_take(&end, (hsep_real)planner->preview);
     self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
     self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
     self->physics = hsep_take_block(&end, filter);

@@ -6,6 +6,7 @@
 /* hybridsep/compensate/splines.py */
 #define HSEP_N_DECIDED 3
 #define HSEP_SPLINES_END 3
+#define HSEP_SPLINES_RETURN 25
 #define HSEP_SPLINES_RIDGE 1e-12
 
 /* hybridsep/compensate/qp.py */

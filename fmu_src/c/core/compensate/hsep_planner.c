@@ -9,6 +9,12 @@
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
+HSEP_API hsep_int hsep_planner_horizon(hsep_int preview, hsep_int Np)
+{
+    const hsep_int horizon = preview - preview * HSEP_SPLINES_RETURN / 100;
+    return horizon > Np ? horizon : Np;
+}
+
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
     const hsep_int half = parameters->Np / 2;
@@ -22,6 +28,7 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     const hsep_int n = hsep_splines_count(parameters->preview, parameters->spacing);
     hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
+    self->horizon = hsep_planner_horizon(parameters->preview, parameters->Np);
     self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
@@ -238,9 +245,10 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *v = hsep_planner_linear(self);
-    hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
+    hsep_splines_filtered_gram(splines, filtered, self->horizon, hsep_at(self, self->P));
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
-        v[j] = hsep_dot(filtered, target + j * splines->spacing, splines->preview - j * splines->spacing);
+        const hsep_int begin = j * splines->spacing;
+        v[j] = begin < self->horizon ? hsep_dot(filtered, target + begin, self->horizon - begin) : 0.0;
     }
     hsep_planner_complete(self, 0);
 }

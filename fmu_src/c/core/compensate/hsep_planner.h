@@ -28,7 +28,7 @@ typedef struct {
 } hsep_planner_parameters;
 
 typedef struct {
-    hsep_int Np;
+    hsep_int Np, horizon;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
     hsep_real jerk_weight;
@@ -45,7 +45,7 @@ typedef struct {
     hsep_int splines, interior;
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 20);
+HSEP_ASSERT_WORDS(hsep_planner, 21);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -70,6 +70,9 @@ HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
+/* Samples of a plan whose error counts: behind them it returns to x_d. */
+HSEP_API hsep_int hsep_planner_horizon(hsep_int preview, hsep_int Np);
+
 /* Splines that a bounded plan leaves as they are. */
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
@@ -84,8 +87,8 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self);
 
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
- * (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
- * n preview multiply-adds. */
+ * (horizon,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (horizon,). Cost:
+ * n horizon multiply-adds. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* Reduce that cost to the splines that are not pinned. */
