@@ -290,8 +290,8 @@ def _left(prediction: ExpertPrediction) -> Array:
 
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
-"""Of the solver, for the physics model's plan and the Newton step: a plan is judged by the model itself, and taken if it
-is better than the others. With a margin as small as rounding an end that exceeds a bound by a millionth would be no
+"""Of the solver, for the physics model's plan and the Newton step: a plan is judged by the model itself, and taken if
+it is better than the others. With a margin as small as rounding an end that exceeds a bound by a millionth would be no
 plan; with a larger one there may be none within the bounds.
 """
 
