@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Mapping
@@ -34,7 +35,15 @@ def fit(
     ] = None,
     Np: Annotated[
         int | None,
-        typer.Option("--Np", min=1, help="Samples of the controller's look-ahead; 100 ms if left out."),
+        typer.Option("--Np", min=1, help="Samples in a window of the predictor, its look-ahead; 100 ms if left out."),
+    ] = None,
+    look_ahead: Annotated[
+        str | None,
+        typer.Option(
+            "--look-ahead",
+            metavar="TIME",
+            help="What the controller has for a compensator, as 60ms; what the drive's model needs if left out.",
+        ),
     ] = None,
     p: Annotated[
         str | None,
@@ -78,7 +87,7 @@ def fit(
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
-    lags = [] if p is None else _numbers(p)
+    lags, ahead = [] if p is None else _numbers(p), None if look_ahead is None else _seconds(look_ahead)
     pairs = [] if cascade is None else [one.partition("=") for one in cascade.split(",")]
     gains = {gain.strip(): value for gain, _, value in pairs} or None
     found = [read_log(path, **reading.arguments()) for path in logs]
@@ -98,7 +107,7 @@ def fit(
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     with progress_bar(as_json) as advance:
-        given: dict[str, Any] = {"Np": Np, "p": lags, "cascade": gains, "name": machine, **known}
+        given: dict[str, Any] = {"Np": Np, "p": lags, "look_ahead": ahead, "cascade": gains, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
         result.build(folder, in_position=in_position, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
@@ -119,6 +128,18 @@ def _numbers(text: str) -> list[int]:
     except ValueError:
         raise ParameterError(f"--p must be whole numbers with commas, got {text!r}") from None
     return [PARAMETERS["p"].checked(one, "--p") for one in numbers]
+
+
+def _seconds(text: str) -> float:
+    """Return the seconds of a time, ``60ms`` or ``0.06s``; ParameterError if it is none."""
+    number, factor = (text[:-2], 1e-3) if text.endswith("ms") else (text.removesuffix("s"), 1.0)
+    try:
+        seconds = factor * float(number)
+    except ValueError:
+        seconds = math.nan
+    if not 0.0 < seconds < math.inf:
+        raise ParameterError(f"--look-ahead must be a time such as 60ms or 0.06s, got {text!r}")
+    return seconds
 
 
 def _print_fit(found: Fit) -> None:
@@ -142,6 +163,9 @@ def _print_fit(found: Fit) -> None:
         console.print(f"  {line}")
     window = f"{1e3 * settings.Np * settings.T_s:.4g} ms"
     console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}")
+    if found.machine.drive_limits is not None:
+        preview = found.machine.compensator_settings.preview or 0
+        console.print(f"A compensator looks preview = {preview} ahead ({1e3 * preview * settings.T_s:.4g} ms)")
     print_judged(judged, "Error on held-out samples", str(judged.replay.verdict()))
     for line in found.tracking.lines(judged.shown) if found.tracking else ():
         console.print(line)

@@ -295,7 +295,7 @@ it is better than the others. With a margin as small as rounding an end that exc
 plan; with a larger one there may be none within the bounds.
 """
 
-_REACH = 0.01
+_REACH = 0.1
 """Reach of friction's slope, relative to the model's velocity scale: a tangent is blind to a sign that changes
 nearby."""
 

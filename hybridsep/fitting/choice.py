@@ -48,10 +48,14 @@ def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
     return replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
 
 
-def settings_to_try(settings: PredictorSettings, p: Sequence[int] = ()) -> list[PredictorSettings]:
-    """Return the settings themselves and others with the same window, of numbers of lags ``p`` if some are given."""
+def settings_to_try(
+    settings: PredictorSettings, p: Sequence[int] = (), most: int = int(PARAMETERS["p"].maximum)
+) -> list[PredictorSettings]:
+    """Return the settings themselves and others with the same window.
+
+    They have numbers of lags ``p`` if some are given, others of at most ``most``.
+    """
     Np = settings.Np
-    most = int(PARAMETERS["p"].maximum)
     lags = dict.fromkeys([settings.p, *(p or (min(max(1, round(share * Np)), most) for share in _SHARES))])
     found = [replace(settings, p=p) for p in lags]
     found += [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
@@ -64,13 +68,14 @@ def choose_settings(
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
     p: Sequence[int] = (),
+    most: int = int(PARAMETERS["p"].maximum),
 ) -> tuple[PredictorSettings, tuple[Tried, ...]]:
     """Return the settings with the least error of causal replays over the training samples, and all that were tried.
 
-    The given ones, the default, are tried first, and stay unless others are better by 5 %; ``p`` as of
+    The given ones, the default, are tried first, and stay unless others are better by 5 %; ``p`` and ``most`` as of
     :func:`settings_to_try`.
     """
-    candidates, errors = settings_to_try(settings, p), []
+    candidates, errors = settings_to_try(settings, p, most), []
     for i, candidate in enumerate(candidates):
         try:
             errors.append(_trained_rms(model, candidate, recordings))

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike
 from ..base.errors import IdentificationError, ParameterError, listed
 from ..base.files import atomic_open, atomic_open_text, plain
 from ..base.metrics import html_table, line_plot
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, PredictorSettings
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_samples
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
 from ..fmi.archive import build_fmu
+from ..fmi.weights import restore_weights, weights_file
 from ..identify.model import IdentifiedModel, machine_of, of_cascade
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
@@ -144,7 +145,9 @@ class Fit:
 
         ``compensate`` is the best model allowed: ``"off"``, ``"physics"`` or ``"hybrid"``.
         """
-        return SepCompensator(self.predictor(), replace(self.machine.compensator_settings, compensate=compensate))
+        predictor = self.machine.new_predictor(self.machine.compensator_predictor)
+        restore_weights(predictor, weights_file(self.predictor()))
+        return SepCompensator(predictor, replace(self.machine.compensator_settings, compensate=compensate))
 
     def predict(self, x_d: ArrayLike) -> Prediction:
         """Return what is predicted, with what was learned, of a window ``(n,)`` from rest at its first command.
@@ -268,6 +271,7 @@ def fit(
     axis: str | None = None,
     Np: int | None = None,
     p: Sequence[int] = (),
+    look_ahead: float | None = None,
     cascade: Mapping[str, float] | None = None,
     name: str = "axis",
     progress: Progress | None = None,
@@ -289,9 +293,12 @@ def fit(
         positions, m if left out, names, and one of several axes. What is returned has positions in m, of a rotary axis
         in rad; its ``predict`` alone takes and gives the unit.
     Np : int, optional
-        Samples of the controller's look-ahead; 0.1 s of them if left out.
+        Samples in a window of the predictor, its look-ahead; 0.1 s of them if left out.
     p : sequence of int
-        Numbers of lags to choose from; some shares of ``Np`` if left out.
+        Numbers of lags to choose from; some shares of ``Np`` if left out, none longer than a compensator's window.
+    look_ahead : float, optional
+        That the controller has for a compensator, s; what the model needs if left out
+        (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`).
     cascade : mapping, optional
         Gains of the loop, by the names of :class:`~hybridsep.base.settings.Cascade`: the physics model is theirs, and
         what the log says of them is among the findings of the identification.
@@ -345,6 +352,7 @@ def fit(
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
     settings_to_try(default, p)  # which refuses what does not fit into the window
+    ahead = None if look_ahead is None else PARAMETERS["preview"].checked(round(look_ahead / T_s), "look_ahead / T_s")
 
     def stage(message: str, begin: float, end: float) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
@@ -358,7 +366,17 @@ def fit(
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    settings, choice = choose_settings(model, tried, default, stage("choose p and q", 0.4, 0.7), p)
+    if ahead is None:
+        ahead = model.look_ahead(T_s, default.input_hold)
+    # A compensator has shorter windows, and what the predictor has learned is to serve it, too
+    most = CompensatorSettings().window(ahead)
+    if look_ahead is not None and p and max(p) > most:
+        raise ParameterError(
+            f"p must be at most {most}, the samples in a window of a compensator that looks {look_ahead:g} s ahead, "
+            f"got {max(p)}"
+        )
+    default = replace(default, p=min(default.p, most))
+    settings, choice = choose_settings(model, tried, default, stage("choose p and q", 0.4, 0.7), p, most)
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=stage("judge on the second half", 0.7, 0.8))
     replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))
@@ -367,7 +385,7 @@ def fit(
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
-    machine = _machine(name, logs, model, settings, plant.entries, limits, required=bool(given_limits))
+    machine = _machine(name, logs, model, settings, ahead, plant.entries, limits, required=bool(given_limits))
     tracking = None
     if given_limits:
         estimate = stage("tracking error with compensation", 0.95, 1.0)
@@ -431,6 +449,7 @@ def _machine(
     logs: Sequence[Log],
     model: ModalModel,
     settings: PredictorSettings,
+    look_ahead: int,
     plant: Mapping[str, Any],
     limits: Mapping[str, Any],
     *,
@@ -440,6 +459,15 @@ def _machine(
     sections: dict[str, Any] = {"plant": {"kind": "identified", **plant}} if plant else {}
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
+    if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
+        given = CompensatorSettings(preview=look_ahead)
+        given = given.for_window(Np := given.window(look_ahead), look_ahead)
+        assert given.spacing is not None
+        if settings.p > Np:
+            Np = -(-settings.p // given.spacing) * given.spacing
+            given = replace(given, preview=None).for_window(Np, look_ahead)
+        numbers = {"Np": Np, "preview": given.preview, "spacing": given.spacing}
+        compensation["compensator"] = numbers
 
     def made(more: Mapping[str, Any]) -> Machine:
         return machine_of(

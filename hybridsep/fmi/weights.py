@@ -144,8 +144,9 @@ def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredic
 def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredictor:
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
-    It must have been trained for the machine: with its ``Np``, ``input_hold``, modes, and all settings on which weights
-    depend (:func:`_learned_settings`), those of its predictor or compensator as ``kind`` says.
+    It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
+    (:func:`_learned_settings`), those of its predictor or compensator as ``kind`` says. Its window may be another one:
+    weights that a predictor learned serve a compensator.
 
     Raises
     ------
@@ -160,7 +161,7 @@ def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredict
     compensates = kind == "SepCompensator"
     settings = machine.compensator_predictor if compensates else machine.predictor_settings
     found, expected = (  # by their names in the machine file
-        {"Np": one.Np, **_learned_settings(one, model), "input_hold": one.input_hold}
+        {**_learned_settings(one, model), "input_hold": one.input_hold}
         for one, model in ((trained.settings, trained.model), (settings, machine.model))
     )
     differing = [

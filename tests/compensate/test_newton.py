@@ -19,7 +19,7 @@ from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettin
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.newton import PlanModel
+from hybridsep.compensate.newton import AveragedPlanner, PlanModel
 from hybridsep.compensate.planning import RETRY, AveragedPlanning, ChosenPlan, runs_away
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
@@ -31,12 +31,13 @@ from hybridsep.predict.predictor import HybridPredictor
 
 AVERAGED = PredictorSettings(Np=50, p=20)
 STAGE = load_machine("als25010_x")
+SETTINGS = CompensatorSettings(preview=200, spacing=2, limits=DRIVE_LIMITS)
 
 
 def compensator(
     machine: Machine = STAGE, compensate: str = "hybrid", predictor: PredictorSettings = AVERAGED, **changes: object
 ) -> SepCompensator:
-    settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate, **changes)  # type: ignore[arg-type]
+    settings = replace(SETTINGS, compensate=compensate, **changes)  # type: ignore[arg-type]
     return machine.new_compensator(settings, predictor=predictor)
 
 
@@ -80,7 +81,7 @@ def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
 def test_the_slope_is_that_of_the_prediction(period: float) -> None:
     sep = SepCompensator.from_bytes(learned(period))
     x_d = moves()[:200]
-    model, basis = plan_model(sep, x_d), SplineBasis(200, 2)
+    model, basis = plan_model(sep, x_d), SplineBasis(200, 2, 200)
     changes = basis.values[:, 10:60:7]
     passed = basis.filtered(sep.predictor.physics_operator(200)[0])[:, 7:57:7]
     found = model.slope(model.predict(x_d), changes, passed, 0.0)
@@ -103,7 +104,7 @@ def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pyt
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200  # kept for other tests: not with what is set next
     monkeypatch.setattr(newton, "_APART", 1)  # the window is another one, and what is behind it
-    x_d, basis = moves()[: late + n], SplineBasis(n, 2)
+    x_d, basis = moves()[: late + n], SplineBasis(n, 2, n)
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
     np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])
@@ -139,7 +140,7 @@ def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
         return np.asarray(np.cos(turns * x))
 
     predictor = HybridPredictor(STAGE.model, AVERAGED, disturbances=(sine, cosine))
-    own = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS))
+    own = SepCompensator(predictor, SETTINGS)
     run(own)
     own.restart(0.0)
     known = SepCompensator.from_bytes(learned(2e-3))
@@ -179,7 +180,9 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
     assert sep.plan(x_d).state is SepState.HYBRID
     worse = np.full(3 + sep._basis.n_free, 1e-3)
     for cost in (math.inf, math.nan):
-        monkeypatch.setattr("hybridsep.compensate.newton.AveragedPlanner.plan", lambda *_, cost=cost: (worse, cost))
+        monkeypatch.setattr(
+            AveragedPlanner, "step", lambda _, start, *__, cost=cost: replace(start, coefficients=worse, cost=cost)
+        )
         plan = sep.plan(x_d)
         assert plan.state is SepState.PHYSICS
         np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)
@@ -259,7 +262,7 @@ def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
 def test_positions_in_another_unit_are_commanded_the_same() -> None:
     def commands(unit: float) -> Array:
         limits = Limits(*(unit * limit for limit in (0.1, 16.0, 5000.0)))
-        settings = CompensatorSettings(limits=limits, change_max=1e-3 * unit)
+        settings = replace(SETTINGS, limits=limits, change_max=1e-3 * unit)
         sep = SepCompensator(
             HybridPredictor(STAGE.model, PredictorSettings(Np=50, p=20, lam=1e-12 * unit**2)), settings
         )

@@ -44,7 +44,7 @@ def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, li
 
 @pytest.mark.slow
 def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() -> None:
-    basis, n, step = SplineBasis(80, 4), 80, 1e-5
+    basis, n, step = SplineBasis(80, 4, 80), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
     x_d, before, rest = 0.01 + np.cumsum(steps), np.full(3, 0.01), np.zeros(basis.values.shape[1])
     of = {keep: DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=keep) for keep in (False, True)}
@@ -64,7 +64,7 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
 @given(st.integers(0, 2**31))
 def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    basis = SplineBasis(80, 4)
+    basis = SplineBasis(80, 4, 80)
     rest: Array = np.asarray(2e-4 * rng.normal(size=basis.values.shape[1]))
     bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=True)
     found = bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest)

@@ -144,23 +144,29 @@ def test_bad_entries_are_refused_by_name(tmp_path: Path, old: str, new: str, mes
 
 
 def test_the_compensators_settings_are_the_recommended_ones() -> None:
-    for name, change_max in {"spring_mass_damper": 1e-3, "als25010_x": 1e-3, "als25010_y": 1.5e-3}.items():
+    for name, (preview, change_max) in {
+        "spring_mass_damper": (61, 1e-3),
+        "als25010_x": (74, 1e-3),
+        "als25010_y": (84, 1.5e-3),
+    }.items():
         machine = load_machine(name)
         compensator = machine.new_compensator()
-        assert compensator.predictor.settings == PredictorSettings(Np=50)
-        paper = {"averaging": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
+        assert compensator.predictor.settings == PredictorSettings(Np=10, p=10)
+        paper = {"averaging": False, "Np": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
-        assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=change_max)
+        expected = CompensatorSettings(preview=preview, spacing=1, limits=limits, change_max=change_max)
+        assert compensator.settings == expected
         assert machine.new_predictor().Np == 100
 
 
+PREVIEW = 40
 COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk = 900.0\n\n[compensator]\n"
 
 
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
-    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=200, spacing=2).to_fmi()
-    expected |= {**PredictorSettings(Np=50, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
+    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=PREVIEW, spacing=1).to_fmi()
+    expected |= {**PredictorSettings(Np=10, p=10, T_s=0.002).to_fmi(), "dead_time": 0}
     assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
     entries += "no_reversal = false\n"
@@ -197,11 +203,23 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
         alone.fmi_compensator_parameters()
 
 
-@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (800, 1600, 16), (1900, 2000, 20)])
-def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int, preview: int, spacing: int) -> None:
-    text = COMPENSATED.replace("[compensator]\n", "").replace("Np = 50", f"Np = {Np}")
-    compensator = load_machine(write(tmp_path, text)).new_compensator()
-    assert (compensator.predictor.Np, compensator.preview, compensator.spacing) == (Np, preview, spacing)
+@pytest.mark.parametrize(
+    ("entries", "expected"),
+    [
+        ("", (PREVIEW, 1, 10, 10)),
+        ("preview = 300", (300, 3, 30, 20)),
+        ("preview = 60", (60, 1, 10, 10)),
+        ("preview = 8", (8, 1, 1, 1)),
+        ("Np = 50", (50 + 3 * PREVIEW // 4, 1, 50, 20)),
+        ("Np = 1900\nspacing = 20", (1983, 20, 1900, 20)),
+    ],
+)
+def test_preview_spacing_and_window_follow_from_each_other(
+    tmp_path: Path, entries: str, expected: tuple[int, ...]
+) -> None:
+    compensator = load_machine(write(tmp_path, COMPENSATED + entries + "\n")).new_compensator()
+    settings = compensator.predictor.settings
+    assert (compensator.preview, compensator.spacing, settings.Np, settings.p) == expected
 
 
 @pytest.mark.parametrize(
@@ -211,10 +229,10 @@ def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int,
         ("lambda = 0", r"compensator.lambda: lambda must be 1e-40 … 1e\+12 m2, got 0"),
         ("change_max = 1e-3", r"compensator.change_max is not an entry"),
         ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be true or false, got 2"),
-        ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),
-        ("Np = 60\npreview = 70", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 71, got 70 \(p, q of "),
+        ("Np = 50\nspacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3$"),
+        ("Np = 60\npreview = 66", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 67, got 66$"),
         ("Np = 20\np = 5\nq = 20", r"compensator: q must be 0 … Np − 1 = 19, got 20; lower q or raise Np$"),
-        ("Np = 10", r"compensator: p must be 1 … Np = 10, got 20; .* \(p, q of \[predictor\]\)"),
+        ("Np = 10\np = 20", r"compensator: p must be 1 … Np = 10, got 20; lower p or raise Np$"),
     ],
 )
 def test_bad_entries_of_the_compensator_are_refused_by_name(tmp_path: Path, entries: str, message: str) -> None:
@@ -225,10 +243,9 @@ def test_bad_entries_of_the_compensator_are_refused_by_name(tmp_path: Path, entr
 def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
     long = GOOD.replace("Np = 50", "Np = 5000")
     assert load_machine(write(tmp_path, long)).predictor_settings.Np == 5000
-    expected = r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5011, got 2000 \(Np, p, q of \[predictor\]\)"
-    for more in ("[compensator]\n", "[drive_limits]\nvelocity = 1\nacceleration = 1\njerk = 1\n"):
-        with pytest.raises(MachineError, match=expected):
-            load_machine(write(tmp_path, f"{long}\n{more}"))
+    assert load_machine(write(tmp_path, f"{long}\n[compensator]\n")).compensator_predictor.Np == 10
+    with pytest.raises(MachineError, match=r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5007, got 2000$"):
+        load_machine(write(tmp_path, f"{long}\n[compensator]\nNp = 5000\n"))
 
 
 def test_without_drive_limits_there_is_a_compensator_but_no_fmu(tmp_path: Path) -> None:

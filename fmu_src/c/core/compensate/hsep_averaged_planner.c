@@ -399,7 +399,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(8, work.predict);
             averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
             self->cost_of_physics = averaged_planner_cost(self, task, of_physics);
-            self->is_last = averaged_planner_better(self->cost, self->cost_of_physics);
+            self->is_last = (hsep_int)averaged_planner_better(self->cost, self->cost_of_physics);
             self->samples = 0;
         }
         if (self->follows && !self->is_last) {

@@ -28,25 +28,25 @@
 
 typedef struct {
     hsep_int horizon, p, Np; /* the error counts in the samples of the horizon; behind it a plan returns to x_d */
-    hsep_int late;        /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_int n, n_pinned; /* splines of a plan, the first ones, which stay as they were, */
-    hsep_int acting;      /* and those that begin within the horizon */
-    hsep_int place;       /* yield behind which the plan goes on; 0: at its beginning */
-    hsep_int judges;      /* whether the averaged model judges plans, */
-    hsep_int follows;     /* and whether it may plan */
-    hsep_int tries;       /* lengths of the Newton step that were tried */
-    hsep_int samples;     /* samples that are predicted, */
-    hsep_int spline;      /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
-    hsep_int solving;     /* whether a bounded programme is being solved */
-    hsep_int planned;     /* model of the plan: 0 none, 1 physics, 2 averaged */
-    hsep_int paused;      /* windows that the averaged model does not plan, now */
-    hsep_int pause;       /* and after the next of its plans that runs away */
-    hsep_int is_last;     /* whether the remainder of the last plan is better than the physics model's plan */
-    hsep_real cost;       /* m2, of the best plan so far, */
+    hsep_int late;           /* samples before the window that are not measured yet: they are predicted, too */
+    hsep_int n, n_pinned;    /* splines of a plan, the first ones, which stay as they were, */
+    hsep_int acting;         /* and those that begin within the horizon */
+    hsep_int place;          /* yield behind which the plan goes on; 0: at its beginning */
+    hsep_int judges;         /* whether the averaged model judges plans, */
+    hsep_int follows;        /* and whether it may plan */
+    hsep_int tries;          /* lengths of the Newton step that were tried */
+    hsep_int samples;        /* samples that are predicted, */
+    hsep_int spline;         /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
+    hsep_int solving;        /* whether a bounded programme is being solved */
+    hsep_int planned;        /* model of the plan: 0 none, 1 physics, 2 averaged */
+    hsep_int paused;         /* windows that the averaged model does not plan, now */
+    hsep_int pause;          /* and after the next of its plans that runs away */
+    hsep_int is_last;        /* whether the remainder of the last plan is better than the physics model's plan */
+    hsep_real cost;          /* m2, of the best plan so far, */
     hsep_real cost_of_physics; /* and of the physics model's */
-    hsep_real start;      /* m, position of rest */
-    hsep_real next;       /* multiply-adds of the next part, 0: the plan is made; */
-    hsep_real left;       /* and that this part and all after it take at most */
+    hsep_real start;           /* m, position of rest */
+    hsep_real next;            /* multiply-adds of the next part, 0: the plan is made; */
+    hsep_real left;            /* and that this part and all after it take at most */
     /* Offsets in words from the beginning of the struct */
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
