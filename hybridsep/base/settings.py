@@ -345,11 +345,12 @@ class CompensatorSettings(Settings):
     def window(self, look_ahead: int) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
 
-        It is at least 10, as short ones leave a controller no time to plan, and a multiple of ``spacing``.
+        It is a multiple of ``spacing``, and at least 20, or a quarter of a short preview: a controller plans in half of
+        it, and 20 lags fit into it, with which what is learned serves a predictor with a longer window, too.
         """
         preview, spacing = self.preview or look_ahead, self.spacing or max(1, round((self.preview or look_ahead) / 100))
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
-        return spacing * min(most, max(-(-10 // spacing), round(preview / 10 / spacing)))
+        return spacing * min(most, math.ceil(max(min(20, preview / 4), preview / 10) / spacing))
 
     def for_window(self, Np: int, look_ahead: int) -> CompensatorSettings:
         """Return these settings for windows of ``Np`` samples, defaults filled in.

@@ -133,7 +133,7 @@ def taught(machine: Machine, recordings: Sequence[Recording], fastest: float) ->
 
     ``fastest``, m/s, is the largest velocity of their commands.
     """
-    predictor = HybridPredictor(machine.model, machine.compensator_predictor)
+    predictor = HybridPredictor(machine.model, machine.predictor_settings)
     residual = cast(AveragedModel, predictor.residual)
     learned = replace(residual.learned, velocity_scale=_SCALE * fastest)
     predictor.state = replace(predictor.state, residual=replace(residual, learned=learned))

@@ -145,13 +145,13 @@ def test_bad_entries_are_refused_by_name(tmp_path: Path, old: str, new: str, mes
 
 def test_the_compensators_settings_are_the_recommended_ones() -> None:
     for name, (preview, change_max) in {
-        "spring_mass_damper": (61, 1e-3),
-        "als25010_x": (74, 1e-3),
+        "spring_mass_damper": (80, 1e-3),
+        "als25010_x": (80, 1e-3),
         "als25010_y": (84, 1.5e-3),
     }.items():
         machine = load_machine(name)
         compensator = machine.new_compensator()
-        assert compensator.predictor.settings == PredictorSettings(Np=10, p=10)
+        assert compensator.predictor.settings == PredictorSettings(Np=20, p=20)
         paper = {"averaging": False, "Np": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
@@ -160,13 +160,13 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
         assert machine.new_predictor().Np == 100
 
 
-PREVIEW = 40
+PREVIEW = 80
 COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk = 900.0\n\n[compensator]\n"
 
 
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
     expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=PREVIEW, spacing=1).to_fmi()
-    expected |= {**PredictorSettings(Np=10, p=10, T_s=0.002).to_fmi(), "dead_time": 0}
+    expected |= {**PredictorSettings(Np=20, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
     assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
     entries += "no_reversal = false\n"
@@ -206,9 +206,9 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
 @pytest.mark.parametrize(
     ("entries", "expected"),
     [
-        ("", (PREVIEW, 1, 10, 10)),
+        ("", (PREVIEW, 1, 20, 20)),
         ("preview = 300", (300, 3, 30, 20)),
-        ("preview = 60", (60, 1, 10, 10)),
+        ("preview = 60", (60, 1, 15, 15)),
         ("preview = 8", (8, 1, 1, 1)),
         ("Np = 50", (50 + 3 * PREVIEW // 4, 1, 50, 20)),
         ("Np = 1900\nspacing = 20", (1983, 20, 1900, 20)),
@@ -243,7 +243,7 @@ def test_bad_entries_of_the_compensator_are_refused_by_name(tmp_path: Path, entr
 def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
     long = GOOD.replace("Np = 50", "Np = 5000")
     assert load_machine(write(tmp_path, long)).predictor_settings.Np == 5000
-    assert load_machine(write(tmp_path, f"{long}\n[compensator]\n")).compensator_predictor.Np == 10
+    assert load_machine(write(tmp_path, f"{long}\n[compensator]\n")).compensator_predictor.Np == 20
     with pytest.raises(MachineError, match=r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5007, got 2000$"):
         load_machine(write(tmp_path, f"{long}\n[compensator]\nNp = 5000\n"))
 
