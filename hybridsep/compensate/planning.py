@@ -332,7 +332,8 @@ class AveragedPlanning(Planning):
             last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
             is_last = is_better(last.cost, of_physics.cost)
             if most is SepState.HYBRID and not self.paused:
-                bounds, start = self.limits(preview, may_turn=True, change=change), last if is_last else of_physics
+                bounds = self.limits(preview, may_turn=True, change=change)
+                start = planner.point(previous_plan) if is_last else of_physics
                 hybrid = planner.step(start, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
                     values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.basis.horizon)

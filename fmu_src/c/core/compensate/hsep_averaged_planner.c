@@ -404,11 +404,12 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         }
         if (self->follows && !self->is_last) {
             self->cost = self->cost_of_physics;
-        } else if (self->follows) { /* it was predicted before */
+        } else if (self->follows) { /* predicted last, with the variances that all plans have */
             AVERAGED_PLANNER_YIELD(9, work.predict);
             averaged_planner_predict(self, task, rest, all / HSEP_AVERAGED_AT_FIRST, 0);
             AVERAGED_PLANNER_YIELD(10, work.predict);
             averaged_planner_predict(self, task, rest, all - self->samples, 0);
+            self->cost = averaged_planner_cost(self, task, rest);
         }
 
         /* A Newton step from there */
