@@ -223,7 +223,7 @@ class SepCompensator:
         chosen = self._planning.choose(predictor, preview, compensate)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, path=command[: self._basis.horizon], scales=chosen.scales)
+        prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
         self._pending = PendingPlan(
             chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.runs_away
         )

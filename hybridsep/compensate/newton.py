@@ -122,10 +122,11 @@ class PlanModel:
     late : (n_late,) array, m
         Commands between there and the horizon, relative to the start.
     start : float, m
-    x_d, path : (n,) array, m
+    x_d : (n,) array, m
         Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
-        last plan; and unmodified commands.
-        Both relative to the start.
+        last plan, relative to the start.
+    path : (preview,) array, m
+        Unmodified commands, likewise.
 
     Attributes
     ----------
@@ -162,7 +163,8 @@ class PlanModel:
         They are, if they exceed the fastest motion so far by ``factor``. Both count, as commands may have corners that
         no drive follows, and a model may overshoot them.
         """
-        window = self._window(self._path[len(self._late) :])
+        late, n = len(self._late), len(self.of_previous_plan.e_h)
+        window = self._window(self._path[late:n])
         fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
         return not fastest <= factor * self._model.learned.fastest
 

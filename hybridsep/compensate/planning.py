@@ -314,21 +314,21 @@ class AveragedPlanning(Planning):
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
         assert predictor.start is not None
-        path = preview.command[: self.basis.horizon] - predictor.start
-        model = self._model(predictor, path, preview)
+        path = preview.command - predictor.start
+        model, x_d = self._model(predictor, path, preview), path[: self.basis.horizon]
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.basis.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), TOLERANCE)
+        physics = self.affine_plan(g, free, x_d, preview, self.limits(preview, change=change), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if predictor.k < predictor.n_init or not model.has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
-            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
+            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, x_d, preview.delta_before)
             last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
             is_last = is_better(last.cost, of_physics.cost)
             if most is SepState.HYBRID and not self.paused:
@@ -362,5 +362,5 @@ class AveragedPlanning(Planning):
         assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.delta(preview.previous_plan)
+            x_d = path[: self.basis.horizon] + self.basis.delta(preview.previous_plan)
             return PlanModel(averaged, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)

@@ -13,6 +13,7 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
         .n = parameters->horizon + hsep_late(&parameters->settings),
+        .ahead = parameters->preview + hsep_late(&parameters->settings),
         .planned = parameters->planned};
 }
 
