@@ -160,7 +160,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.Monk
         return found
 
     monkeypatch.setattr("hybridsep.compensate.planning.solve", compare)
-    cosimulate(compensator(limits=PAPER_LIMITS), plant(), commanded()[:2500], encoder=Encoder(5e-6, 0))
+    cosimulate(compensator(limits=PAPER_LIMITS), plant(), commanded()[:3500], encoder=Encoder(5e-6, 0))
     assert len(bounded) >= 15
     assert np.max(np.abs(bounded)) <= 1e-5
 

@@ -200,6 +200,7 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
     const hsep_real cost = averaged_planner_cost(self, task, c);
     self->tries++;
     if (averaged_planner_better(cost, self->cost)) {
+        self->gains = 1;
         self->tries = HSEP_AVERAGED_TRIES;
         self->cost = cost;
         averaged_planner_copy(self, best, c);
@@ -326,11 +327,13 @@ static hsep_real averaged_planner_left(
                 (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
-        left += work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor + work->solve +
-                (hsep_real)averaged_planner_tolerance.steps * parts + 2.0 * (1 + HSEP_AVERAGED_TRIES) * work->predict;
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
+                           work->solve + (hsep_real)averaged_planner_tolerance.steps * parts +
+                           2.0 * HSEP_AVERAGED_TRIES * work->predict;
         for (hsep_int j = pinned; j < self->acting; j += HSEP_PHYSICS_ABREAST) {
-            left += hsep_linearised_work(linearised, task->model, j * spacing);
+            newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
+        left += 2.0 * work->predict + HSEP_NEWTON_STEPS * newton;
     }
     return left;
 }
@@ -412,12 +415,16 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->cost = averaged_planner_cost(self, task, rest);
         }
 
-        /* A Newton step from there */
-        self->tries = HSEP_AVERAGED_TRIES;
+        /* Newton steps from there, as long as they lower the cost */
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), self->is_last ? rest : of_physics);
             averaged_planner_copy(self, c, rest);
             hsep_planner_follow_friction(planner);
+        }
+        self->gains = self->follows;
+        for (self->steps = 0; self->gains && self->steps < HSEP_NEWTON_STEPS; self->steps++) {
+            self->gains = 0;
+            averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(11, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = self->n_pinned; self->spline < self->acting;) {
@@ -431,23 +438,25 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             }
             AVERAGED_PLANNER_YIELD(14, work.factor);
             hsep_planner_complete(planner, self->n_pinned);
-            self->tries = hsep_planner_factor(planner, 1) ? 0 : HSEP_AVERAGED_TRIES;
-        }
-        if (self->tries == 0) {
+            if (!hsep_planner_factor(planner, 1)) {
+                break;
+            }
             AVERAGED_PLANNER_YIELD(15, work.solve);
-            self->tries = averaged_planner_solve(self, task) ? 0 : HSEP_AVERAGED_TRIES;
+            if (!averaged_planner_solve(self, task)) {
+                break;
+            }
             while (self->solving) {
                 AVERAGED_PLANNER_YIELD(16, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
-        }
-        while (self->tries < HSEP_AVERAGED_TRIES) {
-            self->samples = 0;
-            AVERAGED_PLANNER_YIELD(17, work.predict);
-            averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(18, work.predict);
-            averaged_planner_predict(self, task, c, all - self->samples, 0);
-            averaged_planner_judge(self, task);
+            for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
+                self->samples = 0;
+                AVERAGED_PLANNER_YIELD(17, work.predict);
+                averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
+                AVERAGED_PLANNER_YIELD(18, work.predict);
+                averaged_planner_predict(self, task, c, all - self->samples, 0);
+                averaged_planner_judge(self, task);
+            }
         }
 
         /* The best of them */

@@ -1,8 +1,8 @@
-/* Planner on the residual model with averaging, by a Newton step that follows the slope of its disturbances.
+/* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Once it has learned, the averaged model judges all plans: the remainder of the last one, the physics model's,
- * and its own, which a Gauss-Newton step finds from the better of these two: it solves the quadratic programme of the
+ * and its own, which two Gauss-Newton steps find from the better of these two: each solves the quadratic programme of the
  * model linearised there, and goes towards its minimum as far as lowers the cost. The best is taken. Where its own asks for a larger change than
  * compensation is made for, it is wrong, and plans none for a time, which doubles.
  *
@@ -21,7 +21,7 @@
 #include "hsep_real.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_AVERAGED_TRIES 2    /* lengths of the Newton step that are tried, */
+#define HSEP_AVERAGED_TRIES 2    /* lengths of a Newton step that are tried, */
 #define HSEP_AVERAGED_VARIED 4   /* variances that are computed in a part, */
 #define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
@@ -34,7 +34,9 @@ typedef struct {
     hsep_int place;          /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;         /* whether the averaged model judges plans, */
     hsep_int follows;        /* and whether it may plan */
-    hsep_int tries;          /* lengths of the Newton step that were tried */
+    hsep_int steps;          /* Newton steps done, */
+    hsep_int gains;          /* whether the last one lowered the cost, */
+    hsep_int tries;          /* and lengths of it that were tried */
     hsep_int samples;        /* samples that are predicted, */
     hsep_int spline;         /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
     hsep_int solving;        /* whether a bounded programme is being solved */
@@ -62,7 +64,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 34);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 36);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -96,8 +98,8 @@ HSEP_API void hsep_averaged_planner_begin(
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are not pinned and all = horizon + late samples, m^2 / 2 multiply-adds
  * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
- * of the physics model's programme; a Newton step of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
- * and 5 steps of its programme. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
+ * of the physics model's programme; 2 Newton steps of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
+ * and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
  * (m + 60) for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 
