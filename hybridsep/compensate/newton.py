@@ -1,12 +1,12 @@
 """Plan on the averaged model, by Newton steps that follow the slope of its disturbances.
 
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. Two Gauss-Newton steps begin at the
-better of the remainder of the last plan and the physics model's plan: each solves the quadratic programme of the model
-linearised there, and goes to its minimum, or less far if only that lowers the cost; the next window goes on from there.
-The first samples of a plan follow the last plan, and the plan is made while they act; the steps of the solver are
-limited, so that the work fits into these samples. Predictions are shrunk by their variance, so where the model knows
-nothing the plan is the physics model's.
+friction that follows the command changes its sign with the command's velocity. At most three Gauss-Newton steps begin
+at the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
+and goes to its minimum, or less far if only that lowers the cost; the next window goes on from there. The first samples
+of a plan follow the last plan, and the plan is made while they act; the steps of the solver are limited, so that the
+work fits into these samples. Predictions are shrunk by their variance, so where the model knows nothing the plan is the
+physics model's.
 
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
 of the stack, and the shrinking by the variance, are held constant:
@@ -297,12 +297,9 @@ it is better than the others. With a margin as small as rounding an end that exc
 plan; with a larger one there may be none within the bounds.
 """
 
-_REACH = 0.1
-"""Reach of friction's slope, relative to the model's velocity scale: a tangent is blind to a sign that changes
-nearby."""
-
-_STEPS = 2
-"""Newton steps of a plan: with one the stage's X axis, warm, has 1.5 times the error."""
+_REACHES = (0.1, 0.01, 0.0)
+"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+that changes nearby. With two steps, or one reach for all, the stage's Y axis, warm, has ten times the error."""
 
 _LENGTHS = (1.0, 0.3)
 """Lengths of a step that are tried, relative to the way to the minimum."""
@@ -360,14 +357,14 @@ class AveragedPlanner:
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array
     ) -> PlannedPoint:
         """Return the plan behind Newton steps, as long as they lower the cost; parameters as of :meth:`step`."""
-        for _ in range(_STEPS):
-            before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed)
+        for reach in _REACHES:
+            before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed, reach)
             if start is before:
                 break
         return start
 
     def step(
-        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array
+        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array, reach: float
     ) -> PlannedPoint:
         """Return the plan behind a Newton step; the start itself, if none is better.
 
@@ -382,10 +379,12 @@ class AveragedPlanner:
             Coefficients that the plan does not change.
         passed : (horizon, n_free) array
             Free splines filtered by ``G_pb``.
+        reach : float
+            Of friction's slope, as of :meth:`PlanModel.slope`.
         """
         splines, third = self._basis.values[: self._basis.horizon, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         decided, at = np.split(start.coefficients, [N_DECIDED])
-        W = self._model.slope(start.prediction, splines, passed, _REACH)
+        W = self._model.slope(start.prediction, splines, passed, reach)
         P = W.T @ W + self._jerk_weight * (third.T @ third)
         target = self._x_d - start.x_h + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))

@@ -333,7 +333,7 @@ class AveragedPlanning(Planning):
             is_last = is_better(last.cost, of_physics.cost)
             if most is SepState.HYBRID and not self.paused:
                 bounds = self.limits(preview, may_turn=True, change=change)
-                start = planner.point(previous_plan) if is_last else of_physics
+                start = planner.point(previous_plan)
                 hybrid = planner.plan(start, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
                     values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.basis.horizon)

@@ -160,7 +160,7 @@ class ModalModel:
         """Return the samples ahead that a compensator needs to plan, :data:`_LOOK_AHEAD_MAX` at most.
 
         A change of the command must act within its plan: three times the time in which the response to a step, dead
-        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode, and 80 samples.
+        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode, and 200 samples.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class ModalModel:
         reached = np.abs(step) >= 0.95 * abs(self.dc_gain)
         rise = int(np.argmax(reached)) if reached.any() else len(step)
         period = 1.0 / min(mode.f_n for mode in self.modes) / T_s
-        return min(_LOOK_AHEAD_MAX, max(80, 3 * rise, math.ceil(1.5 * period)))
+        return min(_LOOK_AHEAD_MAX, max(200, 3 * rise, math.ceil(1.5 * period)))
 
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.

@@ -150,7 +150,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert "planned by the hybrid 9" in out
     # Preview and knots follow a window of another length.
     short = write_rows(tmp_path / "short.csv", commanded()[:400], commanded()[:400])
-    sizes = [word for entry in ("Np=25", "p=20", "q=3") for word in ("--set", f"compensator.{entry}")]
+    sizes = [word for entry in ("Np=24", "p=20", "q=3") for word in ("--set", f"compensator.{entry}")]
     assert hybridsep("cosim", "--compensate", "physics", *sizes, "--trajectory", short)[0] == 0
 
 
@@ -202,7 +202,7 @@ def test_what_two_axes_do_not_take(hybridsep: Run, arguments: tuple[str, ...], s
 def test_two_axes_are_delayed_alike(hybridsep: Run, tmp_path: Path) -> None:
     text = (data_folder("models") / "als25010_y.toml").read_text(encoding="utf-8")
     y = tmp_path / "y.toml"
-    y.write_text(text.replace("[compensator] ", "[compensator]\npreview = 150 #"), encoding="utf-8")
+    y.write_text(text.replace("preview = 200", "preview = 150"), encoding="utf-8")
     status, _, err = hybridsep("cosim", "als25010_x", y, "--path", "part.ngc")
     assert (status, "one preview, got 0.001 s and 200 samples and 0.001 s and 150 samples" in err) == (2, True), err
 
@@ -219,9 +219,9 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 0
     assert json.loads(out)["tracking_rms_um"] < 2.5
     assert json.loads(out)["share_hybrid"] == 1.0
-    status, _, err = hybridsep("cosim", *options)
+    status, _, err = hybridsep("cosim", *options, "--set", "predictor.p=20")
     assert status == 2
-    assert "trained.state was not trained for machine spring_mass_damper: it has Np = 50 instead of 100" in err
+    assert "trained.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
     assert hybridsep("build", "SepCompensator", "FeedDrive", *options, "--out", tmp_path)[0] == 0
     with zipfile.ZipFile(tmp_path / "SepCompensator.fmu") as archive:
         assert "resources/weights.bin" in archive.namelist()

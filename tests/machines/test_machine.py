@@ -155,12 +155,12 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
         assert machine.new_predictor().Np == 100
 
 
-PREVIEW = 80
+PREVIEW = 200
 COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk = 900.0\n\n[compensator]\n"
 
 
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
-    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=PREVIEW, spacing=1).to_fmi()
+    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=PREVIEW, spacing=2).to_fmi()
     expected |= {**PredictorSettings(Np=20, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
     assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
@@ -201,12 +201,12 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
 @pytest.mark.parametrize(
     ("entries", "expected"),
     [
-        ("", (PREVIEW, 1, 20, 20)),
+        ("", (PREVIEW, 2, 20, 20)),
         ("preview = 300", (300, 3, 30, 20)),
         ("preview = 60", (60, 1, 15, 15)),
         ("preview = 8", (8, 1, 1, 1)),
-        ("Np = 50", (50 + 3 * PREVIEW // 4, 1, 50, 20)),
-        ("Np = 1900\nspacing = 20", (1983, 20, 1900, 20)),
+        ("Np = 50", (PREVIEW, 2, 50, 20)),
+        ("Np = 1900\nspacing = 20", (2000, 20, 1900, 20)),
     ],
 )
 def test_preview_spacing_and_window_follow_from_each_other(
@@ -239,7 +239,7 @@ def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
     long = GOOD.replace("Np = 50", "Np = 5000")
     assert load_machine(write(tmp_path, long)).predictor_settings.Np == 5000
     assert load_machine(write(tmp_path, f"{long}\n[compensator]\n")).compensator_predictor.Np == 20
-    with pytest.raises(MachineError, match=r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5007, got 2000$"):
+    with pytest.raises(MachineError, match=r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5011, got 2000$"):
         load_machine(write(tmp_path, f"{long}\n[compensator]\nNp = 5000\n"))
 
 

@@ -110,7 +110,7 @@ def test_the_papers_compensator_refuses_a_delay() -> None:
 def compensated(delay: int, compensate: str = "hybrid", n_runs: int = 2) -> list[Run]:
     """Return a cold and a warm run, or the cold one, behind a compensator that knows by how much its sensor is late."""
     machine = load_machine("als25010_x")
-    settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate)
+    settings = CompensatorSettings(preview=200, spacing=2, limits=DRIVE_LIMITS, compensate=compensate)
     assert machine.plant is not None
     sep = machine.new_compensator(settings, predictor=PredictorSettings(Np=50, p=20, measurement_delay=delay))
     runs = []

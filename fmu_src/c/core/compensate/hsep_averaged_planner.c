@@ -6,9 +6,11 @@
 #include <stddef.h>
 #include <string.h>
 
+static const hsep_real averaged_planner_reaches[] = {HSEP_NEWTON_REACHES};
 static const hsep_real averaged_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
 static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE};
 
+HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
 /* Whether a plan costs less than another; not if it is NaN. */
@@ -112,7 +114,7 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
     const hsep_real *e_h = hsep_at(self, self->e_h);
     hsep_real *target = hsep_at(self, self->target);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
-    hsep_linearised_at(linearised, task->model, command, x_pb, HSEP_NEWTON_REACH);
+    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
     for (hsep_int k = 0; k < self->horizon; k++) { /* x_d - x_h, to which W c is added */
         const hsep_int j = self->horizon - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -333,7 +335,7 @@ static hsep_real averaged_planner_left(
         for (hsep_int j = pinned; j < self->acting; j += HSEP_PHYSICS_ABREAST) {
             newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
-        left += 2.0 * work->predict + HSEP_NEWTON_STEPS * newton;
+        left += 2.0 * work->predict + HSEP_AVERAGED_STEPS * newton;
     }
     return left;
 }
@@ -394,7 +396,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
 
-        /* The better of the two */
+        /* Which of the two is better */
         self->samples = 0;
         if (self->judges) {
             AVERAGED_PLANNER_YIELD(7, work.predict);
@@ -405,9 +407,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->is_last = (hsep_int)averaged_planner_better(self->cost, self->cost_of_physics);
             self->samples = 0;
         }
-        if (self->follows && !self->is_last) {
-            self->cost = self->cost_of_physics;
-        } else if (self->follows) { /* predicted last, with the variances that all plans have */
+        if (self->follows) { /* predicted last, with the variances that all plans have */
             AVERAGED_PLANNER_YIELD(9, work.predict);
             averaged_planner_predict(self, task, rest, all / HSEP_AVERAGED_AT_FIRST, 0);
             AVERAGED_PLANNER_YIELD(10, work.predict);
@@ -415,14 +415,14 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->cost = averaged_planner_cost(self, task, rest);
         }
 
-        /* Newton steps from there, as long as they lower the cost */
+        /* Newton steps from the remainder of the last plan, as long as they lower the cost */
         if (self->follows) {
-            averaged_planner_copy(self, hsep_at(self, self->best), self->is_last ? rest : of_physics);
+            averaged_planner_copy(self, hsep_at(self, self->best), rest);
             averaged_planner_copy(self, c, rest);
             hsep_planner_follow_friction(planner);
         }
         self->gains = self->follows;
-        for (self->steps = 0; self->gains && self->steps < HSEP_NEWTON_STEPS; self->steps++) {
+        for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(11, work.linearise);

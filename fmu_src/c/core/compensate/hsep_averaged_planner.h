@@ -1,9 +1,9 @@
 /* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
- * delta. Once it has learned, the averaged model judges all plans: the remainder of the last one, the physics model's,
- * and its own, which two Gauss-Newton steps find from the better of these two: each solves the quadratic programme of the
- * model linearised there, and goes towards its minimum as far as lowers the cost. The best is taken. Where its own asks for a larger change than
+ * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the linearised model, and goes
+ * towards its minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
+ * physics model's, and the remainder of the last one; the best is taken. Where its own asks for a larger change than
  * compensation is made for, it is wrong, and plans none for a time, which doubles.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
@@ -21,6 +21,7 @@
 #include "hsep_real.h"
 #include "hsep_averaged_model.h"
 
+#define HSEP_AVERAGED_STEPS 3    /* Newton steps of a plan at most, */
 #define HSEP_AVERAGED_TRIES 2    /* lengths of a Newton step that are tried, */
 #define HSEP_AVERAGED_VARIED 4   /* variances that are computed in a part, */
 #define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
@@ -98,7 +99,7 @@ HSEP_API void hsep_averaged_planner_begin(
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are not pinned and all = horizon + late samples, m^2 / 2 multiply-adds
  * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
- * of the physics model's programme; 2 Newton steps of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
+ * of the physics model's programme; 3 Newton steps of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
  * and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
  * (m + 60) for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);

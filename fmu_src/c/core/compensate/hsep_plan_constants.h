@@ -6,7 +6,7 @@
 /* hybridsep/compensate/splines.py */
 #define HSEP_N_DECIDED 3
 #define HSEP_SPLINES_END 3
-#define HSEP_SPLINES_RETURN 25
+#define HSEP_SPLINES_RETURN 0
 #define HSEP_SPLINES_RIDGE 1e-12
 
 /* hybridsep/compensate/qp.py */
@@ -25,8 +25,7 @@
 #define HSEP_NEWTON_AT_STOP 0.999999
 #define HSEP_NEWTON_APART 4
 #define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5
-#define HSEP_NEWTON_REACH 0.1
-#define HSEP_NEWTON_STEPS 2
+#define HSEP_NEWTON_REACHES 0.1, 0.01, 0.0
 #define HSEP_NEWTON_LENGTHS 1.0, 0.3
 #define HSEP_NEWTON_LEAST_GAIN 1e-09
 
