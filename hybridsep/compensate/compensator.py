@@ -33,9 +33,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
-from .splines import N_DECIDED, SplineBasis, direct_samples
-
-__all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
+from .splines import N_DECIDED, SplineBasis
 
 RECOMMENDED = PredictorSettings(averaging=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
 """Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the

@@ -18,9 +18,6 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .compensator import SepCompensator
 
-__all__ = ["Expected", "expected_errors", "limits_that_bind"]
-
-
 _BINDS, _SAID = 0.99, 0.001
 """Share of a limit from which on a sample of a command counts as bound by it, and share of the samples from which on a
 limit counts: fewer cost nothing that could be seen."""

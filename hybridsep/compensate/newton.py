@@ -34,8 +34,6 @@ from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "AveragedPlanner", "PlanModel", "PlannedPoint", "is_better"]
-
 _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
 the friction's is the tangent."""
@@ -49,31 +47,17 @@ _APART = 4
 
 
 class DisturbanceSlopes(NamedTuple):
-    """Slopes of the disturbances at given commands.
+    """Slopes of the disturbances at given commands."""
 
-    Attributes
-    ----------
-    friction : (n, N_FRICTION) array, s/m
-        Of each friction with the commanded velocity.
-    stops : (N_STOPS,) array, 1/m
-        Of each stop operator with the command, since it was at its stop.
-    at_stop : (n, N_STOPS) array of int
-        Last sample at which it was there, counted from 1; 0: before all of them.
-    stiffness, damping : (n,) array, m and m/s
-        Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
-    of_position : (n, n_disturbances − N_LASTING) array, 1/m
-        Of all others with ``x``.
-    of_velocity : (n, n_own) array, s/m
-        Of the user's own, the last ones, with the commanded velocity.
-    """
-
-    friction: Array
-    stops: Array
+    friction: Array  # (n, N_FRICTION), s/m: of each friction with the commanded velocity
+    stops: Array  # (N_STOPS,), 1/m: of each stop operator with the command, since it was at its stop
+    # (n, N_STOPS) of int: last sample at which it was there, counted from 1; 0: before all of them
     at_stop: NDArray[np.intp]
+    # (n,), m and m/s: of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``
     stiffness: Array
     damping: Array
-    of_position: Array
-    of_velocity: Array
+    of_position: Array  # (n, n_disturbances − N_LASTING), 1/m: of all others with ``x``
+    of_velocity: Array  # (n, n_own), s/m: of the user's own, the last ones, with the commanded velocity
 
     def behind(self, n: int) -> DisturbanceSlopes:
         """Return the slopes behind the first ``n`` samples."""
@@ -127,12 +111,6 @@ class PlanModel:
         last plan, relative to the start.
     path : (preview,) array, m
         Unmodified commands, likewise.
-
-    Attributes
-    ----------
-    scales : FeatureScales
-    of_previous_plan : AveragedForecast
-        Prediction under ``x_d``, whose variances all others have.
     """
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
@@ -144,6 +122,7 @@ class PlanModel:
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.settings.Np :]
         behind -= np.arange(len(behind)) % _APART
+        # Prediction under ``x_d``, whose variances all others have.
         self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:

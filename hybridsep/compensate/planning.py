@@ -25,84 +25,38 @@ from .newton import TOLERANCE, AveragedPlanner, PlanModel, is_better
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
-__all__ = [
-    "RETRY",
-    "AveragedPlanning",
-    "ChosenPlan",
-    "PaperPlanning",
-    "PendingPlan",
-    "Planning",
-    "Preview",
-    "PublishedPosition",
-    "has_stable_poles",
-    "runs_away",
-]
-
 
 @dataclass(frozen=True)
 class PendingPlan:
-    """Planned window pending measurement.
+    """Planned window pending measurement."""
 
-    Attributes
-    ----------
-    coefficients : (3 + n_free,) array, m
-        Coefficients of the splines, the decided ones first.
-    delta, x_d : (Np,) arrays, m
-        Change of the command, and commanded position.
-    prediction : Prediction
-        Under the modified command.
-    state : SepState
-        Model of the plan.
-    runs_away : bool
-        Whether the residual model's plan ran away, so that it plans none for a time.
-    """
-
-    coefficients: Array
+    coefficients: Array  # (3 + n_free,), m: coefficients of the splines, the decided ones first
+    # (Np,), m: change of the command, and commanded position
     delta: Array
     x_d: Array
-    prediction: Prediction
-    state: SepState
-    runs_away: bool
+    prediction: Prediction  # under the modified command
+    state: SepState  # model of the plan
+    runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
 
 
 @dataclass(frozen=True)
 class Preview:
-    """Commands to plan, and what the plan goes on from.
+    """Commands to plan, and what the plan goes on from."""
 
-    Attributes
-    ----------
-    command : (preview,) array, m
-        Commanded positions.
-    x_d_before, delta_before : (3,) array, m
-        Last commanded positions before, and last changes of them.
-    previous_plan : (3 + n_free,) array, m
-        Coefficients of the remainder of the last plan, the decided ones first.
-    """
-
-    command: Array
+    command: Array  # (preview,), m: commanded positions
+    # (3,), m: last commanded positions before, and last changes of them
     x_d_before: Array
     delta_before: Array
-    previous_plan: Array
+    previous_plan: Array  # (3 + n_free,), m: coefficients of the remainder of the last plan, the decided ones first
 
 
 class ChosenPlan(NamedTuple):
-    """Plan of a window.
+    """Plan of a window."""
 
-    Attributes
-    ----------
-    state : SepState
-        Model that planned it.
-    coefficients : (3 + n_free,) array, m
-    scales : FeatureScales, optional
-        Of the residual model's features.
-    runs_away : bool
-        Whether the residual model's plan ran away.
-    """
-
-    state: SepState
-    coefficients: Array
-    scales: FeatureScales | None
-    runs_away: bool = False
+    state: SepState  # model that planned it
+    coefficients: Array  # (3 + n_free,), m
+    scales: FeatureScales | None  # of the residual model's features
+    runs_away: bool = False  # whether the residual model's plan ran away
 
 
 class PublishedPosition(NamedTuple):
@@ -124,19 +78,12 @@ class Planning(ABC):
     settings : CompensatorSettings
         Of the window: ``preview`` and ``spacing`` are given.
     Np : int
-
-    Attributes
-    ----------
-    PINNED : int
-        Leading samples of a window in which a plan follows the last one.
-    ALWAYS : bool
-        Whether every plan follows the last one there; else only plans that the drive's limits bound.
-    paused, pause : int
-        Windows that the residual model does not plan: now, and after its next plan that runs away.
     """
 
-    PINNED: ClassVar[int]
-    ALWAYS: ClassVar[bool]
+    PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one
+    ALWAYS: ClassVar[bool]  # whether every plan follows it there; else only plans that the drive's limits bound
+    paused: int  # windows that the residual model does not plan now
+    pause: int  # and after its next plan that runs away
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         assert settings.preview is not None

@@ -24,16 +24,6 @@ from ..base.settings import Limits
 from ..base.signals import Array
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = [
-    "EXACT",
-    "Bounds",
-    "DriveBounds",
-    "Minimum",
-    "Tolerance",
-    "minimise",
-    "solve",
-]
-
 _FIRST_SLACK = 0.3
 """Smallest initial slack, in the bounds' unit: 0.01 takes half as many steps again."""
 
@@ -48,25 +38,14 @@ _TAU = 0.995
 
 
 class Tolerance(NamedTuple):
-    """Where the solver ends.
+    """Where the solver ends."""
 
-    Attributes
-    ----------
-    mu : float
-        Complementarity μ, as a share of the cost per bound.
-    dual_residual : float
-        As a share of its largest term; rounding leaves up to 1e-9 of it.
-    margin : float
-        Largest primal residual, in the bounds' unit: a bound is exceeded by no more, unless the steps end before.
-        Callers tighten bounds by it.
-    steps : int
-        Largest number of steps.
-    """
-
-    mu: float
-    dual_residual: float
+    mu: float  # complementarity μ, as a share of the cost per bound
+    dual_residual: float  # as a share of its largest term; rounding leaves up to 1e-9 of it
+    # largest primal residual, in the bounds' unit: a bound is exceeded by no more, unless the steps end before. Callers
+    # tighten bounds by it
     margin: float
-    steps: int
+    steps: int  # largest number of steps
 
 
 _STEPS = 24
@@ -79,20 +58,11 @@ random parameters took all of them."""
 
 
 class Minimum(NamedTuple):
-    """Minimiser of a quadratic programme.
+    """Minimiser of a quadratic programme."""
 
-    Attributes
-    ----------
-    x : (n,) array
-        Not finite if the problem's data are not.
-    steps : int
-        Of the solver.
-    inner : (n,) array, optional
-        Iterate that was farthest inside the bounds without their margin; None if none was inside.
-    """
-
-    x: Array
-    steps: int
+    x: Array  # (n,): not finite if the problem's data are not
+    steps: int  # of the solver
+    # (n,): iterate that was farthest inside the bounds without their margin; None if none was inside
     inner: Array | None = None
 
 
@@ -164,22 +134,13 @@ def minimise(
 
 @dataclass(frozen=True)
 class _Newton:
-    """Newton's equations of a step: ``P dx − Bᵀ dz = r_d``, ``ds = B dx + r_p + ρ dz``, ``z ds + s dz = r_c``.
+    """Newton's equations of a step: ``P dx − Bᵀ dz = r_d``, ``ds = B dx + r_p + ρ dz``, ``z ds + s dz = r_c``."""
 
-    Attributes
-    ----------
-    factor : tuple
-        Of ``P + Bᵀ diag(z · inverse) B``, from :func:`scipy.linalg.cho_factor`.
-    inverse : (2m,) array
-        ``1 / (s + ρ z)``.
-    r_p, r_d : (2m,), (n,) arrays
-        Primal residual ``B x − b − s`` and dual residual ``v − P x + Bᵀ z``.
-    """
-
-    factor: tuple[Array, bool]
+    factor: tuple[Array, bool]  # of ``P + Bᵀ diag(z · inverse) B``, from :func:`scipy.linalg.cho_factor`
     B: Array
     z: Array
-    inverse: Array
+    inverse: Array  # (2m,): ``1 / (s + ρ z)``
+    # (2m,), (n,): primal residual ``B x − b − s`` and dual residual ``v − P x + Bᵀ z``
     r_p: Array
     r_d: Array
     rho: float
@@ -215,16 +176,10 @@ _MOVES = 1e-12
 
 @dataclass(frozen=True)
 class Bounds:
-    """Linear inequality constraints ``low ≤ rows @ c ≤ high`` on the coefficients, normalised by the limits.
+    """Linear inequality constraints ``low ≤ rows @ c ≤ high`` on the coefficients, normalised by the limits."""
 
-    Attributes
-    ----------
-    rows : (m, n) array, 1/m
-    low, high : (m,) arrays
-        Hard bounds.
-    """
-
-    rows: Array
+    rows: Array  # (m, n), 1/m
+    # (m,): hard bounds
     low: Array
     high: Array
 

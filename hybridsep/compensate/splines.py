@@ -20,8 +20,6 @@ from scipy.signal import lfilter
 from ..base.settings import PLAN_END
 from ..base.signals import Array
 
-__all__ = ["N_DECIDED", "PlanCost", "SplineBasis", "direct_samples"]
-
 N_DECIDED = 3
 """Cubic splines that began before a plan and overlap it."""
 
@@ -38,16 +36,10 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class PlanCost:
-    """Quadratic cost ``½ cᵀ P c − vᵀ c`` of a plan: half its sum of squares up to a constant.
+    """Quadratic cost ``½ cᵀ P c − vᵀ c`` of a plan: half its sum of squares up to a constant."""
 
-    Attributes
-    ----------
-    P : (n, n) array
-    v : (n,) array, m
-    """
-
-    P: Array
-    v: Array
+    P: Array  # (n, n)
+    v: Array  # (n,), m
 
     @classmethod
     def regular(cls, P: Array, v: Array) -> PlanCost:

@@ -11,7 +11,8 @@ from compensator_cases import DRIVE_LIMITS, MODEL, beyond, closed, compensator, 
 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
-from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState
+from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator
+from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS

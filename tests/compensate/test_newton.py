@@ -18,13 +18,14 @@ from hybridsep.base.errors import StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
-from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.compensate.newton import AveragedPlanner, PlanModel
 from hybridsep.compensate.planning import RETRY, AveragedPlanning, ChosenPlan, runs_away
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import Machine
+from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from hybridsep.compensate.compensator import SepState
 from hybridsep.compensate.planning import has_stable_poles
+from hybridsep.online.look_ahead import SepState
 
 
 @examples(200)

@@ -14,11 +14,11 @@ from staircase_data import commanded
 
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepState, direct_samples
 from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
-from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
+from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis, direct_samples
 from hybridsep.cosim.loop import cosimulate
+from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
