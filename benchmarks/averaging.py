@@ -8,8 +8,6 @@ follows the command, or the actual velocity. Recordings come with no model: a fi
 samples of dead time is fitted to each by least squares. ``diverged`` stands where a replay was refused.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterator, Sequence

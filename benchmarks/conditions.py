@@ -12,8 +12,6 @@
 RMS is against the measured position.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy

@@ -8,8 +8,6 @@ compensation, and time from the fault, or from when the axis has moved by ``foll
 ms. A trip of a sound loop is false if its error is below the largest one without compensation.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Callable, Iterator, Sequence

@@ -15,8 +15,6 @@ same samples are printed below each row, relative to the best of all others. It 
 the second each window behind its prediction; licences of recordings are beside them.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

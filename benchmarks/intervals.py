@@ -6,8 +6,6 @@ Percent of the measured positions within the intervals of 50, 90 and 95 %, over 
 it: of the warm runs of ``benchmarks/averaging.py``, and pooled over cold runs of random drives.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

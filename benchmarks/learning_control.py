@@ -6,8 +6,6 @@ of D. A. Bristow, M. Tharayil, A. G. Alleyne, IEEE Control Systems Magazine 26 (
 nothing on another motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

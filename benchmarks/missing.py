@@ -6,8 +6,6 @@ Of six recordings every n-th sample is missing, or some at random. The hybrid is
 refitted before each window. RMS of the test half against all its measurements, those that were taken away, too.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -7,8 +7,6 @@ positions, neither has a term wrong. The FMUs are stepped at the sampling interv
 makes their own error of integration vanish. The exit code is 1 if a limit is missed.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from dataclasses import dataclass

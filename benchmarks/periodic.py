@@ -7,8 +7,6 @@ is the staircase's without its cubic terms, plus a force that moves its position
 noise is 1 µm.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

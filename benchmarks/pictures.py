@@ -7,8 +7,6 @@ with what the commands give now, so that a picture older than its figures is tol
 Chromium, Debian's package or any other. Some five minutes for all.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

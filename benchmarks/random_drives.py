@@ -9,8 +9,6 @@ alone, to the hold (the physics model plus the last measured residual, in every 
 ``--peers`` to the best of hold and two ARX models in hindsight.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

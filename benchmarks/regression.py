@@ -10,8 +10,6 @@ its rows in the cache. The filters are given the finished rows, too; padasip's g
 weights are compared with the exact ones of the samples it had.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -10,8 +10,6 @@ in time. *Kept* is the reduction there after the runs, relative to that of the l
 model's plans; *of cold*, both against the hybrid's first run.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor

@@ -7,8 +7,6 @@ that with ``compensate = physics``; without the samples of the last preview, who
 with weights that were learned from a run without compensation.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Set up what the plug-ins' tests share with the core's."""
 
-from __future__ import annotations
-
 import os
 
 # Before NumPy is loaded; tests/conftest.py says why.

@@ -1,7 +1,5 @@
 """Set up what every test shares."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

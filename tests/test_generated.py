@@ -1,7 +1,5 @@
 """Generated files of the repository against the declarations they come from."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of the library and of the C sources that need each other: none may need itself through others."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Iterator

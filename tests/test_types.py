@@ -1,7 +1,5 @@
 """Types of the whole repository, as pyproject.toml has mypy check them: strictly."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

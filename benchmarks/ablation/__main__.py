@@ -10,8 +10,6 @@ third. A second table has the intervals: their score at 90 % relative to the fir
 95 %.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor

@@ -6,8 +6,6 @@ of both generators, plants that have changed before the warm run, and runs that 
 physics model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial

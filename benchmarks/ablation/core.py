@@ -4,8 +4,6 @@ It predicts as the library does, to rounding, some fifty times faster: a change 
 window that is cut off is predicted as part of a whole one, and not learned.
 """
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess
@@ -65,7 +63,7 @@ class CoreVariant:
     def __init__(self, changes: Changes) -> None:
         self.changes = changes
 
-    def __reduce__(self) -> tuple[type[CoreVariant], tuple[Changes]]:
+    def __reduce__(self) -> "tuple[type[CoreVariant], tuple[Changes]]":
         return CoreVariant, (self.changes,)  # each process builds its own
 
     @cached_property

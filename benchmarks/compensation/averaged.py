@@ -6,8 +6,6 @@ Tracking RMS of the true position in µm, cold and warm, mean over the seeds, be
 limits; the exit code is 1 if one is missed. The stage's friction follows the command, or the actual velocity.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator

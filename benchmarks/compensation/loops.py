@@ -1,7 +1,5 @@
 """Closed loops of the library over a trajectory, cold and warm, disturbed too."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

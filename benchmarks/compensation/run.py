@@ -7,8 +7,6 @@ true position in µm, mean over the seeds; a warm run is the second one, with th
 limit beside it; the exit code is 1 if one is missed.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from dataclasses import dataclass, field

@@ -13,8 +13,6 @@ Each joint's model is ``hybridsep.fit``'s, of 24 s of moves; then 20 s of other 
 position's error, mrad. The rival is a finite impulse response with friction's sign, fitted to the same log.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor

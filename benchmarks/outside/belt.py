@@ -9,8 +9,6 @@ the arm. Friction is the LuGre model (C. Canudas de Wit and others, IEEE Trans. 
 the rival is a finite impulse response with friction's sign, fitted to the same log and inverted.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Compensator of the C library in a loop, as a controller runs it, on a plant of any kind."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, replace
 
 from c_library import Library

@@ -8,8 +8,6 @@ norm-optimal with a Q filter, from the command as it is, with the weight and the
 The hybrid's errors are split: what was predicted and left is the plan's, what was not predicted the model's.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

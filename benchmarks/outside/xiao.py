@@ -14,8 +14,6 @@ physics model is the linear loop of the table; *from fit*: of a log of other mot
 The limits of the drive are estimates of that log. Learning control is norm-optimal, with a Q filter.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Sequence

@@ -11,8 +11,6 @@ timer at 25 MHz of the Cortex-M boards, to 40 instructions. An instruction is no
 --readme writes the table into fmu_src/c/README.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """What is replayed on a target: parameters, samples and weights, as a C header."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -5,8 +5,6 @@
 Each drive's log is replayed by ``fmu_src/c/examples/replay.c`` with the first mode of its model, in both precisions.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The processors: how a replay is built for one, run on it, and measured."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -4,8 +4,6 @@ An error is one line on standard error and exit status 2, Ctrl-C another and 130
 standard output has gone.
 """
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys
@@ -117,7 +115,7 @@ class _Commands(TyperGroup):
         return typer.main.get_command(alone)
 
 
-def _plug_ins() -> dict[str, EntryPoint]:
+def _plug_ins() -> "dict[str, EntryPoint]":
     from importlib.metadata import entry_points  # takes a tenth of the time in which a command's help is there
 
     return {one.name: one for one in entry_points(group="hybridsep.commands")}

@@ -1,7 +1,5 @@
 """What commands print and write: consoles, progress, tables or JSON; and the check of files before the work."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex
@@ -42,7 +40,7 @@ console = _WholeLines(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 
-def print_judged(judged: Judged, title: str, verdict: str) -> None:
+def print_judged(judged: "Judged", title: str, verdict: str) -> None:
     """Print the errors of a replay, what they mean, and what the controller says of itself."""
     from ..fitting.advice import OF_ITSELF
 
@@ -58,7 +56,7 @@ def print_judged(judged: Judged, title: str, verdict: str) -> None:
         console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
-def print_run(run: Run, as_json: bool, title: str, unit: str, limits: Mapping[str, Any] | None = None) -> None:
+def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[str, Any] | None = None) -> None:
     """Print the figures of a run of positions in ``unit``, m or rad; of ``limits`` what binds the command."""
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
@@ -178,7 +176,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
             console.print(said, soft_wrap=True)
 
 
-def warn_of_estimates(machines: Iterable[Machine]) -> None:
+def warn_of_estimates(machines: "Iterable[Machine]") -> None:
     """Say on standard error whose limits of the drive are estimated from a log's motion."""
     from ..fitting.compensation import LIMITS_WORDS
 

@@ -1,7 +1,5 @@
 """``fit``, from the log of an axis to its model, FMUs and a report."""
 
-from __future__ import annotations
-
 import math
 import shlex
 import sys
@@ -142,7 +140,7 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def _print_fit(found: Fit) -> None:
+def _print_fit(found: "Fit") -> None:
     """Print what was read and what the checks found, what was identified and how it was judged."""
     import numpy as np
 
@@ -171,7 +169,7 @@ def _print_fit(found: Fit) -> None:
         console.print(line)
 
 
-def _next_steps(found: Fit, files: Mapping[str, Path]) -> list[str]:
+def _next_steps(found: "Fit", files: Mapping[str, Path]) -> list[str]:
     """Return what to do after a fit that wrote ``files``, as lines to paste."""
     from ..fmi.archive import other_platforms
     from ..fmi.compile import no_native

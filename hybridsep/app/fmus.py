@@ -1,7 +1,5 @@
 """Commands that write FMUs and sources for controllers: ``build``, ``hal`` and ``header``."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -124,7 +122,7 @@ def build(
     print_built(paths)
 
 
-def _models(axis: Machine, fmus: Sequence[str], flavour: str, targets: Sequence[str], fmi: str) -> dict[str, str]:
+def _models(axis: "Machine", fmus: Sequence[str], flavour: str, targets: Sequence[str], fmi: str) -> dict[str, str]:
     """Return the FMUs to build, all of the machine's if none is named: name → model."""
     from ..fmi.compile import check_available
     from ..fmi.spec import fmu_names

@@ -3,8 +3,6 @@
 What a command works with is imported when it runs, so that no command's help needs any of it.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -110,7 +108,7 @@ class ReadingOptions:
         ),
     ] = False
 
-    def arguments(self, machine: Machine | None = None) -> dict[str, Any]:
+    def arguments(self, machine: "Machine | None" = None) -> dict[str, Any]:
         """Return the arguments, as a machine's file says where an option does not say otherwise."""
         columns = {role: column for role in ("t", "x_d", "x") if (column := getattr(self, role))}
         given = {"T_s": self.T_s, "delay": self.delay, "resample": self.resample}

@@ -1,7 +1,5 @@
 """Commands to begin with: the demonstration, an example log, and a machine file to edit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any

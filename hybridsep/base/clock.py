@@ -8,8 +8,6 @@ executed in the step whose end reaches the next instant. The arithmetic is the s
 operation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -34,7 +32,7 @@ class SampleClock(NamedTuple):
     end: float  # end of the last step in the importer's time, s
 
     @classmethod
-    def begin(cls, start: float, T_s: float) -> SampleClock:
+    def begin(cls, start: float, T_s: float) -> "SampleClock":
         """Return the clock at ``start``, s.
 
         Raises
@@ -55,7 +53,7 @@ class SampleClock(NamedTuple):
         """Whether the inputs of sample ``k`` have been read: a step began at its instant."""
         return self.since > 0
 
-    def stepped(self, t: float, h: float) -> ClockStep:
+    def stepped(self, t: float, h: float) -> "ClockStep":
         """Return the communication step from ``t`` by ``h``, s, in samples.
 
         Raises
@@ -86,7 +84,7 @@ class SampleClock(NamedTuple):
         return list(map(float, self))
 
     @classmethod
-    def from_state(cls, state: Sequence[float]) -> SampleClock:
+    def from_state(cls, state: Sequence[float]) -> "SampleClock":
         """Return the clock of a :meth:`state`.
 
         Raises

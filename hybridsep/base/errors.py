@@ -15,8 +15,6 @@
 Each message names the thing, what was expected, what came and, where there is one, the way out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from itertools import islice
 

@@ -5,8 +5,6 @@ is on the disk, so that a full disk, an exception, Ctrl-C or the end of the proc
 process leaves ``.hybridsep-….tmp`` in the target's folder.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import math

@@ -1,7 +1,5 @@
 """Figures of merit of sampled signals, and how results show theirs: in one line, in a table, in a plot."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +24,7 @@ class ErrorSize:
     largest: float
 
     @classmethod
-    def of(cls, error: Array) -> ErrorSize:
+    def of(cls, error: Array) -> "ErrorSize":
         """Return the size of ``(n,)`` samples, NaN where they are not known."""
         known = error[~np.isnan(error)]
         return cls(rms(known), largest(known)) if known.size else cls(math.nan, math.nan)
@@ -42,7 +40,7 @@ class Score:
     h: ErrorSize
 
     @classmethod
-    def of(cls, errors: Array) -> Score:
+    def of(cls, errors: Array) -> "Score":
         """Return the score of the errors of the three, ``(3, n)``, m, NaN where missing."""
         return cls(int((~np.isnan(errors[0])).sum()), *map(ErrorSize.of, errors))
 
@@ -150,7 +148,7 @@ def html_table(title: str, figures: Mapping[str, Any]) -> str:
     return f"<table><caption>{escape(title)}</caption>{rows}</table>"
 
 
-def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> ShownFigure:
+def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> "ShownFigure":
     """Return a figure of lines over ``x``."""
     from .shown_figure import ShownFigure
 

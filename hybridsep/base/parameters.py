@@ -1,7 +1,5 @@
 """Declaration of a parameter: type, range, unit, default and description, and the check of a value."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

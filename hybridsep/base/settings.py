@@ -9,8 +9,6 @@ arithmetic on them overflows: the largest response to a position of 1 km, by the
 the least damping, is below 1e30 m, and the smallest divisor, a limit as a difference of samples, is 1e-21 m.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, dataclass, fields, replace
@@ -352,7 +350,7 @@ class CompensatorSettings(Settings):
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
         return spacing * min(most, math.ceil(max(min(20, preview / 4), preview / 10) / spacing))
 
-    def for_window(self, Np: int, look_ahead: int) -> CompensatorSettings:
+    def for_window(self, Np: int, look_ahead: int) -> "CompensatorSettings":
         """Return these settings for windows of ``Np`` samples, defaults filled in.
 
         Parameters
@@ -391,7 +389,7 @@ class CompensatorSettings(Settings):
         return dict((*own[:place], *Limits.fmi_parameters().items(), *own[place:]))
 
     @classmethod
-    def _from_checked(cls, values: Mapping[str, Any]) -> CompensatorSettings:
+    def _from_checked(cls, values: Mapping[str, Any]) -> "CompensatorSettings":
         return replace(super()._from_checked(values), limits=Limits._from_checked(values))
 
     def to_fmi(self) -> dict[str, float | int | bool]:
@@ -399,7 +397,7 @@ class CompensatorSettings(Settings):
         return {**super().to_fmi(), **({} if self.limits is None else self.limits.to_fmi())}
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> CompensatorSettings:
+    def from_table(cls, table: Mapping[str, Any]) -> "CompensatorSettings":
         """Return the settings of :meth:`as_table`."""
         settings = super().from_table(table)
         return settings if settings.limits is None else replace(settings, limits=Limits.from_table(table["limits"]))

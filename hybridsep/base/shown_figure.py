@@ -1,7 +1,5 @@
 """Matplotlib figure that a notebook shows without pyplot or a magic command."""
 
-from __future__ import annotations
-
 import io
 
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """Validation of sampled signals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress

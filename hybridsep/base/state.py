@@ -5,8 +5,6 @@ and shapes), the arrays as float64, the parts, u32 CRC-32 of all before. The sam
 bytes. What the checksum, the kind, the version and the shapes let pass is taken for a state of this library's.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -4,8 +4,6 @@ More threads are slower, above all on busy cores, and change the order of summat
 the number of cores.
 """
 
-from __future__ import annotations
-
 import threading
 from contextlib import ContextDecorator
 from functools import cache

@@ -1,7 +1,5 @@
 """Version of the library, and the commit that it was made from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 __version__ = "0.1.0"

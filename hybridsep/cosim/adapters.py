@@ -3,8 +3,6 @@
 All have the same attributes and methods; what an FMU reports of itself is known after ``initialise``.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Mapping
@@ -171,7 +169,7 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
         self._path, self._role, self._values, self._start_time = path, role, values, start_time
         self.name: str = Path(path).name
 
-    def __enter__(self) -> _OpenedFmu:
+    def __enter__(self) -> "_OpenedFmu":
         from .fmu import FmuInstance
 
         self.fmu = FmuInstance(self._path, self._role)

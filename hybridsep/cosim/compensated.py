@@ -1,7 +1,5 @@
 """Runs of a machine's compensator against its plant, FMU against FMU: none, physics, hybrid cold and warm, a rival."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

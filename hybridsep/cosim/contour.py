@@ -3,8 +3,6 @@
 Planar positions are complex numbers, X + iY, as in :mod:`hybridsep.plants.path`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -34,7 +32,7 @@ class Contour:
     T_s: float  # sampling interval, s
 
     @classmethod
-    def of(cls, path: PlanarPath, reached: Points, T_s: float) -> Contour:
+    def of(cls, path: PlanarPath, reached: Points, T_s: float) -> "Contour":
         """Return the contour errors of points ``(n,)``, n ≥ 2, at ``T_s``, s; between samples the path is a spline."""
         from scipy.interpolate import CubicSpline
 

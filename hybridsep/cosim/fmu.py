@@ -1,7 +1,5 @@
 """Instance of an FMI 2.0 or 3.0 co-simulation FMU with access by variable name, a thin layer over fmpy."""
 
-from __future__ import annotations
-
 import logging
 import os
 import re

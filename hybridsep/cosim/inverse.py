@@ -5,8 +5,6 @@ their signs, which are friction's; the command of a wanted motion then follows. 
 it, it knows no limits of the drive, and it learns nothing more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,7 +36,7 @@ class FirInverse:
     w: Array  # (m + s + 1,), weights of taps, samples, and of signs and 1, m
 
     @classmethod
-    def fitted(cls, recordings: Sequence[tuple[Array, Array]], Np: int) -> FirInverse | None:
+    def fitted(cls, recordings: Sequence[tuple[Array, Array]], Np: int) -> "FirInverse | None":
         """Return the rival that fits commands and measured positions ``(n,)``, m, NaN where missing; None if none does.
 
         ``Np`` is the look-ahead, samples.

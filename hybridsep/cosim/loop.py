@@ -7,8 +7,6 @@ measured arrives so many samples later; a run has it as it was measured. With âˆ
 steps before the controller, as under a sequential (Gauss-Seidel) master.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack

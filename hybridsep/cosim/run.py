@@ -1,7 +1,5 @@
 """Record of a run of a controller and a drive over a trajectory: signals, figures, file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -121,7 +119,7 @@ class Run:
     def _repr_html_(self) -> str:
         return html_table(f"Run of a {self.kind.name}", self._figures())
 
-    def plot(self) -> Figure:
+    def plot(self) -> "Figure":
         """Return a matplotlib figure over time, µm: errors of the predictions, or the tracking error and the change."""
         if self.kind == PREDICTOR:
             lines = {"physics model": self.x_meas - self.x_pb, "hybrid": self.x_meas - self.x_h}

@@ -1,7 +1,5 @@
 """The paper's cases, predicted and compensated, FMU against FMU: what ``hybridsep demo`` runs, scores and draws."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

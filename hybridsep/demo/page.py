@@ -1,7 +1,5 @@
 """Tables of the demonstration, as the command prints them, and the index page of its folder, which needs no network."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

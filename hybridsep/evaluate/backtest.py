@@ -5,8 +5,6 @@ Three predictors are scored against the measured position: the physics model ``x
 this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three publish ``x_pb``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
@@ -68,7 +66,7 @@ class Backtest:
     def _repr_html_(self) -> str:
         return html_table("Prediction errors of a replay", self._figures())
 
-    def plot(self) -> Figure:
+    def plot(self) -> "Figure":
         """Return a matplotlib figure of the RMS errors of each window, µm."""
         errors = {"physics model": self.batch_rms_pb, "hold": self.batch_rms_hold, "hybrid": self.batch_rms_h}
         lines = {name: 1e6 * rows for name, rows in errors.items()}

@@ -4,8 +4,6 @@ Over time: prediction errors like the paper's Figs. 4 and 8, tracking errors and
 path, both axes together: prediction errors and contour errors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Report: one HTML file with text, tables and interactive charts, which needs nothing else, not even a network."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -99,7 +97,7 @@ class Line:
     points: bool = False  # whether points are drawn instead of a line
     panel: int = 0  # panel, from 0, top first
 
-    def draw(self, figure: Figure) -> None:
+    def draw(self, figure: "Figure") -> None:
         """Draw it into its panel."""
         edges = (self.y,) if self.upper is None else (self.y, self.upper)
         places = drawn_places(_COLUMNS, *edges)
@@ -132,7 +130,7 @@ class Chart:
     x_log: bool = False
     y_log: bool = False
 
-    def figure(self) -> Figure:
+    def figure(self) -> "Figure":
         """Return it as plotly's figure."""
         from plotly.subplots import make_subplots
 

@@ -3,8 +3,6 @@
 None of them shares code with what it judges. Each window is predicted from what was measured before it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

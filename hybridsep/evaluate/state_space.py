@@ -5,8 +5,6 @@ The state is what the past says of the future beyond the inputs (N4SID: Van Over
 projection a smooth command leaves nothing of the inputs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

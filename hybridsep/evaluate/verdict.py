@@ -3,8 +3,6 @@
 The errors of a run are summed up by place: a third of the look-ahead window, and whether the axis is commanded to move.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Replay of a report, and the advice that follows from it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Files of a fit: machine file, what was learned, commands to try with, FMUs."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

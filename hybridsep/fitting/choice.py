@@ -4,8 +4,6 @@ Windows of all that is tried are equally long: a shorter one is always predicted
 best of all, so ``Np`` is the controller's look-ahead and is never chosen.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Compensation in ``hybridsep fit``: the drive's limits, and the tracking error to be expected without and with it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

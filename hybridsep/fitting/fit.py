@@ -1,7 +1,5 @@
 """From recorded logs to a model that was tested on held-out samples, and to its files: what ``hybridsep fit`` does."""
 
-from __future__ import annotations
-
 import errno
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -158,7 +156,7 @@ class Fit:
         found, scale = self.predictor().predict(as_samples(x_d, "x_d", factor=factor)), 1.0 / factor("")
         return replace(found, x_pb=scale * found.x_pb, e_h=scale * found.e_h, x_h_std=scale * found.x_h_std)
 
-    def plot(self) -> Figure:
+    def plot(self) -> "Figure":
         """Return a matplotlib figure of the errors over the held-out samples."""
         scale, unit = self.judged.unit
         errors: Array = scale * self.judged.replay.errors()

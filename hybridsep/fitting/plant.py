@@ -5,8 +5,6 @@ better on the last third of the training samples, else the identified model alon
 the compensator has features for just these disturbances, so results on this plant are optimistic.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

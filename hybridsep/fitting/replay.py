@@ -1,7 +1,5 @@
 """Recordings in two parts, for training and for testing, and their replay."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -129,7 +127,7 @@ class Replay:
         """
         return 0.01 * min((resolution(one.x[~np.isnan(one.x)]) for one in self.recordings), default=0.0)
 
-    def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> Replay:
+    def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> "Replay":
         """Return the replay with the peers' predictions of the test samples."""
         pieces = [Piece(one.x_d, one.x, one.n_train, one.first_judged(self.Np)) for one in self.recordings]
         return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))

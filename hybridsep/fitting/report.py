@@ -1,7 +1,5 @@
 """Sections of the reports of a fit and of a replay: how good, how sure, what was found, and how to use it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

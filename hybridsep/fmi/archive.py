@@ -4,8 +4,6 @@ The content follows from the flavour: :mod:`hybridsep.fmi.native` takes librarie
 :mod:`hybridsep.fmi.python` wraps this library.
 """
 
-from __future__ import annotations
-
 import io
 import shlex
 import zipfile

@@ -10,8 +10,6 @@ in 48 bytes, filled with zeros; as float64 the start values of single variables 
 all before as u64.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -11,8 +11,6 @@ Every library lies in one folder. In FMI 2.0 these are the names that it has: ``
 both kinds of Mac, as importers look nowhere else on either.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

@@ -11,8 +11,6 @@ Beckhoff's TE1420, Target for FMI, puts an FMU's sources into a project of Visua
 there stands in an XML file of the form of its ``CustomFMU.xml``, which it finds in its folder of program data.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -62,7 +60,7 @@ def component_files(model: str) -> dict[str, bytes]:
     }
 
 
-def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = None) -> dict[str, bytes]:
+def axis_files(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> dict[str, bytes]:
     """Return the files of an axis' folder, with what an earlier run has learned: name → content.
 
     Raises
@@ -93,7 +91,7 @@ def _check_limits(machine: Machine, instead: str) -> None:
 _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
 
 
-def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = None) -> str:
+def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> str:
     """Return the header's text, with what an earlier run has learned.
 
     Raises
@@ -125,7 +123,7 @@ def axis_header(machine: Machine, model: str, trained: HybridPredictor | None = 
     )
 
 
-def _weights(name: str, trained: HybridPredictor | None) -> list[str]:
+def _weights(name: str, trained: "HybridPredictor | None") -> list[str]:
     """Return the lines that declare the weights: none, or the content of a weights file."""
     if trained is None:
         return [

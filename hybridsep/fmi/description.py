@@ -6,8 +6,6 @@ a tool connects whole FMUs: members of the same name of two terminals of one kin
 the commanded position ahead of the drive, ``drive`` the command of the drive and its measured position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

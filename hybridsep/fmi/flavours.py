@@ -1,7 +1,5 @@
 """Flavours of FMUs, and versions of FMI that they are written for."""
 
-from __future__ import annotations
-
 from ..base.errors import FmuError
 
 FLAVOURS = ("native", "python")

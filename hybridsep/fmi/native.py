@@ -9,8 +9,6 @@ program; headers for shared libraries (fmpy's) do not. FMI 3.0's put it there un
 version.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Sequence

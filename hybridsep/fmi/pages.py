@@ -1,7 +1,5 @@
 """Documentation page and icon of an FMU: ``documentation/index.html`` from templates, ``model.png``."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Collection, Iterable

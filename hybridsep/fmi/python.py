@@ -5,8 +5,6 @@ The library is packed under a name with a hash of its content (``hybridsep_1a2bâ
 share every module of the same name, and the one loaded first would silently serve both.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -6,8 +6,6 @@ parameters have their start values. The outputs are the library's, which compute
 compare them with the FMU's.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

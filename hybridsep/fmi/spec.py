@@ -1,7 +1,5 @@
 """An FMU before it is an archive: a machine on its way into one, with all that the files of the archive say of it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -42,7 +40,7 @@ class FmuSpec:
     title: str  # description of the FMU
     stop_time: float  # s: end of the default experiment
     samples: Array | None = None  # (n,), m: trajectory 3 of a ReferenceTrajectory
-    trained: HybridPredictor | None = None  # with which a HybridPredictor or SepCompensator starts warm
+    trained: "HybridPredictor | None" = None  # with which a HybridPredictor or SepCompensator starts warm
 
     @classmethod
     def of(
@@ -53,10 +51,10 @@ class FmuSpec:
         flavour: str = FLAVOURS[0],
         fmi: str = FMI_VERSIONS[0],
         samples: ArrayLike | None = None,
-        trained: HybridPredictor | None = None,
+        trained: "HybridPredictor | None" = None,
         windows: bool = True,
         rest: float = 0.0,
-    ) -> FmuSpec:
+    ) -> "FmuSpec":
         """Return the FMU of a model; arguments as the attributes, and as :func:`table_of`.
 
         Raises

@@ -4,8 +4,6 @@ Enumerations are in neither: libcosim ends the process where it meets one. The F
 There is no geometry, which is optional: tools place components themselves, and OMSimulator refuses one of a system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ it. Single variables come first, then the modes, then the windows, so that the p
 same in all FMUs of a kind. This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

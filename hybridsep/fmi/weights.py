@@ -9,8 +9,6 @@ model's residual and one of the command's; the CRC-32 of all before as u64.
 This module is packed into the pythonfmu FMUs; the C model reads the same file.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from pathlib import Path
@@ -126,7 +124,7 @@ def _differences(name: str, then: float, now: float) -> list[str]:
     return [f"{name} must be {shown!r}, with which this FMU was trained ({WEIGHTS_FILE}), got {came!r}"]
 
 
-def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
+def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPredictor:
     """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
 
     Raises
@@ -141,7 +139,7 @@ def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredic
     return predictor
 
 
-def load_trained(path: str | Path, machine: Machine, kind: str) -> HybridPredictor:
+def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
     It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend

@@ -1,7 +1,5 @@
 """Result of an identification: the physics model, how sure it is, and what else was tried."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Identification of ``G_pb`` from operation in closed loop: commanded and measured positions of a recording."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 

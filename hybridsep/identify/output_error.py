@@ -4,8 +4,6 @@ The linear parameters, a constant offset and the state at the start of each segm
 projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search is over poles alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

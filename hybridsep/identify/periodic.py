@@ -5,8 +5,6 @@ misfits of the model and vibrations of one frequency in time leave lines in the 
 follow the position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

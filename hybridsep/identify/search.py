@@ -1,7 +1,5 @@
 """Search for poles and dead time of one structure: starts from simpler fits, dead time in doubling, halving steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Choice of the structure by the error on a later part of the recording that was not fitted to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Structures of ``G_pb`` that are tried on a log, and their parameters as modes of eq. (15)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

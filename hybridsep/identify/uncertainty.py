@@ -6,8 +6,6 @@ time is a whole number of samples: the deviations of the other parameters hold f
 deviation with all parameters free.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

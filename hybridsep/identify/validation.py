@@ -3,8 +3,6 @@
 Both hold for a closed position loop, as what drives it, the command, does not depend on what was measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

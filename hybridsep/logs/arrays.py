@@ -1,7 +1,5 @@
 """Named arrays: in memory, or in files, NumPy's ``.npz``, MATLAB's ``.mat`` up to version 7, and Parquet."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

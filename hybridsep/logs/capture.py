@@ -1,7 +1,5 @@
 """Siemens Capture JSON: signals of all axes of a SINUMERIK, one row an interpolation cycle."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -6,8 +6,6 @@ reading of the columns, such as a flipped sign, is accepted if its residual is s
 thousand, simulated and recorded, reached. What is noted changes nothing.
 """
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Choice of a log's columns: which are time, commanded and measured position, in which units, at which rates."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from contextlib import suppress

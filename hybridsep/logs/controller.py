@@ -1,7 +1,5 @@
 """What a controller says of itself, by its own signals beside the pair: delay, following error, contour deviation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

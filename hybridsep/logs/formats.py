@@ -4,8 +4,6 @@ A new format is a file with a subclass of :class:`~hybridsep.logs.source.Source`
 Beside them lies the example log of the package, made by ``examples/example_log.py`` of the repository.
 """
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 

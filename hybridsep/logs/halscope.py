@@ -1,7 +1,5 @@
 """LinuxCNC halscope's CSV, since version 2.9: ``write_log_file`` of LinuxCNC's ``src/hal/utils/scope_files.c``."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

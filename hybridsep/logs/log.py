@@ -1,7 +1,5 @@
 """Recorded logs: :class:`Log`, and :func:`read_log`, which reads one from a file of any format, or from arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -94,7 +92,7 @@ class Log:
         """Units in which its positions are shown."""
         return shown_of(self.file_unit, self.unit)
 
-    def segments(self) -> list[Log]:
+    def segments(self) -> "list[Log]":
         """Return each stretch without a gap as a log of its own."""
         whole = Samples(self.t, self.x_d, self.x_meas, self.T_s, self.starts, self.signals)
         return [replace(self, **part._asdict()) for part in whole.segments()]

@@ -1,7 +1,5 @@
 """Recognition of columns by their names: time, commanded and measured position, of one axis or of several."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 

@@ -4,8 +4,6 @@ Each returns other samples and a line that says what was done, empty where nothi
 they are.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -46,12 +44,12 @@ class Samples(NamedTuple):
     starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
     signals: Mapping[str, Array] = {}  # (n,) each, m or rad: what the controller says beside them
 
-    def segments(self) -> list[Samples]:
+    def segments(self) -> "list[Samples]":
         """Return each segment by itself."""
         ends = (*self.starts[1:], len(self.t))
         return [self._replace(starts=(0,)).at(slice(*piece)) for piece in zip(self.starts, ends, strict=True)]
 
-    def at(self, which: slice | Indices) -> Samples:
+    def at(self, which: slice | Indices) -> "Samples":
         """Return some of the samples; the segments remain where they are."""
         signals = {what: values[which] for what, values in self.signals.items()}
         return self._replace(t=self.t[which], x_d=self.x_d[which], x_meas=self.x_meas[which], signals=signals)

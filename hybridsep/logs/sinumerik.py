@@ -6,8 +6,6 @@ value that is as before is left out there, and a ``rec`` with none as well, so t
 interval from its first value on, each the last one written.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, field

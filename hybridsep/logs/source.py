@@ -1,7 +1,5 @@
 """Interface of log formats: named columns of one length."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ names. Below, a line without any number (an ``overrun``, names that are written 
 left must have the table's columns.
 """
 
-from __future__ import annotations
-
 import codecs
 import csv
 import gzip

@@ -1,7 +1,5 @@
 """Times of a log: counters that wrap, gaps and clocks that were set back, the interval between the samples."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

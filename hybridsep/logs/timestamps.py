@@ -1,7 +1,5 @@
 """Clock timestamps of a text: their time of day counts, dates and zones are passed over."""
 
-from __future__ import annotations
-
 import re
 
 SECOND = 1_000_000_000

@@ -5,8 +5,6 @@ of what is known of each channel, each with its key before it, then a column of 
 "All") or before those that are sampled alike ("For each sampletime").
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

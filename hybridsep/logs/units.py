@@ -1,7 +1,5 @@
 """Units of a log's columns: names, factors to SI, and where a column's name states one (``x [mm]``, ``x_mm``)."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping

@@ -3,8 +3,6 @@
 An invalid file is refused with a message that names the file, the entry, what was expected and what was found.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys
@@ -158,7 +156,9 @@ class Machine(Section):
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
         return self._compensation().for_window(self.compensator_predictor.Np, self._look_ahead)
 
-    def changed(self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]) -> Machine:
+    def changed(
+        self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]
+    ) -> "Machine":
         """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
 
         Raises
@@ -170,7 +170,7 @@ class Machine(Section):
             values = {section: {**self.table.get(section, {}), **values}}
         return machine_from_table({**self.table, **values})
 
-    def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
+    def new_predictor(self, settings: PredictorSettings | None = None) -> "HybridPredictor":
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
         from ..predict.predictor import HybridPredictor
 
@@ -178,7 +178,7 @@ class Machine(Section):
 
     def new_compensator(
         self, settings: CompensatorSettings | None = None, *, predictor: PredictorSettings | None = None
-    ) -> SepCompensator:
+    ) -> "SepCompensator":
         """Return a compensator, by :attr:`compensator_settings` and :attr:`compensator_predictor` if left out."""
         from ..compensate.compensator import SepCompensator
 
@@ -347,7 +347,7 @@ def check_interval(name: str, T_s: float, axis: Machine) -> None:
     )
 
 
-def check_unit(name: str, log: Log, axis: Machine) -> None:
+def check_unit(name: str, log: "Log", axis: Machine) -> None:
     """Raise ParameterError if a log states lengths for a rotary axis, or angles for a linear one."""
     if log.unit_stated and log.unit != axis.unit:
         raise ParameterError(

@@ -1,7 +1,5 @@
 """Sections of a machine file: their entries, with the ranges of :mod:`hybridsep.base.settings`, and how one is read."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields

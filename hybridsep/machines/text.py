@@ -1,7 +1,5 @@
 """Writer of machine files: TOML with the unit of each entry as a comment."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

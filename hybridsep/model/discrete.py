@@ -1,7 +1,5 @@
 """Discrete-time physics model under a zero- or first-order hold, exact at the samples; eq. (2)."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nonlinear spring-mass-damper drive, eqs. (12) and (13)."""
 
-from __future__ import annotations
-
 import math
 
 from ..base.errors import ParameterError, SignalError

@@ -6,8 +6,6 @@ along the path: on an arc the acceleration towards its centre and the one along 
 jerk of its turning, v³/r², is limited, too.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -51,7 +49,7 @@ class PlanarPath:
     centre: Points  # (n,) complex, m: centre of the full circle that a sample is on; NaN elsewhere
 
     @classmethod
-    def of(cls, points: Points) -> PlanarPath:
+    def of(cls, points: Points) -> "PlanarPath":
         """Return a path of which nothing but its positions is known."""
         return cls(points, np.ones(len(points), dtype=np.bool_), np.full(len(points), complex(np.nan)))
 
@@ -72,7 +70,7 @@ class _Move:
     sweep: float = 0.0
     rest: float = 0.0
 
-    def joined(self, after: _Move) -> _Move | None:
+    def joined(self, after: "_Move") -> "_Move | None":
         """Return this move and the one after as one, if they are; otherwise None."""
         if self.feed != after.feed or self.rest or after.rest:
             return None

@@ -5,8 +5,6 @@ predictor. Integration is by the classical Runge-Kutta method, without different
 most 0.1 ms and 1/16 of the linear part's fastest time constant.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Linear-motor stage: modal model, eq. (15), with friction and cable stiffness as input disturbances."""
 
-from __future__ import annotations
-
 import math
 
 from ..base.clock import SampleClock

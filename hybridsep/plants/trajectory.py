@@ -4,8 +4,6 @@ Every function returns positions in metres, sampled exactly at ``k·T_s``; jerk-
 ruckig (Berscheid and Kröger, RSS 2021).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -193,7 +191,7 @@ def along_path(position: _Curve, derivative: _Curve, end: float, limits: Limits,
     return position(u)
 
 
-def _plan(here: float, there: float, limits: Limits) -> ruckig.Trajectory:
+def _plan(here: float, there: float, limits: Limits) -> "ruckig.Trajectory":
     """Return ruckig's time-optimal move between two points at rest."""
     import ruckig
 

@@ -1,7 +1,5 @@
 """What ``fit`` and ``report`` advise: more motion is asked for where there is little of it, and nowhere else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Options of the command line about channels: what a log holds, and rates that differ."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

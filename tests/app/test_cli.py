@@ -1,7 +1,5 @@
 """Command line: results, JSON, help and errors."""
 
-from __future__ import annotations
-
 import json
 import re
 import zipfile

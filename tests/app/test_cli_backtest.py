@@ -1,7 +1,5 @@
 """``hybridsep backtest``: checks of the log, figure, saved state and predictions, warm start, rotary axes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

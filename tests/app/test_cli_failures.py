@@ -1,7 +1,5 @@
 """Failures of the command line: one line on standard error and an exit status."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Output files of the command line: nothing of the user's is overwritten; arguments are checked first."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

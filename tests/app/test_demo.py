@@ -1,7 +1,5 @@
 """Demonstration: FMUs, figures, summary, and the results on the page of figures and in the README against them."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """``hybridsep example-log`` and the log that it writes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import example_log

@@ -1,7 +1,5 @@
 """``hybridsep fit``: from a log to files that work, on held-out samples; what is refused, and going on."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """``hybridsep fit`` with the drive's limits: the compensator FMU, and the tracking error to be expected."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import re

@@ -1,7 +1,5 @@
 """``hybridsep fit`` with what is known of an axis: a period of its error, a late encoder; the hint at a period."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``hybridsep fit`` beside models that need no hybrid: its advice and verdict; share, rate and unit in headlines."""
 
-from __future__ import annotations
-
 import json
 import re
 from html import unescape

@@ -1,7 +1,5 @@
 """Help of the commands: examples, each of which is run."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

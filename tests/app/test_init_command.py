@@ -1,7 +1,5 @@
 """``hybridsep init``: a machine file to edit."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

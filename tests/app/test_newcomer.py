@@ -1,7 +1,5 @@
 """A newcomer's way: from the log of an axis to a compensated run of it, by the lines that ``fit`` prints."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import zipfile

@@ -1,7 +1,5 @@
 """Commands of plug-ins: found by their entry points, named where they are not installed, imported by nothing."""
 
-from __future__ import annotations
-
 import ast
 from importlib.metadata import EntryPoint
 

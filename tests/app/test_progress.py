@@ -1,7 +1,5 @@
 """Progress where standard error is no terminal: stages as lines, the demo's duration first, nothing with --json."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Logs that commands refuse, or change only with a word about it: what is said, and what is left on the disk."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

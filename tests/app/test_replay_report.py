@@ -1,7 +1,5 @@
 """``hybridsep backtest --report``: one page about a replay."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Messages that say what a file is and what to type."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

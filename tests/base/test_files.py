@@ -1,7 +1,5 @@
 """Files that appear whole: whatever ends the writing, the old file is as it was."""
 
-from __future__ import annotations
-
 import os
 import stat
 import sys

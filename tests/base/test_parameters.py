@@ -1,7 +1,5 @@
 """Every parameter out of its range is refused in words that name it, its range and what came."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

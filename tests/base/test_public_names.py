@@ -1,7 +1,5 @@
 """The public names: the three lists of them agree, each is found, and none costs anything before it is used."""
 
-from __future__ import annotations
-
 import ast
 import json
 import subprocess

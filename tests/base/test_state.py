@@ -1,7 +1,5 @@
 """A saved state is read back exactly, or refused: damaged, truncated, foreign, of another kind or version."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from typing import Any

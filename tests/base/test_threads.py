@@ -1,7 +1,5 @@
 """BLAS threads: the same bits for any number, one inside replays and loops, the user's setting afterwards."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from contextlib import ExitStack

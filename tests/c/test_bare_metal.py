@@ -1,7 +1,5 @@
 """A source FMU on a processor without an operating system: no files, no printf, no malloc, a warm start."""
 
-from __future__ import annotations
-
 import subprocess
 import zipfile
 from pathlib import Path

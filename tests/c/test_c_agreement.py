@@ -3,8 +3,6 @@
 Without an accurate minimum in every bounded window a rounding grows a thousandfold in some of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from random_loops import random_loop, run_c, run_library

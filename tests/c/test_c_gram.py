@@ -1,7 +1,5 @@
 """The C core's solutions with penalties against the library's and exact ones. Each test states its tolerance."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 from fractions import Fraction
@@ -68,7 +66,7 @@ class CGram:
     def settle(self) -> None:
         self.library.hsep_gram_settle(self._block)
 
-    def add(self, other: CGram, weight: float) -> None:
+    def add(self, other: "CGram", weight: float) -> None:
         self.library.hsep_gram_add(self._block, other._block, ctypes.c_double(weight))
 
     def discount(self, weight: float) -> None:

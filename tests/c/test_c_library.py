@@ -1,7 +1,5 @@
 """The C core as a library: its package, its interface (hsep.h) and the examples beside it."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import re

@@ -1,7 +1,5 @@
 """The C core's physics model against the library and extended precision. Each test states its tolerance."""
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the C models refuse, in the library's words, and that a refusal changes nothing."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The C core's regression against the direct solution in extended precision. Each test states its tolerance."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 from typing import Any

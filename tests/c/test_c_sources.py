@@ -1,7 +1,5 @@
 """The C sources themselves: what they need, that they compile, what the sanitisers say."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

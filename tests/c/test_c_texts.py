@@ -1,7 +1,5 @@
 """Messages without the C library's printf (HSEP_NO_STDIO) are those with it, numbers to seven digits."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import random

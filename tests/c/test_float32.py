@@ -1,7 +1,5 @@
 """The C library in single precision, ``HSEP_FLOAT32``, beside itself in double precision."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from functools import cache

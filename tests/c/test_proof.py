@@ -4,8 +4,6 @@ What is proved, and what Eva is told, stands in proof/proof.c. The residual mode
 rings: Frama-C 25 ends there with an assertion of its own; the fuzzer and the sanitisers go through it.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

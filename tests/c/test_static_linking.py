@@ -1,7 +1,5 @@
 """Several source FMUs in one program: the FMI functions' names begin with the model identifier (FMI 2.0 and 3.0)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

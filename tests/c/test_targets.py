@@ -5,8 +5,6 @@ both machines (benchmarks/targets/plain_math.c); with each one's own, prediction
 and the C core may.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The C library compiled for WebAssembly by zig, in wasmtime; `.ci/nightly` installs it."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The compensator in closed loop: the figures it reaches, and what is refused and saved."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Compensation with the averaged model: its slope, what a plan gains, and what it must survive."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """When the paper's model plans, and what is measured over a plan."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Commands that never turn back where the path moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from built_once import BuiltFmus

@@ -1,7 +1,5 @@
 """Plans against independent oracles; limits, continuity and fall-back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

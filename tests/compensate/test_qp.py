@@ -1,7 +1,5 @@
 """The interior-point solver against Clarabel, in plans in which an iterate short of the minimum is not good enough."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contour error of two axes against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """FMU instances: closing, loading in threads, and the working directory of the process."""
 
-from __future__ import annotations
-
 import gc
 import os
 import re

@@ -1,7 +1,5 @@
 """Closed system of native FMUs in other projects' importers; all but two of them run at night."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The rival in compensation: what it leaves on a drive that it fits, and on what it cannot be fitted to."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Co-simulation: library and FMUs in each other's place, against predictions of the log; results, files, hooks."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path

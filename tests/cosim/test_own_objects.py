@@ -1,7 +1,5 @@
 """A compensator and a plant of the user's own in a run, and results at a prompt: what a newcomer tries first."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

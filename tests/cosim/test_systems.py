@@ -1,7 +1,5 @@
 """``hybridsep system``: one file with FMUs, connections and parameters."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

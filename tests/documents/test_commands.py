@@ -1,7 +1,5 @@
 """Command lines and Python blocks of README and documentation, run page by page behind the README's fit."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Rows for the tables of tools of fmi-standard.org and ssp-standard.org: their rules, and what hybridsep writes."""
 
-from __future__ import annotations
-
 import json
 from xml.etree import ElementTree as ET
 

@@ -1,7 +1,5 @@
 """Section 3.1 of the paper: disturbances that past residuals determine, and the innovation of others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

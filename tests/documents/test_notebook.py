@@ -1,7 +1,5 @@
 """The notebook of ``examples``: run from the first cell to the last, it ends in a compensated loop."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Links and file names on the pages of the repository, and its length and tone at the front."""
 
-from __future__ import annotations
-
 import re
 from datetime import date
 from functools import cache

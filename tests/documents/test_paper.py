@@ -1,7 +1,5 @@
 """Claims of docs/evidence/paper.md: readings of the equations, cases where the hybrid is worse, commands."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from typing import Any

@@ -1,7 +1,5 @@
 """Pictures of the documentation: those that its command has made, with the figures that the pages name."""
 
-from __future__ import annotations
-
 import json
 import re
 

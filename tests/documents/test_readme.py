@@ -1,7 +1,5 @@
 """The README's two commands and CI, the example of a machine file, the examples."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

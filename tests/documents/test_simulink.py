@@ -1,7 +1,5 @@
 """The script for Simulink, which nothing here runs: its ports and wires beside the FMUs."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

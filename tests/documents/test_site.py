@@ -1,7 +1,5 @@
 """The documentation as a site, by the extra `docs`: built without a warning, complete, no request off the machine."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The page `try` in headless Chromium, over a pipe by its DevTools protocol: the library's figures, and no request."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """What the page `try` reads of a folder of logs: what ``read_log`` reads, to four digits, or nothing."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

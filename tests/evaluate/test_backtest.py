@@ -1,7 +1,5 @@
 """Causal replay: scores, windows, and no look-ahead."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

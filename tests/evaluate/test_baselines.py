@@ -1,7 +1,5 @@
 """Peers on the raw columns: ARX and lag + hold against slow copies of their definitions, on recordings and by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from arx_oracle import arx_by_definition, free_run_by_definition

@@ -1,7 +1,5 @@
 """Figures of runs: nothing is cut off or hidden."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Report: a page that stands alone, escapes what it is given, and draws all that matters of long lines."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """A method of one's own in benchmarks/fit.py: what it sees when, and the samples that judge it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.fit import errors_of

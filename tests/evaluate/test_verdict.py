@@ -1,7 +1,5 @@
 """Verdicts in words, on made-up errors and on replays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Choice of settings: what is tried, what is chosen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

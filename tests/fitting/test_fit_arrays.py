@@ -1,7 +1,5 @@
 """``hybridsep.fit`` of arrays, a table and logs; what it returns."""
 
-from __future__ import annotations
-
 from html import unescape
 from pathlib import Path
 from types import SimpleNamespace

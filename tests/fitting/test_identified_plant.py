@@ -1,7 +1,5 @@
 """Plant of a fit, commands to try with, and limits that are estimated: against drives whose numbers are known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

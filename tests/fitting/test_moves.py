@@ -1,7 +1,5 @@
 """Moves of a log: how long they take to settle, and which are worst."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

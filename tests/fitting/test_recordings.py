@@ -1,7 +1,5 @@
 """Recordings in two parts, training and test samples, and the figures of their replay."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Native FMUs as their FMI functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 

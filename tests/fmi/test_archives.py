@@ -1,7 +1,5 @@
 """Archives of the FMUs: what checkers of others say of them, what they hold, that they are the same every time."""
 
-from __future__ import annotations
-
 import io
 import logging
 import re

@@ -1,7 +1,5 @@
 """An axis as a C header: compiled into the library's example, it predicts what the library in Python predicts."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from pathlib import Path

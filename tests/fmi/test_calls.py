@@ -1,7 +1,5 @@
 """FMI functions of a native FMU, of both versions, called one by one: legal sequences, refusals, logging, memory."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import re

@@ -1,7 +1,5 @@
 """Variables of the FMUs as modelDescription.xml has them: groups, units, windows, terminals, twins of the versions."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 from pathlib import Path

@@ -4,8 +4,6 @@
 the expected outcome of the earlier files becomes the refusal.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

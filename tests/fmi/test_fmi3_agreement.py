@@ -1,7 +1,5 @@
 """FMI 3.0 FMUs against their FMI 2.0 twins: the same outputs bit for bit, and the same states."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrays of an FMI 3.0 HybridPredictor: their size, a structural parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Each FMU's reference run is played by tests/c/host.c; FMUs and host are compiled
 the C library, as on Alpine, the library is the one for glibc: musl's loader takes its place.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

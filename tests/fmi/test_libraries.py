@@ -1,7 +1,5 @@
 """Where the libraries of native FMUs come from: a wheel, a checkout's own, a compiler."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

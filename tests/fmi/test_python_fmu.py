@@ -1,7 +1,5 @@
 """The pythonfmu FMUs: what they compute, carry and refuse, as fmpy tells it; their reference run: test_reference.py."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

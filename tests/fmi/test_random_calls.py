@@ -1,7 +1,5 @@
 """The native FMUs' sources: random calls and tables under sanitizers, and each file compiled alone."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

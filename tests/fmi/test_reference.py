@@ -1,7 +1,5 @@
 """Reference run of each archive, by fmpy and by the library; a run with all defaults."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Resources of native FMUs: where they are found, the table that tells a library which FMU it is, files that change."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import struct

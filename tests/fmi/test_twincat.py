@@ -4,8 +4,6 @@ Neither that compiler nor TE1420 is at hand. Clang, in the ziglang wheel, compil
 declare what a source FMU needs and nothing more (tests/c/msvc).
 """
 
-from __future__ import annotations
-
 import sys
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """FMUs that start warm: a trained predictor built into the resources, in both flavours."""
 
-from __future__ import annotations
-
 import random
 import struct
 import sys

@@ -1,7 +1,5 @@
 """Gains of a loop: the physics model that they make, in machine files and fits, and what a log says of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification from operation: simulated axes are found again, recordings that train nothing are refused."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

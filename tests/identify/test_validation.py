@@ -1,7 +1,5 @@
 """Validation of an identified model: the log's own frequency response, and tests of the residual."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from identification_cases import T_S, correlated, measured, moves

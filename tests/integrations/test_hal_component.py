@@ -1,7 +1,5 @@
 """The HAL component over a stub of HAL: what goes to the drive never steps, whatever comes in."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The tests in a running LinuxCNC run at night: they need its package with the hea
 an ordinary user that LinuxCNC runs as.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pwd

@@ -1,7 +1,5 @@
 """Arrays: NumPy's ``.npz``, MATLAB's ``.mat``, Parquet."""
 
-from __future__ import annotations
-
 import decimal
 import sys
 import zipfile

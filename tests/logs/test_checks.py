@@ -1,7 +1,5 @@
 """Checks of logs: good ones are neither altered nor refused, columns that mean something else are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

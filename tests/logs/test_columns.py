@@ -1,7 +1,5 @@
 """Columns of a log: which are read, in which units, and what is said where that cannot be known."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A controller's own signals beside the pair: planned position, command of the loop, following error, contour."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

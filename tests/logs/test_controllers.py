@@ -1,7 +1,5 @@
 """Logs of controllers: Siemens Capture, SINUMERIK's trace, TwinCAT Scope, LinuxCNC's halscope; rates that differ."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What users hand over: masked, labelled, with units, in tables; stand-ins for pandas, polars, xarray and pint."""
 
-from __future__ import annotations
-
 import decimal
 import math
 from collections.abc import Mapping

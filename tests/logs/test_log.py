@@ -1,7 +1,5 @@
 """Recorded logs: every format gives the same one; files that are none; the interval that times tell."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

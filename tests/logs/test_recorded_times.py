@@ -1,7 +1,5 @@
 """Times of recorded logs: the order of the file, wraps of counters, gaps, rounded times, slow sensors, options."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

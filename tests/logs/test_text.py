@@ -1,7 +1,5 @@
 """Text logs: preamble, comments, units, encodings, decimal commas, compression; and what is wrong in one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Logs whose times are clock timestamps: the same log as with seconds, midnight, and what is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Machine files: those that come with the library are consistent, and bad ones are refused by name."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Writer of machine files: what is written is read as the same machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

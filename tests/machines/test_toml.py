@@ -1,7 +1,5 @@
 """Machine files as text: byte-order mark, messages about thousands of entries."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

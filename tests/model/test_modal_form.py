@@ -1,7 +1,5 @@
 """Modal models: eq. (11), frequency response, conversion from and to python-control, ranges."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

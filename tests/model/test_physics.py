@@ -1,7 +1,5 @@
 """Discretisation of the modal model against the exponential and a differential-equation solver."""
 
-from __future__ import annotations
-
 import numpy as np
 import oracle
 import pytest

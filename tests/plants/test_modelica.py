@@ -1,7 +1,5 @@
 """The Modelica package, written from the paper's equations, beside the plant FMUs."""
 
-from __future__ import annotations
-
 import importlib.util
 import platform
 import sys

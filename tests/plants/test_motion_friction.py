@@ -1,7 +1,5 @@
 """Friction on the stage's actual velocity: its equation, its integration, and both implementations."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 

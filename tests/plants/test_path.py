@@ -1,7 +1,5 @@
 """Planar paths of G-code programs and of columns."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

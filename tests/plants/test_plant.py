@@ -1,7 +1,5 @@
 """Plants: against a tight solve_ivp run, against the linear model, and the noise against its definition."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

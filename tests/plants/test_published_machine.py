@@ -1,7 +1,5 @@
 """Xiao's machine, benchmarks/outside/xiao.py: its printed error without compensation, and its linear part."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Trajectories: exact samples, limits held, arc length against its closed form."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

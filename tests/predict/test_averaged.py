@@ -1,7 +1,5 @@
 """The residual model with averaging: what it predicts of known residuals, and what it never does."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

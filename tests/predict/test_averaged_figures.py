@@ -1,7 +1,5 @@
 """RMS errors of the model with averaging, cold and warm, on the default drive, the stage and the recorded axis."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Constants of the model with averaging: few, all in one place; names of library and C core correspond."""
 
-from __future__ import annotations
-
 import ast
 import itertools
 import re

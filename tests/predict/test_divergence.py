@@ -1,7 +1,5 @@
 """Predictions that diverge, window by window."""
 
-from __future__ import annotations
-
 import c_core
 import numpy as np
 import pytest

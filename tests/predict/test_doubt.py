@@ -1,7 +1,5 @@
 """A plant that has changed before a warm run: an expert that doubts earlier runs tells, and they are forgotten."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One expert's prediction against its formulas written out: free run, variance, shrinkage, bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Parameters from 5e-324 to 1e308, alone and together: a refusal that names one, or finite outputs, in bounded time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Which measurements are believed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from averaged_cases import averaged_model

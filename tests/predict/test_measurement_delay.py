@@ -1,7 +1,5 @@
 """A late measurement: windows that begin where it ends, in predictor, backtest and compensator."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

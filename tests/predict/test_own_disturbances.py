@@ -1,7 +1,5 @@
 """Disturbances of the user's own, functions in Python of position and commanded velocity."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Penalties of each weight, leverage and discounting against the stacked problem solved directly."""
 
-from __future__ import annotations
-
 import numpy as np
 import oracle
 import pytest

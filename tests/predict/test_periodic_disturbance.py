@@ -1,7 +1,5 @@
 """A drive whose force repeats with the position, as of cogging or a screw's pitch, predicted with its period known."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.periodic import errors

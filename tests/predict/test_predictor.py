@@ -1,7 +1,5 @@
 """The predictor against the oracle, its operator, and causality."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Batches, new runs, saved states and refused calls of the predictor."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

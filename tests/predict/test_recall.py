@@ -1,7 +1,5 @@
 """Recall: the stretch that is found, against a search that looks at all of them; what a repeated motion gains."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """The recursive regression against the ridge problem solved directly, also in extended precision."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

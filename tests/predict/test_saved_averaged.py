@@ -1,7 +1,5 @@
 """Saved state of a predictor with averaging: restored bit for bit, or refused."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Stack of experts: the minimum over the simplex against its optimality conditions, and what it prefers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

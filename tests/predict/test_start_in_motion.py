@@ -1,7 +1,5 @@
 """A run that begins in motion: the state of the physics model from its first window."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from averaged_cases import FRICTION, TS, averaged, cycles, friction, physics

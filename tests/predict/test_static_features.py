@@ -1,7 +1,5 @@
 """Features without lags against the disturbances' formulas, filtered over the whole signal at once."""
 
-from __future__ import annotations
-
 import numpy as np
 import oracle
 import pytest

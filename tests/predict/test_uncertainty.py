@@ -1,7 +1,5 @@
 """Standard deviation of the prediction error: calibrated online, wherever the error comes from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

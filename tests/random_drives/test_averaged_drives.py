@@ -1,7 +1,5 @@
 """The predictor with averaging on random drives: as good as the physics model on each, far better on most."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random drives: fixed by seed and index, exact where they are linear, at rest where they should be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Replay of predictors on random drives, and the table of the results."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drives of two masses: fixed by seed and index, exact where they are linear, friction as in closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

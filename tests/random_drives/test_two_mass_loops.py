@@ -1,7 +1,5 @@
 """Closed loops of the native compensator and drives of two masses, and their conditions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

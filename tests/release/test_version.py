@@ -1,7 +1,5 @@
 """The version with the commit: of a checkout by git, of wheel and sdist by a file, of anything else none."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Archives of a release: the wheel, built from the sdist, works in an environment of its own without a compiler."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Workflow files of the hosters: pinned actions, no secrets, all that a contributor's run leaves out at night."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The fixture behind the tests that every implementation runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -4,8 +4,6 @@
 all other parameters of a compensator, whose loop amplifies what is rounded apart.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

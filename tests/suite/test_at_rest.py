@@ -1,7 +1,5 @@
 """An axis at rest whose command rounds in its last places learns no scale from them, in every implementation."""
 
-from __future__ import annotations
-
 import numpy as np
 from driving import T_S
 from stream import COMPENSATOR, OUTPUTS, PREDICTOR, Array, Stream

@@ -1,7 +1,5 @@
 """The rule of the sample clock over many samples of rounded times, beside what ``test_timing.py`` asserts of all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

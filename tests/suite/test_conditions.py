@@ -4,8 +4,6 @@ Every implementation shows what the library shows: within 1e-12 m with averaging
 what it shows is good is tested beside it.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import replace
 from functools import cache

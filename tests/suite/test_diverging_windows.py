@@ -1,7 +1,5 @@
 """A window that diverges, on every implementation: refused with the output's name, and none of it shown."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

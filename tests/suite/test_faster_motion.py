@@ -1,7 +1,5 @@
 """A motion faster than all before is compensated with at most half of the largest change, in every implementation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from driving import T_S, initialise

@@ -1,7 +1,5 @@
 """``rms_hold`` of every implementation, against what is recomputed from the ``x_pb`` that it shows and ``x_meas``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

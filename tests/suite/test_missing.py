@@ -1,7 +1,5 @@
 """An axis many of whose measurements are missing is predicted nearly as well as with all, in every implementation."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

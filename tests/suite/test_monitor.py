@@ -1,7 +1,5 @@
 """Following-error monitor, on every implementation: what trips it, how the change fades, and the reset."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

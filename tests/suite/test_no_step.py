@@ -1,7 +1,5 @@
 """A modified command never steps: its differences are the command's, or within the limits, whatever comes in."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

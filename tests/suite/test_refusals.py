@@ -1,7 +1,5 @@
 """What every implementation refuses, in the same words, and that a refused call changes nothing."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """Saved states, on every implementation: a run from one is the same to the last bit, wherever it goes on."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """Several instances in one process, in every implementation: none sees another."""
 
-from __future__ import annotations
-
 import pytest
 from driving import SHORT, T_S, set_inputs, steps
 from stream import (

@@ -1,7 +1,5 @@
 """Where a run begins and ends, on every implementation."""
 
-from __future__ import annotations
-
 import math
 import re
 

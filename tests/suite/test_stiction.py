@@ -1,7 +1,5 @@
 """A servo with stiction, which stands for hundreds of samples while its command moves on, in every implementation."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

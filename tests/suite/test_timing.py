@@ -4,8 +4,6 @@ Truth is the rule itself in exact fractions: where the instants are, and which s
 run in steps of ``T_s`` that gets the inputs so latched must show the same outputs bit for bit.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Callable

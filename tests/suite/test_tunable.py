@@ -1,7 +1,5 @@
 """Parameters that change in a run, on every implementation: from the next window on, without a jump of the command."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Weights of an earlier run, on every implementation: they predict at once, and fit one set of settings alone."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache

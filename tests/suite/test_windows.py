@@ -1,7 +1,5 @@
 """What every implementation shows, against windows that are computed one by one from the whole log."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cache

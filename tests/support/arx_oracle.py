@@ -1,7 +1,5 @@
 """ARX model of the servo error by its definition: rows and free runs sample by sample."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridsep.base.signals import Array

@@ -1,7 +1,5 @@
 """Drives whose residual is known, and predictors with averaging for them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

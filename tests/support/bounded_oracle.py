@@ -1,7 +1,5 @@
 """Bounded quadratic programmes by an independent solver."""
 
-from __future__ import annotations
-
 import clarabel
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Files built once in a test session, by whichever of xdist's workers asks first."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time

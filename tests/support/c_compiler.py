@@ -1,7 +1,5 @@
 """The C compiler of this machine, its sanitizers, and how it is called for the C core."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

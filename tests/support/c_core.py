@@ -1,7 +1,5 @@
 """Build the C core with the host's compiler and drive it through ctypes."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import os
@@ -227,7 +225,7 @@ class CModel:
         self._call("check_start", self._values)
         self.library.hsep_model_start_values(ctypes.byref(self.context), self._values)
 
-    def initialise(self, t_start: float = 0.0, *, size: int | None = None) -> CModel:
+    def initialise(self, t_start: float = 0.0, *, size: int | None = None) -> "CModel":
         """Make the state, of the size that the model tells if no other is given."""
         size = self.size() if size is None else size
         self.state = np.zeros(-(-size // 8))

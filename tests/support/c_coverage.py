@@ -5,8 +5,6 @@ wrapper of gcc 11 or newer that gives each compilation a folder of its own below
 added up over all of them, line by line. Processes that are killed write no counts.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import os

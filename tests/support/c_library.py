@@ -1,7 +1,5 @@
 """The C core as an installed CMake package, and its interface (hsep.h) through ctypes."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The command line in this process, and a log to give to it."""
 
-from __future__ import annotations
-
 import math
 import re
 import shlex

@@ -1,7 +1,5 @@
 """A compensator of the default machine, its plant and its moves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

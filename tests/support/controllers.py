@@ -1,7 +1,5 @@
 """Processors of controllers in qemu: what their tests need, and where they are skipped."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Figures as they are drawn: what is cut off, and which legends hide something."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

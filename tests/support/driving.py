@@ -1,7 +1,5 @@
 """Inputs for streams and how they are stepped; closed loops that the library's stream has run."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

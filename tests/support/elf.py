@@ -1,7 +1,5 @@
 """Symbols of an ELF file, without binutils, which a machine with Python alone does not have."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 from pathlib import Path

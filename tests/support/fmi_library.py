@@ -1,7 +1,5 @@
 """FMI functions of a native FMU's library, declared by fmpy, for calls that no importer makes; both versions alike."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import struct

@@ -6,8 +6,6 @@ report, or one of the checks here: a refusal without a message, a refused step t
 that was taken, a block of memory that was not given back.
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import shutil

@@ -3,8 +3,6 @@
 The statistic of the checks was chosen on seeds below 1000.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

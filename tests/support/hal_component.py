@@ -1,7 +1,5 @@
 """The HAL component for LinuxCNC over a stub of HAL (tests/integrations/hal_stub.c), stepped period by period."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Hold recomputed from columns that were published: what every implementation and command is compared with."""
 
-from __future__ import annotations
-
 import numpy as np
 from stream import Array
 

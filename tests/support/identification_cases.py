@@ -1,7 +1,5 @@
 """Recordings of simulated linear axes, for the tests of identification."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import lfilter
 

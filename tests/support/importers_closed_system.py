@@ -6,8 +6,6 @@ with the FMUs of a folder, and of another one whose trajectory, command.npy, sta
 goes to OUT.
 """
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

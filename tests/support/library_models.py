@@ -1,7 +1,5 @@
 """The library's models from the values of an FMU's parameters: how every test that needs both puts them together."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

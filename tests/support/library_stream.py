@@ -1,7 +1,5 @@
 """The library's models as streams, stepped as FMUs are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Writes small logs in every format, for the tests of the readers."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Modes of every kind, and commands for them."""
 
-from __future__ import annotations
-
 import numpy as np
 import oracle
 from numpy.typing import NDArray

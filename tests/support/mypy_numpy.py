@@ -4,8 +4,6 @@ Its stubs have other types of arrays and scalars than those that this code is ch
 errors of these kinds. With a newer NumPy, as on any newer Python, they are checked as all others.
 """
 
-from __future__ import annotations
-
 from importlib.metadata import version
 
 from mypy import errorcodes

@@ -4,8 +4,6 @@ It shares no code with the library. The physics model is discretised as one tran
 the ridge problem is solved once per batch from all rows so far, and a window is a loop of its own predictions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Paths of this checkout and of the recordings beside it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 SUPPORT = Path(__file__).resolve().parent

@@ -1,7 +1,5 @@
 """Predictors of the default drive, and signals for them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a contributor's run leaves out, and how many examples a property is tried on: a sixth, all of them at night."""
 
-from __future__ import annotations
-
 from hypothesis import HealthCheck, settings
 
 LEFT_OUT = ("nightly", "release")

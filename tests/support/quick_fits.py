@@ -1,7 +1,5 @@
 """``fit`` without what takes most of its time, for tests of other things."""
 
-from __future__ import annotations
-
 import pytest
 
 from hybridsep.identify.structure import STRUCTURES

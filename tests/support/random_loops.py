@@ -1,7 +1,5 @@
 """Closed loops with random parameters of the compensator: the library's and the C core's, each with its own drive."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 Samples of columns may have rates of their own: ``{"x_d": (T_s, values), …}``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

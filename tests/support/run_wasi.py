@@ -1,7 +1,5 @@
 """Run a WebAssembly program for WASI in wasmtime: ``python run_wasi.py PROGRAM``."""
 
-from __future__ import annotations
-
 import sys
 
 import wasmtime

@@ -1,7 +1,5 @@
 """Weights files that must be refused, most of them with the checksum of their content."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 

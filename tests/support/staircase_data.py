@@ -7,8 +7,6 @@ Six 10 mm moves, one at the start of each second, three up and three down, on th
 with ``x_d`` held over each millisecond.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One interface to a model in every implementation; what an implementation cannot do stands in :data:`CANNOT`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

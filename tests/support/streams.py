@@ -1,7 +1,5 @@
 """Streams of every implementation for tests: a behavioural test that takes one runs on all of them."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import zipfile

@@ -1,7 +1,5 @@
 """Command ``hybridsep fleet``."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -88,7 +86,7 @@ def fleet(
     _print_run(found, out, as_json=as_json)
 
 
-def _print_run(run: FleetRun, out: Path, *, as_json: bool) -> None:
+def _print_run(run: "FleetRun", out: Path, *, as_json: bool) -> None:
     """Print how many logs there were, what was new, and what failed."""
     from hybridsep.base.errors import listed
 

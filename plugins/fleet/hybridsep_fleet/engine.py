@@ -5,8 +5,6 @@ is repeated alone before it is reported: if the process ends twice, the log itse
 example.
 """
 
-from __future__ import annotations
-
 import asyncio
 import multiprocessing
 import signal

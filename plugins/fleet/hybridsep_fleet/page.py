@@ -1,7 +1,5 @@
 """One page about a fleet: gains, what to look at first, and the course of each axis; one file that needs no network."""
 
-from __future__ import annotations
-
 import html
 import json
 import math

@@ -1,7 +1,5 @@
 """Results of a fleet: a Parquet dataset that only grows, one row an axis of a log as it was then."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import uuid

@@ -1,7 +1,5 @@
 """Run of a fleet: what is new or changed is looked at, then fitted; rows are written as they come."""
 
-from __future__ import annotations
-
 import datetime
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -111,7 +109,7 @@ class _Written:
         self._results.add(self._waiting)
         self._waiting, self._last = [], time.monotonic()
 
-    def __enter__(self) -> _Written:
+    def __enter__(self) -> "_Written":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Task of a fleet: a log and an axis, and how they are read and fitted; paths, never data."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass, replace

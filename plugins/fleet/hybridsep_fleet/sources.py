@@ -1,7 +1,5 @@
 """Logs of a fleet: in folders, by patterns, and in object stores that fsspec knows."""
 
-from __future__ import annotations
-
 import datetime
 import glob
 import os

@@ -1,7 +1,5 @@
 """Work of a fleet on one log and axis: fitted as by ``hybridsep fit``, or replayed with a machine file and judged."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

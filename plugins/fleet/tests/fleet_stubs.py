@@ -1,7 +1,5 @@
 """Work of a fleet in the place of fits, and rows in the place of results."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator

@@ -1,7 +1,5 @@
 """Cluster of processes of this machine: every task once, processes that end, strangers that are refused."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os

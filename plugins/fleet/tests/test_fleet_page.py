@@ -1,7 +1,5 @@
 """The page about a fleet: what it says of each axis, its size, and that it loads nothing."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs of a fleet: rows as single fits and replays give them, and nothing twice."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Logs of a fleet: folders, patterns, object stores; what of them is a machine and a day."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

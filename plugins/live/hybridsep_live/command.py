@@ -1,7 +1,5 @@
 """Command ``hybridsep live``."""
 
-from __future__ import annotations
-
 import json
 import math
 import tempfile
@@ -90,7 +88,7 @@ def live(
     given = Given(columns, unit, T_s, axis, speed)
     run = LiveRun({}, 0)
 
-    def say(findings: Sequence[Finding]) -> None:
+    def say(findings: "Sequence[Finding]") -> None:
         for one in findings:
             _say(f"the first seconds: {one}")
 
@@ -126,7 +124,7 @@ def _say(words: str) -> None:
     typer.echo(words, err=True)
 
 
-def _print_run(status: Mapping[str, Any], shown: DisplayUnits, *, as_json: bool) -> None:
+def _print_run(status: Mapping[str, Any], shown: "DisplayUnits", *, as_json: bool) -> None:
     """Print counts, errors and step times of a run."""
     if as_json:
         finite = {name: value if math.isfinite(value) else None for name, value in status.items()}

@@ -4,8 +4,6 @@ Where a stream has the commands that the drive gets now, and none ahead, its mea
 look-ahead. So the FMU sees what it would see in the controller, and all that is shown is older by the look-ahead.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Iterator

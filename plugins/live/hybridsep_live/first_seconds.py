@@ -1,7 +1,5 @@
 """Checks of a stream's first seconds: what its columns mean, as far as motion has shown it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

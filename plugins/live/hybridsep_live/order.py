@@ -1,7 +1,5 @@
 """Order of samples that come over a network: repeated ones are ignored, late ones put in their place, gaps refused."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from statistics import median
 from time import monotonic

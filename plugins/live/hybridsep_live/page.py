@@ -1,7 +1,5 @@
 """Page of a run, in a process of its own: the core's must not wait for a browser."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import queue
@@ -109,7 +107,7 @@ class Page:
         self._process.kill()  # if it has not ended
         self._process.join()
 
-    def __enter__(self) -> Page:
+    def __enter__(self) -> "Page":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -123,7 +121,7 @@ class Page:
                 self._told.send((kind, (table(arguments[0]), arguments[1]) if kind == "take" else arguments))
 
 
-def _serve(told: Connection, title: str, shown: DisplayUnits, port: int, token: str) -> None:
+def _serve(told: "Connection", title: str, shown: DisplayUnits, port: int, token: str) -> None:
     """Serve the page of a run until its process ends; what it was bound to, or why not, is told first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the run
     for name in [name for name in os.environ if name.startswith(_FOREIGN)]:
@@ -141,7 +139,7 @@ def _serve(told: Connection, title: str, shown: DisplayUnits, port: int, token: 
     server.run()
 
 
-def _follow(told: Connection, state: State, server: Any) -> None:
+def _follow(told: "Connection", state: State, server: Any) -> None:
     """Hand on what the run's process sends."""
     handlers = {"begin": state.begin, "take": state.take, "end": state.end}
     with suppress(EOFError, OSError):  # the run's process is over, in whatever way

@@ -1,7 +1,5 @@
 """Page of a run: its document, and the Bokeh server that gives it to who knows the token, on this machine alone."""
 
-from __future__ import annotations
-
 import asyncio
 import hmac
 import logging

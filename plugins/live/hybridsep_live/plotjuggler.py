@@ -1,7 +1,5 @@
 """Sender of rows to PlotJuggler, as JSON by UDP with a root ``timestamp``."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Run of the native core on a source: samples in order, rows to the sinks that show or send them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Samples of a stream: rows of CSV and JSON objects, with the names and units that logs have."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Sources of samples: a log that is replayed, UDP, standard input; and how an address names them."""
 
-from __future__ import annotations
-
 import os
 import queue
 import re

@@ -1,7 +1,5 @@
 """What the page's process knows of a run: its last rows, and the part of them that lines have pixels for."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from typing import Any

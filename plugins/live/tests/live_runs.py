@@ -1,7 +1,5 @@
 """Sources and sinks of live runs in tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Checks of a stream's first seconds, and a warm start from what lies beside the machine file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

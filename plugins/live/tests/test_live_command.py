@@ -1,7 +1,5 @@
 """Command ``hybridsep live``."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

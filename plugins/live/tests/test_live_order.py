@@ -1,7 +1,5 @@
 """Order of samples: repeated, late and missing ones, by number and by time."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

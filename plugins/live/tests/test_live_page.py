@@ -1,7 +1,5 @@
 """Page of a run: who gets it, what a session gets, and that nothing leaves the machine."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import json

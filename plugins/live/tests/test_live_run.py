@@ -1,7 +1,5 @@
 """Native core on a stream: equal to a co-simulation, and to a replay."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Samples of JSON messages and CSV lines."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Sources of samples: UDP, standard input, and how an address names them."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

@@ -1,7 +1,5 @@
 """What the page keeps and draws of a run."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

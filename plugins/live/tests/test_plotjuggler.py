@@ -1,7 +1,5 @@
 """Rows as PlotJuggler takes them."""
 
-from __future__ import annotations
-
 import json
 import math
 import socket

@@ -1,7 +1,5 @@
 """Command ``hybridsep modal``."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -89,12 +87,12 @@ def _identified(
     T_s: float | None,
     axis: str | None,
     n_modes: int | None,
-    progress: Callable[[str, float], object],
+    progress: "Callable[[str, float], object]",
     *,
     unit_gain: bool,
     input_hold: str,
     dead_time: int,
-) -> IdentifiedResponse:
+) -> "IdentifiedResponse":
     """Return the model of a file, whose kind its columns tell."""
     import numpy as np
 
@@ -138,7 +136,7 @@ def _identified(
     )
 
 
-def _print(found: IdentifiedResponse, title: str) -> None:
+def _print(found: "IdentifiedResponse", title: str) -> None:
     """Print an identified model as tables."""
     from rich import box
     from rich.console import Console

@@ -1,7 +1,5 @@
 """Figure of a frequency response, its fit and the error of the fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files of frequency responses: CSV, MAT or NPZ with frequency and complex value, or magnitude and phase."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

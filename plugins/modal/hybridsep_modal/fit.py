@@ -4,8 +4,6 @@ The deviations are the Cramér–Rao bounds. A mode has the parameters ``log ω,
 ``h = β/ω``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The response is position over position. Acceleration over acceleration is the sa
 numerator and denominator are differentiated alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

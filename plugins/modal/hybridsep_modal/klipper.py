@@ -6,8 +6,6 @@ what can be identified is the magnitude of the response, and from it one mode wi
 commanded and measured acceleration together (:mod:`~hybridsep.identify.swept_sine`).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The whole record is one window, so that a response which begins and ends at rest
 spectrum are averaged over neighbouring lines for the coherence, which gives each line's standard deviation.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ B. Gustavsen, A. Semlyen, IEEE Trans. Power Delivery 14 (1999) 1052; relaxed: B.
 in ``c, c̃, d``; the zeros of σ are the next poles.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Identification from a frequency response: the paper's Table 1 is found again."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

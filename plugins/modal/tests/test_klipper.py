@@ -1,7 +1,5 @@
 """Klipper's accelerometer files: reading, and the resonance that they show."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

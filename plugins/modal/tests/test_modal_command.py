@@ -1,7 +1,5 @@
 """``hybridsep modal``: what it writes, draws and prints for each kind of file, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Agreement with other packages: vector fitting with scikit-rf's, poles with sdypy-EMA's."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

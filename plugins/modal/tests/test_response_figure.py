@@ -1,7 +1,5 @@
 """Figure of a response: what was not measured is not drawn, nothing is cut off or hidden."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

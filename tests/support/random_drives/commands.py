@@ -1,7 +1,5 @@
 """Random reference trajectories of a feed axis, sampled at 1 kHz."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import cycle
 

@@ -1,7 +1,5 @@
 """Random nonlinearities of a drive: friction, backlash, cubic stiffness, cogging, drift."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from random_drives.drive import Draws

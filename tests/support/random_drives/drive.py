@@ -1,7 +1,5 @@
 """A random drive of either generator, as a replay sees it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

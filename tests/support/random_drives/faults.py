@@ -1,7 +1,5 @@
 """Faults of a position sensor; each returns the faulty measurement and the index of its last faulty sample."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random nonlinear feed drives with a physics model that is 20 % wrong: pure functions of a seed and an index."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -57,7 +55,7 @@ class ModalDrive:
         """Whether a mode has a negative gain."""
         return any(mode.g < 0 for mode in self.modes)
 
-    def with_gain(self, gain: float) -> ModalDrive:
+    def with_gain(self, gain: float) -> "ModalDrive":
         """Return the same drive with another static gain, all modes scaled alike."""
         scale = gain / self.gain
         return replace(self, modes=tuple(replace(mode, g=mode.g * scale) for mode in self.modes))
@@ -139,7 +137,7 @@ class Recipe:
     noise: Array
 
     @classmethod
-    def draw(cls, index: int, seed: int) -> Recipe:
+    def draw(cls, index: int, seed: int) -> "Recipe":
         """Return the recipe of a drive."""
         draws = Draws(seed, index)
         kind, x_d = random_command(draws)

@@ -1,7 +1,5 @@
 """Replay of a predictor over a random drive."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -4,8 +4,6 @@ Every operation is an elementary one (+, −, ×, /, comparison, rounding) on on
 a drive is the same to the last bit whichever others are simulated with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields
 

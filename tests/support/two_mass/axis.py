@@ -1,7 +1,5 @@
 """A drive of two masses with its cascaded position loop, and its nonlinearities, as plain numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,7 +41,7 @@ class LinearLoop:
         row[6:] = self.k_p * self.k_v, self.k_p * self.feedforward
         return row
 
-    def slower(self, factor: float) -> LinearLoop:
+    def slower(self, factor: float) -> "LinearLoop":
         """Return the same drive with gains lower by a factor below 1."""
         return replace(self, k_p=factor * self.k_p, k_v=factor * self.k_v, t_i=self.t_i / factor)
 
@@ -136,7 +134,7 @@ class Axis:
     dead_time: int = 0  # samples until a command arrives
     interpolates: bool = False  # whether the drive runs in a straight line from one command to the next, a sample late
 
-    def linear(self) -> Axis:
+    def linear(self) -> "Axis":
         """Return the drive without its nonlinearities."""
         free = Friction()
         return replace(self, motor=free, bearing=free, play=0.0, cogging=0.0, lead=0.0, force_max=1e9)

@@ -4,8 +4,6 @@ Where an axis moves from point to point, its velocity is piecewise constant and 
 bound acceleration and jerk (as controls of machine tools do).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -25,7 +23,7 @@ class Dynamics:
     jerk_time: float
 
     @classmethod
-    def draw(cls, draws: Draws, fastest: float) -> Dynamics:
+    def draw(cls, draws: Draws, fastest: float) -> "Dynamics":
         """Return random bounds up to a velocity, m/s."""
         velocity = fastest * draws.log_uniform(0.1, 1.0)
         return cls(velocity, draws.log_uniform(0.5, 8.0), draws.log_uniform(0.005, 0.06))

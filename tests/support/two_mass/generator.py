@@ -1,7 +1,5 @@
 """Random drives of two masses with a physics model that is up to 40 % wrong: pure functions of a seed and an index."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -45,7 +43,7 @@ class Recipe:
     text: str  # how the model errs
 
     @classmethod
-    def draw(cls, index: int, seed: int) -> Recipe:
+    def draw(cls, index: int, seed: int) -> "Recipe":
         """Return the recipe of a drive."""
         draws = Draws(seed, index, 2)
         machine = random_machine(draws)

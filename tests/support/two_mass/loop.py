@@ -1,7 +1,5 @@
 """Closed loop of the native SepCompensator and a drive of two masses, with the FMU's timing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace

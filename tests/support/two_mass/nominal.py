@@ -1,7 +1,5 @@
 """Physics models of a drive of two masses that are up to 40 % wrong, or a lag, or late by the wrong time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

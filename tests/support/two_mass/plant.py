@@ -1,7 +1,5 @@
 """Simulation of a drive of two masses by drive.c, compiled for this machine."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 from functools import cache
