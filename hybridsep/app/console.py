@@ -148,10 +148,7 @@ def print_json(result: Any) -> None:
 def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
     """Print what files hold: names, units, samples, rates, and what is read without a word.
 
-    Raises
-    ------
-    LogError
-        If a file cannot be read.
+    LogError if a file cannot be read.
     """
     from ..logs.columns import channels
     from ..logs.formats import open_source
@@ -238,11 +235,8 @@ def check_outputs(
 
     Existing files are overwritten with ``force``, and ``ours`` without it; ``inputs``, role → path, never.
 
-    Raises
-    ------
-    ParameterError
-        If an output is an input, by whatever name, or another output; a folder; an existing file; of another ending; or
-        cannot be written in its folder.
+    ParameterError if an output is an input, by whatever name, or another output; a folder; an existing file; of
+    another ending; or cannot be written in its folder.
     """
     taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
     for what, given in taken:

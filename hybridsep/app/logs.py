@@ -126,12 +126,8 @@ def backtest(
 def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:
     """Read a log of a machine and check it; what was found is shown.
 
-    Raises
-    ------
-    LogError
-        If the log cannot be read, its columns mean something else, or a measurement misses without averaging.
-    ParameterError
-        If it is sampled otherwise than the machine, or in another unit.
+    LogError if the log cannot be read, its columns mean something else, or a measurement misses without averaging;
+    ParameterError if it is sampled otherwise than the machine, or in another unit.
     """
     import numpy as np
 

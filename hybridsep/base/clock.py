@@ -35,10 +35,7 @@ class SampleClock(NamedTuple):
     def begin(cls, start: float, T_s: float) -> "SampleClock":
         """Return the clock at ``start``, s.
 
-        Raises
-        ------
-        FmuError
-            If ``start`` is not finite, or so large that doubles near it do not resolve a quarter of ``T_s``.
+        FmuError if ``start`` is not finite, or so large that doubles near it do not resolve a quarter of ``T_s``.
         """
         if not math.isfinite(start):
             raise FmuError(f"the start time must be finite, got {start} s")
@@ -56,12 +53,7 @@ class SampleClock(NamedTuple):
     def stepped(self, t: float, h: float) -> "ClockStep":
         """Return the communication step from ``t`` by ``h``, s, in samples.
 
-        Raises
-        ------
-        ParameterError
-            If ``h`` is not in (0, 100] s.
-        FmuError
-            If ``t`` is not where the last step ended.
+        ParameterError if ``h`` is not in (0, 100] s; FmuError if ``t`` is not where the last step ended.
         """
         check_step_size(h)
         check_communication_point(t, self.end, 0.5 * self.T_s)
@@ -87,10 +79,7 @@ class SampleClock(NamedTuple):
     def from_state(cls, state: Sequence[float]) -> "SampleClock":
         """Return the clock of a :meth:`state`.
 
-        Raises
-        ------
-        StateError
-            If a field is out of range.
+        StateError if a field is out of range.
         """
         T_s, k, since, carry, end = map(float, state)
         fits = all(map(math.isfinite, (T_s, end))) and T_s > 0 and 0 <= since <= T_s

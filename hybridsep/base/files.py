@@ -39,11 +39,8 @@ def atomic_open(path: str | Path) -> Iterator[IO[bytes]]:
     A symbolic link is followed, the old file's permissions are kept; other hard links keep the old content. A device or
     a pipe cannot be replaced and is written directly.
 
-    Raises
-    ------
-    OSError
-        With ``path`` as its file name, if it is a folder or write-protected or cannot be written; an old file is
-        unchanged.
+    OSError with ``path`` as its file name, if it is a folder or write-protected or cannot be written; an old file is
+    unchanged.
     """
     target = Path(os.path.realpath(path))
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -52,10 +52,7 @@ class Parameter:
     def checked(self, value: Any, label: str | None = None) -> Any:
         """Return a value, of a choice its name, in the parameter's type; ``label`` is its name in the message.
 
-        Raises
-        ------
-        ParameterError
-            If the value is of another type, not finite, or out of range.
+        ParameterError if the value is of another type, not finite, or out of range.
         """
         shown = label or self.name
         if self.kind is str:

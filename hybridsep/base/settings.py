@@ -28,10 +28,7 @@ _SettingsType = TypeVar("_SettingsType", bound="Settings")
 class Settings:
     """Group of parameters, validated on construction; what is declared of each ends the docstring of its class.
 
-    Raises
-    ------
-    ParameterError
-        Naming every parameter that is out of range, or the joint constraints that are violated.
+    ParameterError naming every parameter that is out of range, or the joint constraints that are violated.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ()
@@ -75,10 +72,7 @@ class Settings:
     def from_fmi(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
         """Return the settings from the values of an FMU's variables by name; missing ones have their defaults.
 
-        Raises
-        ------
-        ParameterError
-            Naming every value that is out of range.
+        ParameterError naming every value that is out of range.
         """
         given, problems = {}, []
         for name, parameter in cls.fmi_parameters().items():
@@ -472,10 +466,7 @@ DRIVE_LIMIT_ENTRIES = {
 def check(name: str, value: Any, *, label: str | None = None) -> Any:
     """Return ``value`` in the type of a parameter, by its name in FMUs; ``label`` is its name in messages.
 
-    Raises
-    ------
-    ParameterError
-        If the value is of another kind, not finite, or out of range.
+    ParameterError if the value is of another kind, not finite, or out of range.
     """
     return PARAMETERS[name].checked(value, label)
 

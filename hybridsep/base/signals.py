@@ -44,10 +44,7 @@ def given_column(values: Any) -> Given:
 
     What is masked, None or NA is NaN; Decimals are floats, and times with a zone durations since the first one.
 
-    Raises
-    ------
-    TypeError
-        If they are not all numbers or times; or something else that NumPy raises.
+    TypeError if they are not all numbers or times; or something else that NumPy raises.
     """
     index = getattr(values, "index", None)
     dims: Any = getattr(values, "dims", ())
@@ -136,10 +133,8 @@ def as_samples(
 
     They are in m or rad, or times the ``factor`` of the unit that they state, empty without.
 
-    Raises
-    ------
-    SignalError
-        If they are not one-dimensional, of the wrong length, not all finite, or no positions in metres or radians.
+    SignalError if they are not one-dimensional, of the wrong length, not all finite, or no positions in metres or
+    radians.
     """
     samples = _as_array(values, name, factor)
     if samples.ndim != 1:
@@ -174,10 +169,7 @@ def check_position(name: str, value: float, when: str = "", unit: str = "m") -> 
 def as_published(window: Array, name: str) -> Array:
     """Return a window of predictions, ``(n,)``, m, if it is bounded; ``name`` is the output's.
 
-    Raises
-    ------
-    SignalError
-        If a value is not finite, or beyond :data:`PREDICTION_MAX`.
+    SignalError if a value is not finite, or beyond :data:`PREDICTION_MAX`.
     """
     if not np.abs(window).max() <= PREDICTION_MAX:  # NaN too
         raise SignalError(

@@ -45,10 +45,7 @@ def pack(
 def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], dict[str, bytes]]:
     """Return ``(meta, arrays, parts)`` of a blob made by :func:`pack`.
 
-    Raises
-    ------
-    StateError
-        If the blob is not one, is truncated or damaged, or is of another kind or version.
+    StateError if the blob is not one, is truncated or damaged, or is of another kind or version.
     """
     if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != _MAGIC:
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
@@ -127,10 +124,7 @@ def restored(like: _Record, arrays: Mapping[str, Array]) -> _Record:
 
     ``like`` has the same shapes; what is fixed is taken from it.
 
-    Raises
-    ------
-    LookupError, ValueError
-        If an array is missing or has another shape.
+    LookupError, ValueError if an array is missing or has another shape.
     """
     for path, value in _leaves(like):
         if arrays[path].shape != np.shape(value):

@@ -44,11 +44,7 @@ class Compensator(Protocol):
 class LibraryController:
     """A predictor or compensator behind its look-ahead, with the FMU's timing.
 
-    Parameters
-    ----------
-    controller : HybridPredictor or SepCompensator
-    t_init : float, optional
-        Warm-up, s; its own if left out.
+    ``t_init``: Warm-up, s; its own if left out.
     """
 
     name: str = "the controller"  # in error messages
@@ -89,10 +85,7 @@ class LibraryController:
 class OwnController:
     """A compensator of the user's own; a run has NaN for the predictions that it does not make.
 
-    Raises
-    ------
-    ParameterError
-        If ``T_s`` or ``delay`` is out of range.
+    ParameterError if ``T_s`` or ``delay`` is out of range.
     """
 
     name: str = "the compensator"
@@ -153,16 +146,8 @@ class LibraryDrive:
 class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     """FMU whose instance lives as long as the context.
 
-    Parameters
-    ----------
-    path : str or Path
-        The archive.
-    role : str
-        Name of the instance, as its log messages show it.
-    values : mapping
-        Parameters to set before the initialization.
-    start_time : float
-        Start of the experiment, s.
+    ``path``: the archive; ``role``: name of the instance, as its log messages show it; ``values``: parameters to set
+    before the initialization; ``start_time``: start of the experiment, s.
     """
 
     def __init__(self, path: str | Path, role: str, values: Mapping[str, Any], start_time: float) -> None:
@@ -189,10 +174,7 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
 class FmuController(_OpenedFmu):
     """A predictor or compensator FMU.
 
-    Raises
-    ------
-    FmuError
-        If the archive is no FMU, or neither of the two.
+    FmuError if the archive is no FMU, or neither of the two.
     """
 
     def __init__(self, path: str | Path, values: Mapping[str, Any], start_time: float) -> None:
@@ -229,10 +211,7 @@ class FmuController(_OpenedFmu):
 class FmuDrive(_OpenedFmu):
     """A plant FMU.
 
-    Raises
-    ------
-    FmuError
-        If the archive is no FMU, or no plant.
+    FmuError if the archive is no FMU, or no plant.
     """
 
     T_s: float | None = None

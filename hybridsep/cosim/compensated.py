@@ -38,13 +38,8 @@ def compensate(
     The FMU goes to the folder ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
     The seeds of the noise are the machine's if none are given.
 
-    Returns
-    -------
-    runs : dict
-        The first seed's, by the keys of :data:`COMPENSATED` and :data:`RIVAL`.
-    summary : dict
-        The same keys → means over the seeds of :meth:`Run.summary`, with the spread
-        ``tracking_rms_um_std``.
+    Returns ``runs``: the first seed's, by the keys of :data:`COMPENSATED` and :data:`RIVAL`; ``summary``: the same
+    keys → means over the seeds of :meth:`Run.summary`, with the spread ``tracking_rms_um_std``.
     """
     assert machine.plant is not None
     seeds = seeds or [machine.plant.seed]

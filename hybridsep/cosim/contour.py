@@ -68,10 +68,8 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], Points, Array]:
     """Return where a polyline is nearest to each point, among segments ``around + first … around + end − 1``.
 
-    Returns
-    -------
-    segments, nearest, distance : (n,) arrays
-        The segment, the point on it, and the distance, positive on the left.
+    Returns ``segments``, ``nearest``, ``distance``: (n,): the segment, the point on it, and the distance, positive on
+    the left.
     """
     along = np.diff(path, append=path[-1:])
     lengths = np.maximum(np.abs(along) ** 2, 1e-300)

@@ -79,10 +79,7 @@ _VERSIONS = {
 def read_description(path: str | Path) -> Any:
     """Return fmpy's model description of an FMI 2.0 or 3.0 co-simulation FMU, which callers share: change none.
 
-    Raises
-    ------
-    FmuError
-        If there is none at ``path``, or fmpy's validation has a finding.
+    FmuError if there is none at ``path``, or fmpy's validation has a finding.
     """
     path = Path(path)
     if not path.is_file():

@@ -213,10 +213,7 @@ class Run:
 def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
     """Write arrays ``(n,)`` by name: ``.csv`` with one row a sample, truth values as 0 and 1, or ``.npz``.
 
-    Raises
-    ------
-    ValueError
-        If the suffix is another one.
+    ValueError if the suffix is another one.
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -125,24 +125,13 @@ def demo(
 
     First the predictor beside the uncompensated drive, then the compensator in its place.
 
-    Parameters
-    ----------
-    out : str or Path
-        Folder for FMUs, figures, results and ``summary.json``; made if needed.
-    full : bool
-        Average the staircase over :data:`SEEDS` noise seeds instead of running the first one, and co-simulate the
-        spiral's axes too.
-    progress : callable
-        Called with a message and the fraction done.
-
-    Returns
-    -------
-    dict
-        As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
-        ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
-        ``off``, ``physics``, ``hybrid_cold``, ``hybrid_warm`` and ``fir_inverse`` what
-        :func:`hybridsep.cosim.compensated.compensate` found, for the spiral's axes with the contour error of both
-        together, :meth:`hybridsep.cosim.contour.Contour.figures`.
+    ``out``: folder for FMUs, figures, results and ``summary.json``; made if needed; ``full``: average the staircase
+    over :data:`SEEDS` noise seeds instead of running the first one, and co-simulate the spiral's axes too;
+    ``progress``: called with a message and the fraction done. Returns as written to ``summary.json``: for each case
+    ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``, ``reduction_percent``, ``printed`` and more; RMS in µm against the
+    measured position. ``compensation`` says for ``off``, ``physics``, ``hybrid_cold``, ``hybrid_warm`` and
+    ``fir_inverse`` what :func:`hybridsep.cosim.compensated.compensate` found, for the spiral's axes with the contour
+    error of both together, :meth:`hybridsep.cosim.contour.Contour.figures`.
     """
     out = Path(out)
     seeds = SEEDS if full else 1

@@ -58,17 +58,9 @@ _SCRIPT = """\
 def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
     """Return the indices at which lines are drawn: the extremes in each of so many columns of pixels.
 
-    Parameters
-    ----------
-    columns : int
-        Columns of pixels that the lines take.
-    *rows : (n,) array_like
-        Lines over one abscissa; unknown where NaN. A column without any known sample stays a gap.
-
-    Returns
-    -------
-    (m,) array
-        Ascending, the first and the last among them; all where there are at most two for each column.
+    ``columns``: columns of pixels that the lines take; ``*rows``: (n,): lines over one abscissa; unknown where NaN. A
+    column without any known sample stays a gap. Returns (m,): ascending, the first and the last among them; all where
+    there are at most two for each column.
     """
     lines = np.array(rows, dtype=np.float64)
     n = lines.shape[1]

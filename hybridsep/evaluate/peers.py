@@ -66,10 +66,7 @@ _BLOCK = 4096
 class MinimumNorm:
     """Minimum-norm least squares of rows that arrive in blocks; what is kept, a triangular factor, does not grow.
 
-    Parameters
-    ----------
-    n_columns : int
-        Regressors.
+    ``n_columns``: regressors.
     """
 
     def __init__(self, n_columns: int) -> None:
@@ -98,14 +95,8 @@ class ArxRun:
     ``y(k) = Σ a_i y(k−i) + Σ b_j [x_d(k−j) − x_d(k−j−1)] + c`` with ``y = x − x_d``, ``i = 1 … n``, ``j = 0 … n``:
     free runs of minimum-norm least squares, what is missing before them bridged by free runs as well.
 
-    Parameters
-    ----------
-    x_d, x : (n_samples,) array, m
-        Commanded and measured positions, the latter NaN where missing.
-    n : int
-        Lags.
-    delay : int
-        Samples by which the measurements are late: ``x(k)`` is the position at ``k − delay``.
+    ``x_d``, ``x``: (n_samples,), m: commanded and measured positions, the latter NaN where missing; ``n``: lags;
+    ``delay``: samples by which the measurements are late: ``x(k)`` is the position at ``k − delay``.
     """
 
     def __init__(self, x_d: Array, x: Array, n: int, delay: int = 0) -> None:
@@ -123,10 +114,7 @@ class ArxRun:
 
         At most half of a row's lags are interpolated.
 
-        Returns
-        -------
-        (m, 2 n + 3) array
-            ``y(k−1) … y(k−n)``, increments ``k … k−n`` of the command, 1, and the target ``y(k)``.
+        Returns (m, 2 n + 3): ``y(k−1) … y(k−n)``, increments ``k … k−n`` of the command, 1, and the target ``y(k)``.
         """
         n, first, last = self.n, max(first, self.n + 1), min(last, len(self._y))
         if last <= first:
@@ -142,12 +130,7 @@ class ArxRun:
 
         It is one free run from the last sample that is measured then.
 
-        Parameters
-        ----------
-        w : (2 n + 2,) array
-            Coefficients.
-        begin, end : int
-            Samples; ``begin`` never falls from call to call.
+        ``w``: (2 n + 2,): coefficients; ``begin``, ``end``: samples; ``begin`` never falls from call to call.
         """
         known = max(begin - self._delay, 0)
         self._bridge(w, known)

@@ -97,20 +97,11 @@ def judge(
 ) -> Verdict:
     """Return the verdict on predictions of whole windows, of which the last may be shorter.
 
-    Parameters
-    ----------
-    x_d, x : (n,) array, m
-        Commanded and measured positions, NaN where missing.
-    predictions : (3 or more, n) array, m
-        ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``.
-    place : (n,) array of int
-        Number of each sample in its window of ``Np``.
-    further : sequence of str
-        Names of peers besides :data:`_PEERS`.
-    least : float
-        Least RMS error, m, that the measurement's resolution shows: no ratio to a smaller one is formed.
-    n_rejected, n_missing : int
-        Measurements not learned, and of these missing ones; as many as the samples lack, if left out.
+    ``x_d``, ``x``: (n,), m: commanded and measured positions, NaN where missing; ``predictions``: (3 or more, n), m:
+    ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``; ``place``: (n,) of int: number of each sample in
+    its window of ``Np``; ``further``: names of peers besides :data:`_PEERS`; ``least``: least RMS error, m, that the
+    measurement's resolution shows: no ratio to a smaller one is formed; ``n_rejected``, ``n_missing``: measurements
+    not learned, and of these missing ones; as many as the samples lack, if left out.
     """
     begin, known = np.flatnonzero(place == 0), ~np.isnan(x)
     window = np.cumsum(place == 0) - 1

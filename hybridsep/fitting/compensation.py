@@ -63,10 +63,7 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     :func:`~hybridsep.fitting.fit.fit` takes ``change_max`` and ``following_error_max`` from the log where they are not
     among them.
 
-    Raises
-    ------
-    ParameterError
-        If some of the three limits are missing.
+    ParameterError if some of the three limits are missing.
     """
     found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]

@@ -100,14 +100,9 @@ class _Disturbed(NamedTuple):
 class _Piece:
     """Piece of a recording, relative to its first command.
 
-    Attributes
-    ----------
-    u, x, v_d : (n,) array
-        Commands and measured positions, m; commanded velocity, m/s.
-    path : (n,) array, m
-        Position by the identified model, which the stiffness acts at.
-    fitted, choosing, judging : (n,) array of bool
-        Samples for fitting, for choosing, and for the test.
+    ``u``, ``x``, ``v_d``: (n,): commands and measured positions, m; commanded velocity, m/s; ``path``: (n,), m:
+    position by the identified model, which the stiffness acts at; ``fitted``, ``choosing``, ``judging``: (n,):
+    samples for fitting, for choosing, and for the test.
     """
 
     def __init__(self, discrete: DiscreteModel, recording: Recording, late: int) -> None:

@@ -50,10 +50,7 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
 
     ``n_settling`` samples after each gap are no test samples, unless fewer than half of the test samples were left.
 
-    Raises
-    ------
-    SignalError
-        If a part is left without samples.
+    SignalError if a part is left without samples.
     """
     given = list(pieces)
     n = sum(len(x_d) for x_d, _ in given)
@@ -258,10 +255,7 @@ def replay(
 
     Another run begins with each further recording.
 
-    Raises
-    ------
-    SignalError
-        If samples cannot be used, or a prediction diverges.
+    SignalError if samples cannot be used, or a prediction diverges.
     """
     x_d, x = (np.concatenate([getattr(one, name) for one in recordings]) for name in ("x_d", "x"))
     starts = np.cumsum([0, *(len(one.x) for one in recordings[:-1])]).tolist()

@@ -94,10 +94,7 @@ class Compiler:
 def host_target() -> str:
     """Return the name of this machine's platform, a key of :data:`TARGETS`.
 
-    Raises
-    ------
-    FmuError
-        If it is another one.
+    FmuError if it is another one.
     """
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     name = f"{machine}-{platform.system().lower()}"
@@ -109,10 +106,7 @@ def host_target() -> str:
 def expanded(targets: Sequence[str]) -> tuple[str, ...]:
     """Return the platforms, keys of :data:`TARGETS`, that some of :data:`TARGET_NAMES` mean.
 
-    Raises
-    ------
-    FmuError
-        If a name is unknown.
+    FmuError if a name is unknown.
     """
     if unknown := sorted(set(targets) - set(TARGET_NAMES)):
         raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
@@ -142,10 +136,7 @@ def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]
 def compiler_for(target: str) -> Compiler:
     """Return the compiler for a key of :data:`TARGETS`: ``ziglang``, or for the host ``$CC``, cc, gcc or clang.
 
-    Raises
-    ------
-    FmuError
-        If there is none.
+    FmuError if there is none.
     """
     if find_spec("ziglang") is not None:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
@@ -206,10 +197,7 @@ _KEPT_VERSIONS = 4
 def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
     """Return the libraries of a kind for targets of :data:`TARGET_NAMES`: platform → library.
 
-    Raises
-    ------
-    FmuError
-        If a target is unknown, or a library is not there and cannot be compiled.
+    FmuError if a target is unknown, or a library is not there and cannot be compiled.
     """
     paths = library_paths([(kind, target) for target in expanded(targets)])
     return {target: path.read_bytes() for (_, target), path in paths.items()}
@@ -222,10 +210,7 @@ def library_paths(
 
     ``on_library`` is told each that had to be compiled, when it is there and kept, and the fraction done.
 
-    Raises
-    ------
-    FmuError
-        As :func:`libraries`.
+    FmuError as :func:`libraries`.
     """
     paths = {library: kept(library) for library in wanted}
     compilers = {library: compiler_for(library[1]) for library, path in paths.items() if path is None}
@@ -260,10 +245,7 @@ def kept(library: Library) -> Path | None:
 def check_available(targets: Sequence[str]) -> None:
     """Check, before any work, that the libraries for some platforms are there or can be compiled.
 
-    Raises
-    ------
-    FmuError
-        If not, or a target is unknown.
+    FmuError if not, or a target is unknown.
     """
     for target in expanded(targets):
         if not _all_kept(target):
@@ -287,10 +269,7 @@ def default_targets() -> tuple[str, ...]:
 def chosen_targets() -> tuple[str, ...]:
     """Return the platforms of ``$HYBRIDSEP_TARGETS``, names with commas or ``none``; this one if it is not set.
 
-    Raises
-    ------
-    FmuError
-        If a name is unknown, or none is set and this machine is none of the platforms.
+    FmuError if a name is unknown, or none is set and this machine is none of the platforms.
     """
     chosen = os.environ.get("HYBRIDSEP_TARGETS") or "host"
     return expanded(() if chosen == "none" else chosen.split(","))

@@ -63,10 +63,7 @@ def component_files(model: str) -> dict[str, bytes]:
 def axis_files(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> dict[str, bytes]:
     """Return the files of an axis' folder, with what an earlier run has learned: name → content.
 
-    Raises
-    ------
-    FmuError
-        If a compensator is asked for a machine without limits of its drive.
+    FmuError if a compensator is asked for a machine without limits of its drive.
     """
     if model == "SepCompensator":
         _check_limits(machine, "--predictor writes the component that predicts alone")
@@ -94,10 +91,7 @@ _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "com
 def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> str:
     """Return the header's text, with what an earlier run has learned.
 
-    Raises
-    ------
-    FmuError
-        If a compensator is asked for a machine without limits of its drive.
+    FmuError if a compensator is asked for a machine without limits of its drive.
     """
     compensates = model == "SepCompensator"
     if compensates:

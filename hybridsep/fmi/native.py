@@ -37,10 +37,7 @@ _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content; arguments as of :func:`hybridsep.fmi.archive.build_fmu`.
 
-    Raises
-    ------
-    FmuError
-        If it cannot be compiled.
+    FmuError if it cannot be compiled.
     """
     table, fmi = spec.table, spec.fmi
     model, name = table.model, table.name

@@ -51,16 +51,10 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return the pages of an FMU, ``documentation/index.html`` among them: archive name → content.
 
-    Parameters
-    ----------
-    spec : FmuSpec
-        The machine's sources are listed, and types named as its version of FMI has them.
-    needs, dependencies : str
-        Requirements of the FMU: one sentence, and in detail, the text of ``externalDependencies.txt``.
-    reference : collection of str
-        Files of its reference run; empty if it has none.
-    limits, sources : str
-        Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
+    ``spec``: the machine's sources are listed, and types named as its version of FMI has them; ``needs``,
+    ``dependencies``: requirements of the FMU: one sentence, and in detail, the text of ``externalDependencies.txt``;
+    ``reference``: collection: files of its reference run; empty if it has none; ``limits``, ``sources``: section on
+    the limits of the FMU's flavour, and on compiling its sources, HTML.
     """
     model, name = spec.table.model, spec.table.name
     table = [

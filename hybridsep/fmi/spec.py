@@ -57,12 +57,8 @@ class FmuSpec:
     ) -> "FmuSpec":
         """Return the FMU of a model; arguments as the attributes, and as :func:`table_of`.
 
-        Raises
-        ------
-        FmuError
-            If the flavour is unknown, or has no FMUs of this version of FMI.
-        SignalError
-            If ``samples`` is not finite or empty.
+        FmuError if the flavour is unknown, or has no FMUs of this version of FMI; SignalError if ``samples`` is not
+        finite or empty.
         """
         played = None if samples is None else as_samples(samples, "samples")
         if played is not None:
@@ -182,10 +178,7 @@ def _title(machine: Machine, model: str) -> str:
 def generation_time() -> str:
     """Return ``generationDateAndTime``: the day of this version, or ``$SOURCE_DATE_EPOCH``, never the clock's.
 
-    Raises
-    ------
-    FmuError
-        If the variable is no number of seconds.
+    FmuError if the variable is no number of seconds.
     """
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:

@@ -169,32 +169,14 @@ def build_system(
 ) -> Path:
     """Write a system of three native FMUs as an SSP archive.
 
-    Parameters
-    ----------
-    machine : Machine
-        With a plant.
-    path : str or Path
-        The archive.
-    command : (n,) array_like, m
-        Commanded positions at the machine's ``T_s``, which the system's ReferenceTrajectory plays; all FMUs start at
-        the first of them.
-    compensate : {"off", "physics", "hybrid"}, optional
-        Best model with which a SepCompensator modifies the command; if left out a HybridPredictor only predicts.
-    targets, weights
-        As in :func:`hybridsep.fmi.archive.build_fmu`, for the look-ahead.
-    ssp : {"1", "2"}
-        Version of SSP: 1.0 with FMI 2.0 FMUs, 2.0 with FMI 3.0 FMUs.
-    progress : callable
-        Called with a message and the fraction done.
-
-    Raises
-    ------
-    FmuError
-        If the machine has no plant or no drive limits, a library cannot be had, or there is no such version of SSP.
-    SignalError
-        If ``command`` is not finite or empty.
-    StateError
-        If ``weights`` is no saved predictor, or one of another machine or other settings.
+    ``machine``: with a plant; ``path``: the archive; ``command``: (n,), m: commanded positions at the machine's
+    ``T_s``, which the system's ReferenceTrajectory plays; all FMUs start at the first of them; ``compensate``:
+    {"off", "physics", "hybrid"}: best model with which a SepCompensator modifies the command; if left out a
+    HybridPredictor only predicts; ``targets``, ``weights``: as in :func:`hybridsep.fmi.archive.build_fmu`, for the
+    look-ahead; ``ssp``: {"1", "2"}: version of SSP: 1.0 with FMI 2.0 FMUs, 2.0 with FMI 3.0 FMUs; ``progress``:
+    called with a message and the fraction done. FmuError if the machine has no plant or no drive limits, a library
+    cannot be had, or there is no such version of SSP; SignalError if ``command`` is not finite or empty; StateError
+    if ``weights`` is no saved predictor, or one of another machine or other settings.
     """
     check_system(machine, compensate=compensate, ssp=ssp)
     fmi = FMI_VERSIONS[SSP_VERSIONS.index(ssp)]

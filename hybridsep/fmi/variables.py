@@ -147,10 +147,7 @@ def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
 def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
     """Return the modes that the variables ``mode[i].*`` describe.
 
-    Raises
-    ------
-    ParameterError
-        If one is out of its range, naming it with its place.
+    ParameterError if one is out of its range, naming it with its place.
     """
     n = sum(name.endswith(".f_n") for name in values)
     return [

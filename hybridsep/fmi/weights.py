@@ -63,11 +63,8 @@ def weights_file(predictor: HybridPredictor) -> bytes:
 def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     """Restore what a predictor has learned from the file's content.
 
-    Raises
-    ------
-    StateError
-        If it is damaged, truncated or of another version, or was learned with other settings, naming all that differ;
-        the predictor is unchanged then.
+    StateError if it is damaged, truncated or of another version, or was learned with other settings, naming all that
+    differ; the predictor is unchanged then.
     """
     body = content[: -_CHECKSUM.size]
     if (
@@ -127,10 +124,7 @@ def _differences(name: str, then: float, now: float) -> list[str]:
 def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPredictor:
     """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
 
-    Raises
-    ------
-    StateError
-        As :func:`load_trained`.
+    StateError as :func:`load_trained`.
     """
     if weights is None:
         return machine.new_predictor()
@@ -146,10 +140,8 @@ def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredi
     (:func:`_learned_settings`), those of its predictor or compensator as ``kind`` says. Its window may be another one:
     weights that a predictor learned serve a compensator.
 
-    Raises
-    ------
-    StateError
-        If the file is not a saved predictor, one of another machine, naming all that differs, or has learned nothing.
+    StateError if the file is not a saved predictor, one of another machine, naming all that differs, or has learned
+    nothing.
     """
     path = Path(path)
     try:

@@ -47,10 +47,7 @@ class IdentifiedModel:
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
         """Return the machine with this model; ``entries`` are more of its file, such as ``predictor={"Np": 20}``.
 
-        Raises
-        ------
-        ParameterError
-            If an entry is invalid.
+        ParameterError if an entry is invalid.
         """
         return machine_of(self.model, self.input_hold, self.T_s, name, title, unit=self.unit, **entries)
 

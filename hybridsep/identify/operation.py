@@ -56,34 +56,14 @@ def identify_operation(
     them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before; the chosen
     one is then fitted to everything.
 
-    Parameters
-    ----------
-    recordings : iterable of pairs ``(x_d, x)`` of (n,) array_like, m
-        Commanded and measured positions, one pair for each piece without a gap, sampled alike; ``x`` is NaN where it
-        is missing. Such samples are left out of the error, the model runs over them.
-    T_s : float
-        Sampling interval, s.
-    unit_gain : bool, optional
-        Whether the static gain is 1; chosen by the recordings if left out.
-    order_max : int
-        Largest number of poles, at least 1.
-    unit : {"m", "rad"}
-        Unit of the positions, for estimates.
-    shown : DisplayUnits, optional
-        Units in which findings say errors; ``unit``'s if left out.
-    part : str
-        What the recordings are, for findings and errors.
-    progress : callable, optional
-        Called with a message and the fraction done.
-
-    Raises
-    ------
-    IdentificationError
-        If the recordings cannot determine a model, with the reason.
-    SignalError
-        If samples are not finite or of different lengths.
-    ParameterError
-        If ``T_s`` is out of its range.
+    ``recordings``: iterable of pairs ``(x_d, x)`` of (n,), m: commanded and measured positions, one pair for each
+    piece without a gap, sampled alike; ``x`` is NaN where it is missing. Such samples are left out of the error, the
+    model runs over them; ``T_s``: sampling interval, s; ``unit_gain``: whether the static gain is 1; chosen by the
+    recordings if left out; ``order_max``: largest number of poles, at least 1; ``unit``: {"m", "rad"}: unit of the
+    positions, for estimates; ``shown``: units in which findings say errors; ``unit``'s if left out; ``part``: what
+    the recordings are, for findings and errors; ``progress``: called with a message and the fraction done.
+    IdentificationError if the recordings cannot determine a model, with the reason; SignalError if samples are not
+    finite or of different lengths; ParameterError if ``T_s`` is out of its range.
     """
     T_s, shown = check("T_s", T_s), shown or shown_in(unit)
     segments = as_segments(recordings)

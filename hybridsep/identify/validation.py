@@ -56,12 +56,8 @@ def frequency_response(
     differences of the signals are transformed, which have the same ratio, with a window of low side lobes. The response
     is the model's plus that of its error: a window smears what it is long enough for, and of the model nothing then.
 
-    Parameters
-    ----------
-    recordings : iterable of three (n,) arrays, m
-        Commanded and measured positions without a gap, of the same instants, and the measured ones minus the model's;
-        a segment with NaN is left out.
-    T_s : float, s
+    ``recordings``: iterable of three (n,), m: commanded and measured positions without a gap, of the same instants,
+    and the measured ones minus the model's; a segment with NaN is left out; ``T_s``: s.
     """
     pieces = [np.diff(signals, 2) for signals in recordings]
     for n in _LENGTHS:
@@ -121,12 +117,8 @@ class ResidualTest:
 def residual_test(pieces: Iterable[tuple[Array, Array, Array]], n_lags: int) -> ResidualTest | None:
     """Return the tests of a residual, None where it or the command does not change, or samples are too few.
 
-    Parameters
-    ----------
-    pieces : iterable of three (n,) arrays, m
-        Commanded and measured positions, and residuals of a model that was fitted to others; NaN where missing.
-    n_lags : int
-        Largest lag, samples; a tenth of the samples is the most.
+    ``pieces``: iterable of three (n,), m: commanded and measured positions, and residuals of a model that was fitted
+    to others; NaN where missing; ``n_lags``: largest lag, samples; a tenth of the samples is the most.
     """
     apart = np.full((2, n_lags), np.nan)  # no product reaches from one piece into the next
     v, e = np.hstack([part for x_d, _, e in pieces for part in (apart, (np.diff(x_d, prepend=x_d[:1]), e))])

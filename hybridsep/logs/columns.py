@@ -47,10 +47,7 @@ def choose_columns(
     ``axis`` one of several, by the format's name or the columns' names (``X1`` of ``X1_CommandPosition``);
     ``time_needed`` whether a time column must be there.
 
-    Raises
-    ------
-    LogError
-        If a column is missing, occurs twice, or its unit is unknown or contradicts the given one.
+    LogError if a column is missing, occurs twice, or its unit is unknown or contradicts the given one.
     """
     for role in columns or ():
         if role not in ROLES:
@@ -283,10 +280,7 @@ def side_by_side(source: Source, columns: Mapping[str, Column], *, resample: boo
 
     Times that differ are refused unless ``resample`` is set.
 
-    Raises
-    ------
-    LogError
-        If the times differ and are not to be resampled, or cannot be.
+    LogError if the times differ and are not to be resampled, or cannot be.
     """
     names = {role: column.name for role, column in columns.items()}
     x_d, x = names["x_d"], names["x"]

@@ -78,10 +78,7 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
 def open_source(path: Path) -> Source:
     """Open a file with the reader that its content asks for.
 
-    Raises
-    ------
-    LogError
-        If there is no such file, or none of :data:`READERS` for it; the message says how to convert it.
+    LogError if there is no such file, or none of :data:`READERS` for it; the message says how to convert it.
     """
     try:
         if not path.is_file():

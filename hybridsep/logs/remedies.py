@@ -128,10 +128,7 @@ def shifted(given: Samples, delay: int) -> tuple[Samples, str]:
 
     Of each segment the samples are left out at whose instants nothing was measured then.
 
-    Raises
-    ------
-    ParameterError
-        If no segment is as long.
+    ParameterError if no segment is as long.
     """
     parts = [part for part in given.segments() if len(part.t) > abs(delay)]
     if not parts:

@@ -61,10 +61,7 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
     not. A ``given`` sampling interval, s, tells the unit of times that state none, and replaces times that are rounded
     too coarsely.
 
-    Raises
-    ------
-    LogError
-        If the times never increase, their unit is unknown, they are too coarse, or another interval was given.
+    LogError if the times never increase, their unit is unknown, they are too coarse, or another interval was given.
     """
     coarse = _is_coarse(times)
     t, remarks = _unwrapped(times * factor)

@@ -24,10 +24,7 @@ class DiscreteModel:
     :meth:`ModalModel.state_space`, block diagonal, ``dead_time`` in samples, ``T_s`` in s, ``input_hold`` zero-order
     ("zoh") or first-order ("foh"); windows of up to ``block`` samples are computed in one piece.
 
-    Raises
-    ------
-    ParameterError
-        If ``T_s`` is out of its range or the hold is unknown.
+    ParameterError if ``T_s`` is out of its range or the hold is unknown.
     """
 
     def __init__(
@@ -53,18 +50,9 @@ class DiscreteModel:
     def forced_response(self, state: Array, x_d: Array) -> tuple[Array, Array]:
         """Return the response over a window, free response included, and the state at its end; eq. (2).
 
-        Parameters
-        ----------
-        state : (n_state,) or (n_state, m) array, m
-            From :meth:`rest` or an earlier call; not changed.
-        x_d : (n,) or (n, m) array, m
-            Commanded positions, any length; each column is a signal of its own.
-
-        Returns
-        -------
-        x_pb : (n,) or (n, m) array, m
-        state : (n_state,) or (n_state, m) array, m
-            Initial state of the next window.
+        ``state``: (n_state,) or (n_state, m), m: from :meth:`rest` or an earlier call; not changed; ``x_d``: (n,) or
+        (n, m), m: commanded positions, any length; each column is a signal of its own. Returns ``x_pb``: (n,) or (n,
+        m), m; ``state``: (n_state,) or (n_state, m), m: initial state of the next window.
         """
         n = len(x_d)
         s, u, register = state, x_d, state[:0]

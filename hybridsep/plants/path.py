@@ -107,23 +107,12 @@ def _shares(length: float, feed: float, limits: Limits, T_s: float) -> Array:
 def read_path(path: str | Path, limits: Limits, T_s: float, unit: str | None = None) -> PlanarPath:
     """Read a planar path: a G-code program, or a log's columns ``x`` and ``y`` of commanded positions.
 
-    Parameters
-    ----------
-    path : str or Path
-        A program in G17 with G0 to G3 (I and J from the arc's beginning, or R), G4 (P in s), G20, G21, G90, G91 and F
-        (a minute), from X0 Y0 on; comments, N, M, S and T words and Z moves are passed over. Or a log in any format
-        of :func:`~hybridsep.logs.log.read_log`, whose times, if there are any, must be ``T_s`` apart.
-    limits : Limits
-        Of the motion along the path of a program.
-    T_s : float
-        Sampling interval, s.
-    unit : str, optional
-        Unit of a log's columns; from their names, or m, if left out.
-
-    Raises
-    ------
-    LogError
-        If a word would change the path and is not read, with its line; or if a log cannot be used.
+    ``path``: a program in G17 with G0 to G3 (I and J from the arc's beginning, or R), G4 (P in s), G20, G21, G90, G91
+    and F (a minute), from X0 Y0 on; comments, N, M, S and T words and Z moves are passed over. Or a log in any format
+    of :func:`~hybridsep.logs.log.read_log`, whose times, if there are any, must be ``T_s`` apart; ``limits``: of the
+    motion along the path of a program; ``T_s``: sampling interval, s; ``unit``: unit of a log's columns; from their
+    names, or m, if left out. LogError if a word would change the path and is not read, with its line; or if a log
+    cannot be used.
     """
     with Path(path).open("rb") as file:
         beginning = file.read(4096).decode("latin-1")

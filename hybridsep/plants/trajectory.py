@@ -145,10 +145,7 @@ def read_trajectory(
     ``column`` is the command's name there; ``unit`` and ``T_s`` are as of :func:`hybridsep.logs.log.read_log`, which
     reads it.
 
-    Raises
-    ------
-    LogError
-        If the file, the column or the time axis cannot be used.
+    LogError if the file, the column or the time axis cannot be used.
     """
     log = read_log(path, columns={"x_d": column, "x": column}, unit=unit, T_s=T_s)
     return log.x_d, log.T_s

@@ -47,13 +47,7 @@ def changed(folder: Path, name: str, *changes: tuple[str, str], source: Path = X
 class Run:
     """A drive of first order behind the component, and what the component writes.
 
-    Attributes
-    ----------
-    cmd : list of float, mm
-        The command as it came.
-    fb : float, mm
-        Where the drive is.
-    shown : list of (7,) arrays
+    ``cmd``: list, mm: the command as it came; ``fb``: mm: where the drive is; ``shown``: each (7,).
     """
 
     def __init__(self, component: Component, start: float = 0.0) -> None:

@@ -70,10 +70,7 @@ def built_once(path: Path, build: Callable[[Path], object]) -> Path:
 class BuiltFmus:
     """The FMUs of all machines in both flavours, for this machine.
 
-    Parameters
-    ----------
-    folder : Path
-        Shared by all workers of a session.
+    ``folder``: shared by all workers of a session.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -82,14 +79,8 @@ class BuiltFmus:
     def __call__(self, name: str, *, machine: Machine | None = None, weights: Path | None = None) -> Path:
         """Return an FMU's archive, built when it is first asked for.
 
-        Parameters
-        ----------
-        name : str
-            Of :func:`hybridsep.fmu_names`.
-        machine : Machine, optional
-            With other values than the machine file of that name has.
-        weights : Path, optional
-            Saved predictor that it starts warm with.
+        ``name``: of :func:`hybridsep.fmu_names`; ``machine``: with other values than the machine file of that name
+        has; ``weights``: saved predictor that it starts warm with.
         """
         own, flavour, fmi = _FMUS[name]
         machine = machine or own

@@ -172,16 +172,8 @@ class RefusedError(Exception):
 class CModel:
     """One instance of a model, as an adapter holds it.
 
-    Parameters
-    ----------
-    name : str
-        Of :data:`TABLES`.
-    start : mapping
-        Values that differ from the table's start values.
-    resources : Path, optional
-        Resources folder.
-    weights : bytes, optional
-        Content of ``weights.bin``, with which it starts.
+    ``name``: of :data:`TABLES`; ``start``: values that differ from the table's start values; ``resources``: resources
+    folder; ``weights``: content of ``weights.bin``, with which it starts.
     """
 
     def __init__(

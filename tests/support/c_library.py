@@ -145,12 +145,7 @@ def interface() -> ctypes.CDLL:
 class Library:
     """A predictor or a compensator of the C library.
 
-    Parameters
-    ----------
-    kind : {"predictor", "compensator"}
-    settings : mapping
-        Those that differ from the defaults.
-    modes : list of mappings
+    ``kind``: {"predictor", "compensator"}; ``settings``: those that differ from the defaults.
     """
 
     def __init__(self, kind: str, settings: Mapping[str, float], modes: Sequence[Mapping[str, float]]) -> None:

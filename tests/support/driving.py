@@ -98,25 +98,10 @@ def closed_loop(
 ) -> Loop:
     """Return a closed loop over a path; the same is run once.
 
-    Parameters
-    ----------
-    model : str
-        A look-ahead.
-    n : int
-        Samples.
-    values : mapping, optional
-        Parameters.
-    start : float
-        Position of rest, m.
-    weights : Path, optional
-        Saved predictor that the look-ahead starts warm with.
-    size : float
-        Of the path, as a fraction.
-    sensor : function
-    delay : int
-        Samples by which its output arrives late; at rest before.
-    path : {"staircase", "spiral"}
-        The spiral is the X axis' part of it.
+    ``model``: a look-ahead; ``n``: samples; ``values``: parameters; ``start``: position of rest, m; ``weights``:
+    saved predictor that the look-ahead starts warm with; ``size``: of the path, as a fraction; ``delay``: samples by
+    which its output arrives late; at rest before; ``path``: {"staircase", "spiral"}: the spiral is the X axis' part
+    of it.
     """
     given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
     return _closed_loop(model, n, tuple(given.items()), weights, size, sensor, delay, path)

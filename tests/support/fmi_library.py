@@ -29,20 +29,9 @@ ABSENT = (
 class Library:
     """Functions of FMI 2.0, ``fmi2`` left out of their names, with their statuses, and what passed the callbacks.
 
-    Parameters
-    ----------
-    folder : Path
-        An unpacked FMU.
-    largest : int
-        Bytes beyond which the importer has no memory for a block.
-
-    Attributes
-    ----------
-    references, kinds, causalities, sizes : dict
-        By the variables' names.
-    messages : list of (status, category, text)
-    blocks : dict
-        Bytes of the blocks of memory that were not given back.
+    ``folder``: an unpacked FMU; ``largest``: bytes beyond which the importer has no memory for a block.
+    ``references``, ``kinds``, ``causalities``, ``sizes``: by the variables' names; ``messages``: each (status,
+    category, text); ``blocks``: bytes of the blocks of memory that were not given back.
     """
 
     version, slave = 2, fmi2.FMU2Slave

@@ -51,12 +51,7 @@ def _library(model: str) -> ctypes.CDLL:
 class Component:
     """One axis, loaded; a process has one of a model at a time.
 
-    Parameters
-    ----------
-    machine : Machine
-    folder : Path
-        For the axis' own folder.
-    model : {"SepCompensator", "HybridPredictor"}
+    ``folder``: for the axis' own folder; ``model``: {"SepCompensator", "HybridPredictor"}.
     """
 
     def __init__(self, machine: Machine, folder: Path, model: str = "SepCompensator") -> None:

@@ -58,12 +58,8 @@ def library_plant(values: Mapping[str, Any]) -> Drive:
 def library_look_ahead(values: Mapping[str, Any], weights: bytes = b"") -> LookAhead:
     """Return the compensator's look-ahead where the values have a preview, the predictor's otherwise.
 
-    Parameters
-    ----------
-    values : mapping
-        Parameters and ``x_d_ahead``, where it starts.
-    weights : bytes, optional
-        Content of ``weights.bin``, with which it starts warm.
+    ``values``: parameters and ``x_d_ahead``, where it starts; ``weights``: content of ``weights.bin``, with which it
+    starts warm.
     """
     start = float(values["x_d_ahead"])
     if "preview" not in values:

@@ -18,15 +18,8 @@ LongArray = NDArray[np.longdouble]
 def transfer_function(modes: Sequence[tuple[float, float, float, float]]) -> tuple[Array, Array]:
     """Multiply out eq. (15).
 
-    Parameters
-    ----------
-    modes : sequence of (f_n, zeta, alpha, beta)
-        Hz, 1, 1/s², 1/s.
-
-    Returns
-    -------
-    numerator, denominator : arrays
-        Coefficients, highest power of s first.
+    ``modes``: sequence of (f_n, zeta, alpha, beta): Hz, 1, 1/s², 1/s. Returns ``numerator``, ``denominator``:
+    coefficients, highest power of s first.
     """
     numerator, denominator = np.array([0.0]), np.array([1.0])
     for f_n, zeta, alpha, beta in modes:
@@ -42,19 +35,8 @@ def physics(
 ) -> list[float]:
     """Eq. (2): answer commands from rest, sample by sample.
 
-    Parameters
-    ----------
-    numerator, denominator : arrays
-        G_pb(s), highest power first.
-    x_d : sequence of float, m
-        Commands relative to the position of rest.
-    T_s : float, s
-    hold : {"zoh", "foh"}
-    dead_time : int, samples
-
-    Returns
-    -------
-    list of float, m
+    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``: m: commands relative to the position of
+    rest; ``T_s``: s; ``hold``: {"zoh", "foh"}; ``dead_time``: samples. Returns list, m.
     """
     # With the sampling interval as the unit of time the coefficients stay near one another.
     num = numerator * T_s ** -np.arange(len(numerator) - 1.0, -1.0, -1.0)
@@ -136,17 +118,9 @@ def run(
 ) -> OracleRun:
     """Predict batch after batch of a run from rest at ``x_d[0]``, eqs. (2) to (6).
 
-    Parameters
-    ----------
-    numerator, denominator : arrays
-        G_pb(s), highest power first.
-    x_d, x : (n,) arrays, m
-        Commanded and measured positions; the last batch may be short.
-    T_s, t_init : float, s
-    Np, p, q : int
-    lam : float, m²
-    hold : {"zoh", "foh"}
-    dead_time : int, samples
+    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``, ``x``: (n,), m: commanded and measured
+    positions; the last batch may be short; ``T_s``, ``t_init``: s; ``lam``: m²; ``hold``: {"zoh", "foh"};
+    ``dead_time``: samples.
     """
     start = float(x_d[0])
     relative = [float(value) - start for value in x_d]

@@ -52,15 +52,7 @@ class Loop:
 def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: float) -> Loop:
     """Return a loop whose parameters follow from a seed, ``n`` samples long.
 
-    Parameters
-    ----------
-    seed : int
-    n : int
-        Samples.
-    machine : str, optional
-        Random too if left out.
-    **fixed
-        Parameters that are not random.
+    ``n``: samples; ``machine``: random too if left out; ``**fixed``: parameters that are not random.
     """
     rng = np.random.default_rng(seed)
     drawn = MACHINES[rng.integers(3)]

@@ -62,16 +62,9 @@ def twincat_csv(
 ) -> str:
     """Return an export of TwinCAT Scope as Beckhoff's manual describes it.
 
-    Parameters
-    ----------
-    channels : mapping
-    mark : str
-        Between fields; numbers have a decimal comma unless it is one.
-    unit : str
-    full : bool
-        Whether times are Windows file times; otherwise they are milliseconds.
-    shared : bool
-        Whether neighbours that are sampled alike share a column of times.
+    ``mark``: between fields; numbers have a decimal comma unless it is one; ``full``: whether times are Windows file
+    times; otherwise they are milliseconds; ``shared``: whether neighbours that are sampled alike share a column of
+    times.
     """
     start = 132_959_733_843_760_000
 

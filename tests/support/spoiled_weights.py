@@ -15,10 +15,7 @@ def sealed(body: bytes) -> bytes:
 def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
     """Return what is damaged, and what was learned with other settings, by what is wrong.
 
-    Parameters
-    ----------
-    content : bytes
-        Of a good file, of a model with one mode at least.
+    ``content``: of a good file, of a model with one mode at least.
     """
     body = content[:-8]
     n_settings, n_modes, n_learned = struct.unpack_from("<3Q", body, 8)

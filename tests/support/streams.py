@@ -47,13 +47,8 @@ STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
 class CoreStream:
     """The C core through ctypes, as an adapter holds it: the block of its state beside the values.
 
-    Parameters
-    ----------
-    model : str
-    resources : Path
-        Folder of the files that the model reads.
-    learned : bytes, optional
-        Content of ``weights.bin``, with which no warm-up is needed.
+    ``resources``: folder of the files that the model reads; ``learned``: content of ``weights.bin``, with which no
+    warm-up is needed.
     """
 
     def __init__(self, model: str, resources: Path, learned: bytes | None = None) -> None:
@@ -190,13 +185,7 @@ class FmuStream:
 class StreamMaker:
     """Make streams of one model in one implementation; all that were made are closed together.
 
-    Parameters
-    ----------
-    implementation, model : str
-    fmus : BuiltFmus
-        Where archives come from.
-    folder : Path
-        For the files that the C core reads.
+    ``fmus``: where archives come from; ``folder``: for the files that the C core reads.
     """
 
     def __init__(self, implementation: str, model: str, fmus: BuiltFmus, folder: Path) -> None:

@@ -177,17 +177,9 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
     Who connects to a cluster that is started here needs a certificate that is made for it and stays in its processes:
     a scheduler runs what it is sent, as its own user.
 
-    Parameters
-    ----------
-    workers : int
-        Processes of a cluster of this machine, each with its share of the memory; as many as cores if 0.
-    scheduler : str
-        Address of a running one, such as ``tls://10.0.0.5:8786``, with Dask's own settings of TLS.
-
-    Raises
-    ------
-    ParameterError
-        If the scheduler cannot be reached, or both are given.
+    ``workers``: processes of a cluster of this machine, each with its share of the memory; as many as cores if 0;
+    ``scheduler``: address of a running one, such as ``tls://10.0.0.5:8786``, with Dask's own settings of TLS.
+    ParameterError if the scheduler cannot be reached, or both are given.
     """
     if workers and scheduler:
         raise ParameterError("--workers and --scheduler exclude each other")

@@ -86,18 +86,8 @@ def courses(rows: Sequence[Mapping[str, Any]]) -> list[Course]:
 def write_page(rows: Sequence[Mapping[str, Any]], page: Path, results: Path) -> None:
     """Write the page.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        As of :meth:`~hybridsep_fleet.results.Results.rows`.
-    page : Path
-    results : Path
-        Folder of the results, to which links lead.
-
-    Raises
-    ------
-    LogError
-        If there are no rows.
+    ``rows``: as of :meth:`~hybridsep_fleet.results.Results.rows`; ``results``: folder of the results, to which links
+    lead. LogError if there are no rows.
     """
     if not rows:
         raise LogError(f"{results}: there are no results; hybridsep fleet SOURCE --out {results} makes some")

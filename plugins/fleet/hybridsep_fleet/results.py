@@ -35,12 +35,7 @@ def key_of(log: str, axis: str, settings: str) -> str:
 
 
 class Results:
-    """Rows in a folder; each :meth:`add` writes a file of its own, whole or not at all.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Rows in a folder; each :meth:`add` writes a file of its own, whole or not at all."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -60,10 +55,7 @@ class Results:
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows, the oldest first.
 
-        Raises
-        ------
-        StateError
-            If a file is damaged.
+        StateError if a file is damaged.
         """
         found: list[dict[str, Any]] = []
         for path in sorted(self._rows.glob(f"*{_ENDING}")):

@@ -46,21 +46,8 @@ def run_fleet(
 ) -> FleetRun:
     """Fit, or replay, what is new or changed.
 
-    Parameters
-    ----------
-    sources : sequence of str
-    out : Path
-        Folder of the results.
-    settings : FleetSettings
-    engine : callable
-        Starts the engine; called only where there is something to do.
-    progress : callable, optional
-        Called with a message and the fraction done.
-
-    Raises
-    ------
-    LogError
-        If there are no logs.
+    ``out``: folder of the results; ``engine``: starts the engine; called only where there is something to do;
+    ``progress``: called with a message and the fraction done. LogError if there are no logs.
     """
     results, key = Results(out), settings.key()
     logs = find_logs(sources)

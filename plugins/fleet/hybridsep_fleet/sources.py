@@ -37,10 +37,7 @@ class LogFile:
 def find_logs(sources: Iterable[str]) -> list[LogFile]:
     """Return all logs of folders, patterns and addresses such as ``s3://bucket/folder``, by address, each once.
 
-    Raises
-    ------
-    LogError
-        If a source has none, or its store cannot be reached.
+    LogError if a source has none, or its store cannot be reached.
     """
     found: dict[str, LogFile] = {}
     for source in sources:
@@ -55,10 +52,7 @@ def find_logs(sources: Iterable[str]) -> list[LogFile]:
 def local_copy(url: str) -> Iterator[Path]:
     """Yield a path with the content of a log: its own, or a copy that is removed afterwards.
 
-    Raises
-    ------
-    LogError
-        If the store does not give it.
+    LogError if the store does not give it.
     """
     if "://" not in url:
         yield Path(url)

@@ -46,10 +46,7 @@ class _Judged:
 def look(task: tuple[LogFile, FleetSettings]) -> Looked:
     """Return the hash of a log's content, and its axes.
 
-    Raises
-    ------
-    LogError
-        If it cannot be read.
+    LogError if it cannot be read.
     """
     log, settings = task
     with local_copy(log.url) as path:
@@ -65,10 +62,7 @@ def look(task: tuple[LogFile, FleetSettings]) -> Looked:
 def work(task: AxisTask) -> dict[str, Any]:
     """Fit or replay an axis; return its row.
 
-    Raises
-    ------
-    HybridSepError
-        If the log, or the axis, cannot be used.
+    HybridSepError if the log, or the axis, cannot be used.
     """
     begin = time.perf_counter()
     with one_blas_thread, local_copy(task.looked.log.url) as path:

@@ -26,12 +26,7 @@ _SHORTEST, _WIDTH, _BINS = 1e-7, math.log(1.02), 1000
 class StepTimes:
     """Quantiles of step times in constant memory: a histogram whose bins are 2 % wide.
 
-    Attributes
-    ----------
-    n : int
-        Number of times.
-    longest : float
-        The longest one, s.
+    ``n``: number of times; ``longest``: the longest one, s.
     """
 
     def __init__(self) -> None:
@@ -81,23 +76,10 @@ class _Published(NamedTuple):
 class LiveCore:
     """FMU of a predictor on a stream.
 
-    Parameters
-    ----------
-    controller : FmuController
-        Opened.
-    first : Sample
-        The first sample, at whose command the drive rests.
-
-    Attributes
-    ----------
-    T_s : float
-        Sampling interval, s.
-    Np, delay : int
-        Samples in a window; samples by which rows are behind the stream.
-    n_samples, n_missing : int
-        Number of samples taken in, and of samples without a measured position.
-    times : StepTimes
-        Of the FMU's steps.
+    ``controller``: opened; ``first``: the first sample, at whose command the drive rests. ``T_s``: sampling interval,
+    s; ``Np``, ``delay``: samples in a window; samples by which rows are behind the stream; ``n_samples``,
+    ``n_missing``: number of samples taken in, and of samples without a measured position; ``times``: of the FMU's
+    steps.
     """
 
     def __init__(self, controller: FmuController, first: Sample) -> None:
@@ -119,12 +101,8 @@ class LiveCore:
     def step(self, sample: Sample) -> Row | None:
         """Take in a sample; return the row that is known by it, None during the first fill.
 
-        Raises
-        ------
-        SignalError
-            If its command is ahead and the commands before were not, or the other way round.
-        FmuError
-            If the FMU refuses it.
+        SignalError if its command is ahead and the commands before were not, or the other way round; FmuError if the
+        FMU refuses it.
         """
         if sample.ahead != self._ahead:
             raise SignalError(f"sample {sample.k}: either all commands are ahead (x_d_ahead) or none")

@@ -19,18 +19,9 @@ _SECONDS, _SAMPLES = 3.0, (500, 5000)
 class FirstSeconds:
     """First samples of a stream, checked once the axis has moved for long enough, beside the run, or at its end.
 
-    Parameters
-    ----------
-    unit : {"m", "rad"}
-        Of the machine.
-    T_s : float
-        Sampling interval, s.
-    Np : int
-        Samples by which commands that are ahead come before the positions.
-    stated : bool
-        Whether the unit of the positions was stated.
-    say : callable
-        Called with the findings once, from a thread of its own.
+    ``unit``: {"m", "rad"}: of the machine; ``T_s``: sampling interval, s; ``Np``: samples by which commands that are
+    ahead come before the positions; ``stated``: whether the unit of the positions was stated; ``say``: called with
+    the findings once, from a thread of its own.
     """
 
     def __init__(

@@ -29,15 +29,8 @@ class Order:
 
     Samples with neither are taken as they come.
 
-    Parameters
-    ----------
-    T_s : float
-        Sampling interval, s.
-
-    Attributes
-    ----------
-    n_repeated, n_late : int
-        Samples that came again, which are ignored; samples that came after a later one.
+    ``T_s``: sampling interval, s. ``n_repeated``, ``n_late``: samples that came again, which are ignored; samples
+    that came after a later one.
     """
 
     def __init__(self, T_s: float) -> None:
@@ -52,10 +45,7 @@ class Order:
     def take(self, sample: Sample) -> list[Sample]:
         """Take a sample in; return the samples whose turn it is, with their numbers.
 
-        Raises
-        ------
-        SignalError
-            If samples are missing before it, its number is far behind, or its times tell another interval.
+        SignalError if samples are missing before it, its number is far behind, or its times tell another interval.
         """
         if sample.k is None and sample.t is None:
             number = 0 if self._next is None else self._next

@@ -36,25 +36,8 @@ _FLUSHED = 5.0
 class Page:
     """Page that a browser of this machine shows, at :attr:`address` alone.
 
-    Parameters
-    ----------
-    title : str
-    shown : DisplayUnits
-        Units.
-    port : int
-        0 for a free one.
-
-    Attributes
-    ----------
-    address : str
-        With the token, without which there is nothing to see.
-    n_dropped : int
-        Rows that the page missed, as its process was too slow.
-
-    Raises
-    ------
-    ParameterError
-        If the port is taken.
+    ``shown``: units; ``port``: 0 for a free one. ``address``: with the token, without which there is nothing to see;
+    ``n_dropped``: rows that the page missed, as its process was too slow. ParameterError if the port is taken.
     """
 
     def __init__(self, title: str, shown: DisplayUnits, port: int = 0) -> None:

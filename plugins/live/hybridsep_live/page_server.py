@@ -204,22 +204,7 @@ class _Tornado(BokehTornado):
 class PageServer:
     """Server of a page.
 
-    Parameters
-    ----------
-    fill : callable
-        Fills the document of a session.
-    port : int
-        0 for a free one.
-    token : str
-
-    Attributes
-    ----------
-    port : int
-
-    Raises
-    ------
-    OSError
-        If the port is taken.
+    ``fill``: fills the document of a session; ``port``: 0 for a free one. OSError if the port is taken.
     """
 
     def __init__(self, fill: Callable[[Document], None], port: int, token: str) -> None:

@@ -19,17 +19,8 @@ _ADDRESS = re.compile(r"(?P<host>[^:\s]+|\[[^\]\s]+\]):(?P<port>\d+)", re.ASCII)
 class PlotJuggler:
     """Sender of a datagram a row: ``{"timestamp": t, "NAME": {"x_d": …, "x_meas": …, …}}``, in SI units.
 
-    Parameters
-    ----------
-    address : str
-        ``HOST:PORT`` of PlotJuggler's UDP server.
-    name : str
-        Of the machine, below which the signals are.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such address.
+    ``address``: ``HOST:PORT`` of PlotJuggler's UDP server; ``name``: of the machine, below which the signals are.
+    ParameterError if there is no such address.
     """
 
     def __init__(self, address: str, name: str) -> None:

@@ -51,20 +51,9 @@ def run_live(
 ) -> LiveRun:
     """Run an FMU on a source until it ends, or Ctrl-C does.
 
-    Parameters
-    ----------
-    source : LiveSource
-    controller : FmuController
-        Of a predictor; it is opened and closed here.
-    sinks : sequence of Sink
-        They get every row, and are told of the end, by an error too.
-    watch : callable, optional
-        Sampling interval, s, and samples in a window → what checks the first seconds.
-
-    Raises
-    ------
-    HybridSepError
-        If a sample is refused, or commands are missing.
+    ``controller``: of a predictor; it is opened and closed here; ``sinks``: they get every row, and are told of the
+    end, by an error too; ``watch``: sampling interval, s, and samples in a window → what checks the first seconds.
+    HybridSepError if a sample is refused, or commands are missing.
     """
     with controller:
         run, interrupted = _Run(source, sinks, watch), False

@@ -113,16 +113,7 @@ def _number(values: Mapping[str, Any], name: str, where: str, *, may_miss: bool 
 class MessageReader:
     """Reader of JSON messages: an object is a sample, an array of objects are several.
 
-    Parameters
-    ----------
-    where : str
-        The source, for messages.
-    reading : Reading
-
-    Attributes
-    ----------
-    n : int
-        Messages read.
+    ``where``: the source, for messages. ``n``: messages read.
     """
 
     def __init__(self, where: str, reading: Reading) -> None:
@@ -133,12 +124,8 @@ class MessageReader:
     def samples(self, message: bytes) -> list[Sample]:
         """Return the samples of a message.
 
-        Raises
-        ------
-        SignalError
-            If it is no JSON, or a value is no number or missing.
-        LogError, ParameterError
-            If the first one lacks a name, or states a unit that does not fit.
+        SignalError if it is no JSON, or a value is no number or missing; LogError, ParameterError if the first one
+        lacks a name, or states a unit that does not fit.
         """
         self.n += 1
         where = f"{self._where}, message {self.n}"
@@ -162,11 +149,7 @@ class MessageReader:
 class RowReader:
     """Reader of CSV lines, the first of which are the names.
 
-    Parameters
-    ----------
-    where : str
-        The source, for messages.
-    reading : Reading
+    ``where``: the source, for messages.
     """
 
     def __init__(self, where: str, reading: Reading) -> None:
@@ -179,12 +162,8 @@ class RowReader:
     def samples(self, line: bytes) -> list[Sample]:
         """Return the sample of a line; none of the names or of an empty line.
 
-        Raises
-        ------
-        SignalError
-            If a line has another number of fields, or one that is no number or missing.
-        LogError, ParameterError
-            If the first one lacks a name, or states a unit that does not fit.
+        SignalError if a line has another number of fields, or one that is no number or missing; LogError,
+        ParameterError if the first one lacks a name, or states a unit that does not fit.
         """
         self._n += 1
         where = f"{self._where}, line {self._n}"

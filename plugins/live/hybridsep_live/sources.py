@@ -78,16 +78,7 @@ class LiveSource(ABC):
 class RecordedSource(LiveSource):
     """Samples of a log, at true or scaled speed.
 
-    Parameters
-    ----------
-    log : Log
-    speed : float
-        Times the recorded one; 0: as fast as they are taken.
-
-    Raises
-    ------
-    ParameterError
-        If ``speed`` is negative.
+    ``speed``: times the recorded one; 0: as fast as they are taken. ParameterError if ``speed`` is negative.
     """
 
     def __init__(self, log: Log, speed: float = 1.0) -> None:
@@ -112,24 +103,9 @@ class RecordedSource(LiveSource):
 class UdpSource(LiveSource):
     """Datagrams, each a JSON message, from whoever sends them to the address; what is no sample is dropped.
 
-    Parameters
-    ----------
-    port : int
-        0 for a free one.
-    host : str
-        Address of this machine that is listened at; this machine's own network if left out.
-    reading : Reading
-    say : callable, optional
-        Called with what is wrong with the first message that is dropped.
-
-    Attributes
-    ----------
-    port : int
-
-    Raises
-    ------
-    ParameterError
-        If the address cannot be listened at.
+    ``port``: 0 for a free one; ``host``: address of this machine that is listened at; this machine's own network if
+    left out; ``say``: called with what is wrong with the first message that is dropped. ParameterError if the address
+    cannot be listened at.
     """
 
     def __init__(
@@ -176,13 +152,8 @@ class UdpSource(LiveSource):
 class LinesSource(LiveSource):
     """Lines of a descriptor, until its writer closes it: CSV, the first of which are the names, or JSON messages.
 
-    Parameters
-    ----------
-    descriptor : int
-        It is read from directly: a thread that waits in a buffered reader could not be left at the end.
-    reading : Reading
-    say : callable, optional
-        Called with what is wrong with the first JSON message that is dropped.
+    ``descriptor``: it is read from directly: a thread that waits in a buffered reader could not be left at the end;
+    ``say``: called with what is wrong with the first JSON message that is dropped.
     """
 
     name: str = "standard input"
@@ -254,21 +225,9 @@ def open_source(
 ) -> LiveSource:
     """Open a source.
 
-    Parameters
-    ----------
-    address : str
-        In one of :data:`FORMS`.
-    machine : Machine
-    given : Given
-    say : callable, optional
-        As of :class:`UdpSource`.
-
-    Raises
-    ------
-    ParameterError
-        If the address has no such form, cannot be listened at, or a speed is given for another source than a log.
-    LogError
-        If the log cannot be read.
+    ``address``: in one of :data:`FORMS`; ``say``: as of :class:`UdpSource`. ParameterError if the address has no such
+    form, cannot be listened at, or a speed is given for another source than a log; LogError if the log cannot be
+    read.
     """
     own = machine.log
     columns, unit = {**own.columns, **given.columns}, given.unit or own.unit

@@ -31,17 +31,8 @@ graphics processor must draw them ten times a second; while they rest, with as m
 class History:
     """Last rows, contiguous.
 
-    Parameters
-    ----------
-    n_columns : int
-        The first one is the time, which increases.
-    capacity : int
-        Rows that are kept at least, once there are as many.
-
-    Attributes
-    ----------
-    n : int
-        Rows that ever came.
+    ``n_columns``: the first one is the time, which increases; ``capacity``: rows that are kept at least, once there
+    are as many. ``n``: rows that ever came.
     """
 
     def __init__(self, n_columns: int, capacity: int = CAPACITY) -> None:
@@ -77,19 +68,8 @@ def drawn(rows: Array, first: int, columns: int) -> Array:
 
     Stretches are of equal length and begin at multiples of it, so that a line that moves does not flicker.
 
-    Parameters
-    ----------
-    rows : (n, m) array
-        The first column is the time.
-    first : int
-        Number of the first row.
-    columns : int
-        Columns of pixels.
-
-    Returns
-    -------
-    (k, m) array
-        Two rows a stretch, or all where there are at most two rows for each pixel.
+    ``rows``: (n, m): the first column is the time; ``first``: number of the first row; ``columns``: columns of
+    pixels. Returns (k, m): two rows a stretch, or all where there are at most two rows for each pixel.
     """
     if len(rows) <= 2 * columns:
         return rows
@@ -116,12 +96,7 @@ def table(rows: list[Row]) -> Array:
 def signals(rows: Array, shown: DisplayUnits) -> Array:
     """Return what is drawn, ``(n, len(DRAWN))``.
 
-    Parameters
-    ----------
-    rows : (n, len(COLUMNS)) array
-        As of :func:`table`.
-    shown : DisplayUnits
-        Units.
+    ``rows``: (n, len(COLUMNS)): as of :func:`table`; ``shown``: units.
     """
     t, x_d, x_meas, x_pb, x_h, std, _, step, _ = rows.T
     position, error = shown.position[0], shown.small[0]

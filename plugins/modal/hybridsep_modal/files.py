@@ -50,15 +50,8 @@ def read_response(path: Path) -> ResponseFile:
     unless their column's name has dB; phases are in degrees or radians as theirs says, in degrees where one is
     beyond 2π.
 
-    Parameters
-    ----------
-    path : Path
-        CSV, MAT or NPZ; a complex vector ``H`` of a MAT file counts as ``H.real`` and ``H.imag``.
-
-    Raises
-    ------
-    LogError
-        If the file or its columns cannot be used.
+    ``path``: CSV, MAT or NPZ; a complex vector ``H`` of a MAT file counts as ``H.real`` and ``H.imag``. LogError if
+    the file or its columns cannot be used.
     """
     source = open_source(path)
     found = _found(source.names)

@@ -92,18 +92,9 @@ def polish(
 ) -> ModalFit:
     """Return the least-squares fit that starts from poles.
 
-    Parameters
-    ----------
-    omega : (n,) array, rad/s
-    response : (n,) array of complex
-    weight : (n,) array
-        Reciprocal standard deviation of each line, up to a factor.
-    poles : (n_modes, 2) array
-        ``log ω, log ζ`` to start from.
-    unit_gain : bool
-        Whether the static gains sum to 1.
-    iterations : int
-        Largest number of evaluations.
+    ``omega``: (n,), rad/s; ``response``: (n,); ``weight``: (n,): reciprocal standard deviation of each line, up to a
+    factor; ``poles``: (n_modes, 2): ``log ω, log ζ`` to start from; ``unit_gain``: whether the static gains sum to 1;
+    ``iterations``: largest number of evaluations.
     """
     s = np.asarray(1j * omega, dtype=np.complex128)
     start = np.column_stack((poles, _numerators(s, response, weight, poles, unit_gain)))

@@ -94,33 +94,13 @@ def identify_frequency_response(
 ) -> IdentifiedResponse:
     """Identify the physics model from a frequency response.
 
-    Parameters
-    ----------
-    frequency : (n,) array_like, Hz
-        Lines in any order; lines at 0, and where the response is 0 or not finite, are left out.
-    response : (n,) array_like of complex, m/m
-    std : (n,) array_like, optional
-        Standard deviation of each line's complex error; a constant part of its magnitude if left out.
-    n_modes : int, optional
-        Number of modes; by the Bayesian information criterion  if left out.
-    unit_gain : bool
-        Whether the static gain is 1.
-    T_s : float
-        Sampling interval of the machine, s.
-    input_hold : {"zoh", "foh"}
-    dead_time : int
-        Whole samples of dead time in the response.
-    sampled : bool
-        Whether the response was measured on sampled signals, so that it contains the hold.
-    progress : callable, optional
-        Called with a message and the fraction done.
-
-    Raises
-    ------
-    IdentificationError
-        If there are too few lines.
-    ParameterError
-        If a parameter is out of its range.
+    ``frequency``: (n,), Hz: lines in any order; lines at 0, and where the response is 0 or not finite, are left out;
+    ``response``: (n,) array_like, m/m; ``std``: (n,): standard deviation of each line's complex error; a constant
+    part of its magnitude if left out; ``n_modes``: number of modes; by the Bayesian information criterion  if left
+    out; ``unit_gain``: whether the static gain is 1; ``T_s``: sampling interval of the machine, s; ``input_hold``:
+    {"zoh", "foh"}; ``dead_time``: whole samples of dead time in the response; ``sampled``: whether the response was
+    measured on sampled signals, so that it contains the hold; ``progress``: called with a message and the fraction
+    done. IdentificationError if there are too few lines; ParameterError if a parameter is out of its range.
     """
     T_s, input_hold = check("T_s", T_s), check("input_hold", input_hold)
     dead_time = check("dead_time", dead_time)

@@ -53,10 +53,7 @@ def is_klipper(path: str | Path) -> bool:
 def read_klipper(path: str | Path) -> Acceleration:
     """Return the accelerations of a file.
 
-    Raises
-    ------
-    LogError
-        If it is not one of Klipper's, or damaged.
+    LogError if it is not one of Klipper's, or damaged.
     """
     if not is_klipper(path):
         raise LogError(f"{path}: is no accelerometer file of Klipper, which begins with #{HEADER}")
@@ -88,20 +85,8 @@ def identify_resonance(
 ) -> IdentifiedResponse:
     """Identify one mode from the magnitude of an axis' response to Klipper's resonance test.
 
-    Parameters
-    ----------
-    recording : Acceleration
-    axis : {"x", "y", "z"}
-        The axis that was shaken.
-    T_s : float
-        Sampling interval of the machine file, s.
-    band : tuple of float
-        Frequencies of the test, Hz.
-
-    Raises
-    ------
-    IdentificationError
-        If there is no resonance in the band.
+    ``axis``: {"x", "y", "z"}: the axis that was shaken; ``T_s``: sampling interval of the machine file, s; ``band``:
+    frequencies of the test, Hz. IdentificationError if there is no resonance in the band.
     """
     a = recording.axes[axis]
     n = min(len(a), max(16, round(WINDOW / recording.T_s)))

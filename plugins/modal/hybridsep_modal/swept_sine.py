@@ -44,19 +44,9 @@ class Response(NamedTuple):
 def h1(x_d: ArrayLike, x: ArrayLike, T_s: float, f_min: float = 0.0, f_max: float | None = None) -> Response:
     """Return the H1 estimate ``S_xd,x / S_xd,xd`` at the lines that the command excites.
 
-    Parameters
-    ----------
-    x_d, x : (n,) array_like
-        Commanded and measured positions, m, or both accelerations; at rest at both ends.
-    T_s : float
-        Sampling interval, s.
-    f_min, f_max : float
-        Band, Hz; up to half of the Nyquist frequency if ``f_max`` is left out.
-
-    Raises
-    ------
-    IdentificationError
-        If no line is coherent.
+    ``x_d``, ``x``: (n,): commanded and measured positions, m, or both accelerations; at rest at both ends; ``T_s``:
+    sampling interval, s; ``f_min``, ``f_max``: band, Hz; up to half of the Nyquist frequency if ``f_max`` is left
+    out. IdentificationError if no line is coherent.
     """
     T_s = check("T_s", T_s)
     u = as_samples(x_d, "x_d")

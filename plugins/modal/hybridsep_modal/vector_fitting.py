@@ -31,15 +31,9 @@ def starting_poles(omega: Array, n_modes: int) -> Complex:
 def vector_fit(omega: Array, response: Complex, weight: Array, poles: Complex) -> Complex:
     """Return stable poles of a strictly proper model of the response, real ones and the upper half of the pairs.
 
-    Parameters
-    ----------
-    omega : (n,) array, rad/s
-        Angular frequencies of the lines.
-    response : (n,) array of complex
-    weight : (n,) array
-        Of each line's error, for example ``1/|response|``.
-    poles : (m,) array of complex, rad/s
-        Starting poles: real ones and the upper half of the pairs.
+    ``omega``: (n,), rad/s: angular frequencies of the lines; ``response``: (n,); ``weight``: (n,): of each line's
+    error, for example ``1/|response|``; ``poles``: (m,), rad/s: starting poles: real ones and the upper half of the
+    pairs.
     """
     scale = float(np.sqrt(omega[omega > 0].min() * omega.max()))
     s = np.asarray(1j * omega / scale, dtype=np.complex128)

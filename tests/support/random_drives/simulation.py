@@ -31,18 +31,9 @@ def simulate(
 ) -> list[Array]:
     """Return the true positions of drives at rest at their first command.
 
-    Parameters
-    ----------
-    models, disturbances : sequences of m ModalModel and Disturbances
-        Linear parts, of at most 4 modes, and nonlinearities.
-    commands : sequence of m arrays (n_i,), m
-        Held over each millisecond.
-    sub_steps : int
-        Internal steps in a millisecond.
-
-    Returns
-    -------
-    x : list of m arrays (n_i,), m
+    ``models``, ``disturbances``: sequences of m ModalModel and Disturbances: linear parts, of at most 4 modes, and
+    nonlinearities; ``commands``: sequence of m (n_i,), m: held over each millisecond; ``sub_steps``: internal steps
+    in a millisecond. Returns ``x``: list of m (n_i,), m.
     """
     n = max(len(command) for command in commands)
     u = np.zeros((n, len(commands)))
@@ -111,14 +102,9 @@ def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, su
 def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
     """Return the exact step by ``h``, s, of each mode, and its outputs.
 
-    Returns
-    -------
-    A : (2, 2, 4) array
-    B : (2, 4) array
-    command : (2, 4) array
-        Output weights of the response to the command.
-    force : (2, 4) array
-        Output weights of the response to a force at the tool: every mode in phase, without zeros, static gain 1.
+    Returns ``A``: (2, 2, 4); ``B``: (2, 4); ``command``: (2, 4): output weights of the response to the command;
+    ``force``: (2, 4): output weights of the response to a force at the tool: every mode in phase, without zeros,
+    static gain 1.
     """
     A, b, c = model.state_space()
     step, gain = np.zeros((2, 2, MODES_MAX)), np.zeros((2, MODES_MAX))
@@ -157,12 +143,7 @@ class _Offsets:
     def step(self, x: Array, dx: Array) -> Array:
         """Return minus the offset over the next step.
 
-        Parameters
-        ----------
-        x : (m,) array, m
-            Positions.
-        dx : (m,) array, m
-            Displacements over the last step.
+        ``x``: (m,), m: positions; ``dx``: (m,), m: displacements over the last step.
         """
         # Stribeck: the bristle's limit falls from static to sliding friction.
         speed = dx * self.per_stribeck

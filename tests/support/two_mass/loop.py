@@ -71,18 +71,9 @@ def closed_loop(
 ) -> Loop:
     """Return a run of a drive behind its compensator.
 
-    Parameters
-    ----------
-    recipe : Recipe
-    axis : Axis
-        The drive, which may be another one than the recipe's.
-    compensate : {"off", "physics", "hybrid"}
-    sensor : callable, optional
-        Called as ``sensor(k, x_meas)``; returns what is measured in its place.
-    weights : bytes, optional
-        Content of ``weights.bin``, with which it starts.
-    **more
-        Parameters of the compensator's FMU besides.
+    ``axis``: the drive, which may be another one than the recipe's; ``compensate``: {"off", "physics", "hybrid"};
+    ``sensor``: called as ``sensor(k, x_meas)``; returns what is measured in its place; ``weights``: content of
+    ``weights.bin``, with which it starts; ``**more``: parameters of the compensator's FMU besides.
     """
     predictor, compensator, x_d = settings_of(recipe)
     assert compensator.preview is not None

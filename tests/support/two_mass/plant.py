@@ -68,12 +68,7 @@ def _library() -> ctypes.CDLL:
 class TwoMassDrive:
     """A drive, at rest at ``start`` at first.
 
-    Parameters
-    ----------
-    axis : Axis
-    start : float, m
-    step : float, s
-        Longest internal step.
+    ``start``: m; ``step``: s: longest internal step.
     """
 
     def __init__(self, axis: Axis, start: float = 0.0, step: float = INTERNAL_STEP) -> None:
