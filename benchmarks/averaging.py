@@ -30,11 +30,8 @@ from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import PAPER_LIMITS, along_path, rest_to_rest, spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-SEEDS = (0, 1000)
-"""Seeds of the encoder noise, cold and warm."""
-
-WINDOWS = (100, 20)
-"""Samples in a window, ``Np``, over a recording; ``p`` is 50 where it fits."""
+SEEDS = (0, 1000)  # seeds of the encoder noise, cold and warm
+WINDOWS = (100, 20)  # samples in a window, ``Np``, over a recording; ``p`` is 50 where it fits
 
 
 @dataclass(frozen=True)

@@ -33,17 +33,10 @@ from hybridsep.plants.plant import Encoder, Plant, simulate
 from hybridsep.plants.trajectory import spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-DELAY = 5
-"""Samples by which the measurement is late."""
-
-SETTLED = 2.0
-"""Time after which a warm run is to be no worse than a cold one, s."""
-
-RATES = (250.0, 1000.0, 8000.0)
-"""Sampling rates, Hz."""
-
-HORIZON = 0.1
-"""Length of a window at each of them, s."""
+DELAY = 5  # samples by which the measurement is late
+SETTLED = 2.0  # time after which a warm run is to be no worse than a cold one, s
+RATES = (250.0, 1000.0, 8000.0)  # sampling rates, Hz
+HORIZON = 0.1  # length of a window at each of them, s
 
 CUTS = (0.21, 0.37, 0.58)
 """Parts of a run of a random drive that are cut off, or up to a tenth more: until it moves fast."""
@@ -63,8 +56,7 @@ STAGE_CHANGES = {
 }
 """The same of the stage's X axis."""
 
-DETUNED = 0.9
-"""Factor on the natural frequencies of a random drive after it was learned."""
+DETUNED = 0.9  # factor on the natural frequencies of a random drive after it was learned
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -23,14 +23,9 @@ from hybridsep.base.metrics import largest, rms
 from hybridsep.base.signals import Array
 from hybridsep.online.look_ahead import SepState
 
-MARGIN = 1.3
-"""``following_error_max`` relative to the largest error without compensation, as ``fit`` writes it."""
-
-FASTEST = 2000.0
-"""Largest sampling rate, Hz: faster loops take up to half a minute each."""
-
-HARMED, PEAK = 1.2, 1.5
-"""Largest RMS and largest error that count as no harm, relative to no compensation."""
+MARGIN = 1.3  # ``following_error_max`` relative to the largest error without compensation, as ``fit`` writes it
+FASTEST = 2000.0  # largest sampling rate, Hz: faster loops take up to half a minute each
+HARMED, PEAK = 1.2, 1.5  # largest RMS and largest error that count as no harm, relative to no compensation
 
 Fault = Callable[[float, float, float], float]
 """Called as ``fault(x_meas, held, x_d)`` with what was measured before it began; returns what is measured, m."""
@@ -46,8 +41,7 @@ SENSORS: dict[str, Fault] = {
 }
 """Mirrored: counts backwards. Reversed, wrong sign: of the position. Wrong error: of the following error."""
 
-AT_ONCE = ("sound", "wrong sign", "wrong error", "saturated")
-"""What is so from the beginning."""
+AT_ONCE = ("sound", "wrong sign", "wrong error", "saturated")  # what is so from the beginning
 
 DRIVES = {"saturated": "motor saturated at 0.6", "ringing": "begins to ring"}
 

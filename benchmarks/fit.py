@@ -35,8 +35,7 @@ from hybridsep.machines.machine import machine_name
 
 WINDOWS = (100, 20)
 
-COPIES = ("xl330_kp100_raw_jitter.csv",)
-"""Recordings that are others again."""
+COPIES = ("xl330_kp100_raw_jitter.csv",)  # recordings that are others again
 
 COLUMNS = ("lag + hold", "hold", "ARX20", "ARX40", "physics", "hybrid", "best of the others", "ratio", "advice")
 

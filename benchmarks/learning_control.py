@@ -15,8 +15,7 @@ from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.plant import Plant, simulate
 
-_REST = 1000
-"""Samples of rest that are taken before and after a motion, so that its ends do not meet."""
+_REST = 1000  # samples of rest that are taken before and after a motion, so that its ends do not meet
 
 
 class Repeat(NamedTuple):

@@ -34,11 +34,8 @@ MODELS = {
 TOLERANCES = (1e-6, 1e-9, 1e-12)
 """Relative tolerances of rumoca's solver; the absolute ones are a thousandth of them, in m and m/s."""
 
-STEPS = (1, 50)
-"""Communication steps of an FMU within one sampling interval."""
-
-LIMIT = 1e-12
-"""Largest difference of a position at the tightest tolerance from an FMU with short steps, m."""
+STEPS = (1, 50)  # communication steps of an FMU within one sampling interval
+LIMIT = 1e-12  # largest difference of a position at the tightest tolerance from an FMU with short steps, m
 
 
 @dataclass(frozen=True)

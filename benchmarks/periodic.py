@@ -22,11 +22,8 @@ from hybridsep.predict.predictor import HybridPredictor
 
 TS, NOISE = 1e-3, 1e-6
 M, C, K = 1.0, 15.7, 24674.0
-STARTS = (0.0, 0.0313)
-"""Of the two runs, m: no whole number of any pitch apart."""
-
-CASES = ((20e-6, 0.005), (50e-6, 0.02), (5e-6, 0.001))
-"""Amplitudes and pitches, m."""
+STARTS = (0.0, 0.0313)  # of the two runs, m: no whole number of any pitch apart
+CASES = ((20e-6, 0.005), (50e-6, 0.02), (5e-6, 0.001))  # amplitudes and pitches, m
 
 
 def moves(amplitude: float, pitch: float, start: float, seed: int) -> tuple[Array, Array]:

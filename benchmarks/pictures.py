@@ -24,8 +24,7 @@ from hybridsep.cosim.compensated import COMPENSATED
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "pictures"
 RECORD = FOLDER / "pictures.json"
-DIGITS = 4
-"""Significant digits of the figures that are kept."""
+DIGITS = 4  # significant digits of the figures that are kept
 
 REPORT_SIZE = (1000, 900)
 

@@ -32,11 +32,8 @@ from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-NOISE_STD = 5e-6
-"""Standard deviation of the encoder noise, m."""
-
-ROWS_AT_ONCE = 500
-"""Rows that the extended-precision factor takes in at a time; bounds its work space."""
+NOISE_STD = 5e-6  # standard deviation of the encoder noise, m
+ROWS_AT_ONCE = 500  # rows that the extended-precision factor takes in at a time; bounds its work space
 
 
 def staircase_log(n: int) -> tuple[Array, Array]:

@@ -38,8 +38,7 @@ from hybridsep.plants.trajectory import spiral, staircase
 from hybridsep.predict.predictor import HybridPredictor
 
 RUNS, FEED = 3, 1.3
-WEIGHTS = 10.0 ** np.arange(-2.0, 1.5, 0.5)
-"""Of learning control, relative to the square of the model's gain at rest."""
+WEIGHTS = 10.0 ** np.arange(-2.0, 1.5, 0.5)  # of learning control, relative to the square of the model's gain at rest
 
 
 @dataclass(frozen=True)

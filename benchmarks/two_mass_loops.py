@@ -26,8 +26,7 @@ from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.predict.predictor import HybridPredictor
 
-KEPT = 1e-7
-"""Share by which a limit may be exceeded: third differences of positions round."""
+KEPT = 1e-7  # share by which a limit may be exceeded: third differences of positions round
 
 RUNS = {"physics": ("physics", False), "hybrid": ("hybrid", False), "hybrid, warm": ("hybrid", True)}
 """Best model allowed, and whether it starts with learned weights; warm only where the drive is sound."""

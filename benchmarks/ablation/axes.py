@@ -31,20 +31,14 @@ from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel
 
-WINDOWS = {"recordings": (100, 20), "so101": (5, 20)}
-"""Samples in a window, ``Np``, by the folder of the logs."""
+WINDOWS = {"recordings": (100, 20), "so101": (5, 20)}  # samples in a window, ``Np``, by the folder of the logs
 
 CHOOSE = {"recordings": ("cnc_a", "xl330_sin_sin"), "so101": ("Rotation",)}
 """Parts of the names of logs that constants may be chosen on, by folder; the others judge."""
 
-COPIES = "raw_jitter"
-"""Part of the name of a recording that is a copy of another."""
-
-SEEDS = {"modal": 103, "two_mass": 104, "changed": 101}
-"""Seeds of the random drives, which no constant was chosen on."""
-
-LEVELS = (0.5, 0.9, 0.95)
-"""Probabilities of intervals whose coverage is measured."""
+COPIES = "raw_jitter"  # part of the name of a recording that is a copy of another
+SEEDS = {"modal": 103, "two_mass": 104, "changed": 101}  # seeds of the random drives, which no constant was chosen on
+LEVELS = (0.5, 0.9, 0.95)  # probabilities of intervals whose coverage is measured
 
 _NOTHING = (np.empty(0), np.empty(0))
 

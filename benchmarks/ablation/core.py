@@ -23,14 +23,12 @@ from hybridsep.model.physics import ModalModel
 
 SOURCES = Path(__file__).resolve().parents[2] / "fmu_src" / "c" / "core"
 
-PARTS = ("numeric", "modal", "predict", "online")
-"""Folders of the core that a predictor needs."""
+PARTS = ("numeric", "modal", "predict", "online")  # folders of the core that a predictor needs
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Dmemcpy=memmove")
 """Options of the compiler; a change may make what is copied overlap."""
 
-Run = tuple[Array, Array]
-"""Commanded and measured positions, ``(n,)`` each, m."""
+Run = tuple[Array, Array]  # commanded and measured positions, ``(n,)`` each, m
 
 Changes = Mapping[str, Sequence[tuple[str, str]]]
 """Path of a file below ``fmu_src/c/core`` → pairs of a text in it, and what replaces it."""

@@ -22,14 +22,9 @@ from hybridsep.base.signals import Array
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.trajectory import spiral, staircase
 
-NO_WORSE = 1.02
-"""Largest RMS relative to the physics model's plans, where there is no figure."""
-
-OUTLIER_MOVES = 5.0
-"""Largest change of x_dm by an outlier of 1 mm, µm."""
-
-LATE = 5
-"""Samples by which a late measurement is late, which the compensator knows; the same figures are asked of it."""
+NO_WORSE = 1.02  # largest RMS relative to the physics model's plans, where there is no figure
+OUTLIER_MOVES = 5.0  # largest change of x_dm by an outlier of 1 mm, µm
+LATE = 5  # samples by which a late measurement is late, which the compensator knows; the same figures are asked of it
 
 
 @dataclass(frozen=True)

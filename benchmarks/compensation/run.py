@@ -46,8 +46,7 @@ class Report:
 
 
 UM = 1e6
-STAGE_SHARES = (1 / 2, 2 / 3)
-"""Largest error of the hybrid's warm runs on either axis, relative to the physics model's."""
+STAGE_SHARES = (1 / 2, 2 / 3)  # largest error of the hybrid's warm runs on either axis, relative to the physics model's
 
 LESS_THAN_5_PERCENT_WORSE = 1.05
 

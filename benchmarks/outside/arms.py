@@ -31,8 +31,7 @@ from hybridsep.fitting.fit import Fit, fit
 from hybridsep.machines.machine import Machine
 
 T_S, NP, RESOLUTION = 2e-3, 50, 2 * np.pi / 2**17
-LOG, TEST = 24.0, 20.0
-"""Durations of the log and of the test, s."""
+LOG, TEST = 24.0, 20.0  # durations of the log and of the test, s
 
 WAYS = ("off", "physics", "hybrid, cold", "hybrid, warm", "FIR inverse")
 MRAD = 1e3

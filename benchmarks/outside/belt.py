@@ -25,11 +25,8 @@ from hybridsep.machines.machine import Machine
 from hybridsep.plants.plant import simulate
 from hybridsep.predict.predictor import HybridPredictor
 
-T_S, ENCODER = 1e-3, 2 * math.pi / 2**18
-"""Sampling interval, s, and step of the arm's encoder, rad."""
-
-V_MAX, A_MAX, J_MAX = 9.0, 300.0, 2e4
-"""Of the drive, rad/s and so on: 1.3, 4 and 14 times the program's."""
+T_S, ENCODER = 1e-3, 2 * math.pi / 2**18  # sampling interval, s, and step of the arm's encoder, rad
+V_MAX, A_MAX, J_MAX = 9.0, 300.0, 2e4  # of the drive, rad/s and so on: 1.3, 4 and 14 times the program's
 
 MDEG = 1e3 * 180 / math.pi
 

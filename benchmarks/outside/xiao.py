@@ -42,8 +42,7 @@ from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.predict.predictor import HybridPredictor
 
 T_S, NP, NOISE_STD, PASSES = 1e-3, 100, 1e-7, 4
-RADIUS, FEED, TURNS = 10e-3, 1.25 / 60.0, 3
-"""Of the circle, m and m/s, and how often each pass goes round it."""
+RADIUS, FEED, TURNS = 10e-3, 1.25 / 60.0, 3  # of the circle, m and m/s, and how often each pass goes round it
 
 PLANE = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
 """Two directions that span the circle's plane, to which all three axes are inclined alike."""

@@ -23,8 +23,7 @@ from benchmarks.targets.targets import C_SOURCES, TARGETS, Replay, Target, build
 
 README = C_SOURCES / "README.md"
 BEGIN, END = "<!-- targets -->", "<!-- /targets -->"
-_FEW_WINDOWS = 12
-"""Replayed where each operation of a double takes a hundred instructions."""
+_FEW_WINDOWS = 12  # replayed where each operation of a double takes a hundred instructions
 _HEAD = (
     "processor",
     "look-ahead",

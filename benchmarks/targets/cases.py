@@ -22,8 +22,7 @@ KINDS = ("predictor", "compensator")
 SIZES = ((20, 20), (100, 50))
 OUTPUTS = {"predictor": ("x_h", "x_h_std"), "compensator": ("x_dm", "predicted.x_h")}
 """What a replay writes of each sample."""
-_BLOCK_SIZE = 1_500_000
-"""Room for the block, bytes; data of the program, not of the library."""
+_BLOCK_SIZE = 1_500_000  # room for the block, bytes; data of the program, not of the library
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,8 @@ from .start import demo, example_log, init
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-PLUG_INS = ("fleet", "live", "modal")
-"""Commands that this repository has as plug-ins, in ``plugins``."""
-
-_DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
-"""Environment variable: if it is set, an unexpected error shows its traceback."""
+PLUG_INS = ("fleet", "live", "modal")  # commands that this repository has as plug-ins, in ``plugins``
+_DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"  # environment variable: if it is set, an unexpected error shows its traceback
 
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
 """What an option takes, by the beginning of a type of typer's errors."""

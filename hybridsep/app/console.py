@@ -184,11 +184,8 @@ def warn_of_estimates(machines: "Iterable[Machine]") -> None:
 
 # Progress -------------------------------------------------------------------------------------------------------------
 
-_SILENT = 2.0
-"""Time for which no line is printed, s: what is done by then needs no progress."""
-
-_PAUSE = 5.0
-"""Time without a line after which one says how far the stage is, s."""
+_SILENT = 2.0  # time for which no line is printed, s: what is done by then needs no progress
+_PAUSE = 5.0  # time without a line after which one says how far the stage is, s
 
 
 @contextmanager
@@ -217,8 +214,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None]]:
 # Files ----------------------------------------------------------------------------------------------------------------
 
 FIGURES = (".png", ".pdf", ".svg")
-RUNS = (".csv", ".npz")
-"""Endings of figures and of runs."""
+RUNS = (".csv", ".npz")  # endings of figures and of runs
 
 Output = tuple[str, Path | None, tuple[str, ...]]
 """Option that names a file, the file where it is given, and the endings that it may have; any where there are none."""

@@ -15,8 +15,7 @@ from .options import ForceOption, MachineOption, SetOption, TargetOption, UnitOp
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-_CONTROLLERS = ("twincat",)
-"""Controllers that ``--for`` takes."""
+_CONTROLLERS = ("twincat",)  # controllers that ``--for`` takes
 
 
 def build(

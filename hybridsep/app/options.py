@@ -19,8 +19,7 @@ from ..fmi.compile import TARGET_NAMES
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
-"""What ``--trajectory`` takes besides a file."""
+TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")  # what ``--trajectory`` takes besides a file
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]

@@ -8,8 +8,7 @@ import typer
 
 from .options import ForceOption
 
-_LAG = 0.006
-"""Time constant of the axis in a machine file to edit, s."""
+_LAG = 0.006  # time constant of the axis in a machine file to edit, s
 
 
 def demo(

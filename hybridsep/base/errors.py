@@ -18,11 +18,8 @@ Each message names the thing, what was expected, what came and, where there is o
 from collections.abc import Callable, Collection
 from itertools import islice
 
-_LINE_MAX = 200
-"""Largest length of another library's message within one of ours, in characters."""
-
-_LISTED_MAX = 12
-"""Most names or problems that a message lists; more are counted."""
+_LINE_MAX = 200  # largest length of another library's message within one of ours, in characters
+_LISTED_MAX = 12  # most names or problems that a message lists; more are counted
 
 
 def brief(value: object) -> str:

@@ -17,11 +17,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
-DEFAULT_MACHINE = "spring_mass_damper"
-"""Machine file of the paper's staircase; its FMUs have no suffix."""
-
-COMMANDS = "commands.csv"
-"""File that ``hybridsep fit`` writes beside a machine file: commands of the log to try with."""
+DEFAULT_MACHINE = "spring_mass_damper"  # machine file of the paper's staircase; its FMUs have no suffix
+COMMANDS = "commands.csv"  # file that ``hybridsep fit`` writes beside a machine file: commands of the log to try with
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 

@@ -18,8 +18,7 @@ from typing import Any, ClassVar, TypeVar
 from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
-PLAN_END = 3
-"""Samples without change at the end of a compensator's plan, so that the third difference is zero after it."""
+PLAN_END = 3  # samples without change at the end of a compensator's plan, so that the third difference is zero after it
 
 _SettingsType = TypeVar("_SettingsType", bound="Settings")
 
@@ -31,8 +30,7 @@ class Settings:
     ParameterError naming every parameter that is out of range, or the joint constraints that are violated.
     """
 
-    OPTIONAL: ClassVar[tuple[str, ...]] = ()
-    """Fields that may be None."""
+    OPTIONAL: ClassVar[tuple[str, ...]] = ()  # fields that may be None
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ()
     """Fields that are no entries of these settings' own section of a machine file."""

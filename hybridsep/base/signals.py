@@ -26,8 +26,7 @@ squares of smaller values cannot overflow."""
 _SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")
 """Spellings of the units in which a quantity is taken as it is."""
 
-_GAP = 1.5
-"""Usual steps of an index from which on samples are missing in it."""
+_GAP = 1.5  # usual steps of an index from which on samples are missing in it
 
 
 @dataclass(frozen=True, eq=False)

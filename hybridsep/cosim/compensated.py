@@ -15,8 +15,7 @@ from .inverse import FirInverse, PlayedCommand
 from .loop import cosimulate
 from .run import Run
 
-_TRAINING_SEED = 1000
-"""Noise seed of the training run of a warm compensator; no case uses it."""
+_TRAINING_SEED = 1000  # noise seed of the training run of a warm compensator; no case uses it
 
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
@@ -26,8 +25,7 @@ RIVAL = "fir_inverse"
 
 Runs = dict[str, Run]
 
-Advance = Callable[[str], object]
-"""Called with the name of each run before it."""
+Advance = Callable[[str], object]  # called with the name of each run before it
 
 
 def compensate(

@@ -31,11 +31,8 @@ from fmpy.fmi3 import FMU3Slave
 from ..base.errors import FmuError, first_line, listed
 from ..base.files import named_errors
 
-_WORDS_MAX = 1000
-"""Most characters of an FMU's message in an error."""
-
-_NO_RUN_NEEDS = ("sources/", "documentation/")
-"""Folders of an archive with most of its files."""
+_WORDS_MAX = 1000  # most characters of an FMU's message in an error
+_NO_RUN_NEEDS = ("sources/", "documentation/")  # folders of an archive with most of its files
 
 _LOADING = threading.Lock()
 

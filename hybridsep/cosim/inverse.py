@@ -16,14 +16,9 @@ _AHEAD, _PAST, _FAR, _SIGNS = 21, 10, 10, 5
 """Taps from half a look-ahead ago to a whole one ahead; further back, geometrically, to so many look-aheads, as the
 integrator of a drive remembers; and taps of the velocity's sign."""
 
-_RIDGE = 1e-6
-"""Penalty of a tap, relative to the mean square of its column: neighbouring taps are nearly alike."""
-
-_SLOW = 0.02
-"""Velocity over which friction's sign changes, relative to the largest of the log."""
-
-_SMOOTH = 9
-"""Samples over which measured positions are smoothed before they are differentiated."""
+_RIDGE = 1e-6  # penalty of a tap, relative to the mean square of its column: neighbouring taps are nearly alike
+_SLOW = 0.02  # velocity over which friction's sign changes, relative to the largest of the log
+_SMOOTH = 9  # samples over which measured positions are smoothed before they are differentiated
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,7 @@ Sensor = Callable[[int, float], float]
 _Disturb = Callable[[int, Any], object]
 """Called as ``disturb(k, plant)`` before sample ``k``, counted likewise; may change the plant."""
 
-Progress = Callable[[int, int], object]
-"""Called with samples done and samples in all, about a hundred times."""
+Progress = Callable[[int, int], object]  # called with samples done and samples in all, about a hundred times
 
 
 def cosimulate(

@@ -27,8 +27,7 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 
 _PEERS = {"n_batches_worse_than_physics": "x_pb", "n_batches_worse_than_hold": "x_hold"}
 
-SEEDS = 10
-"""Noise seeds that a full demonstration's staircase is averaged over."""
+SEEDS = 10  # noise seeds that a full demonstration's staircase is averaged over
 
 
 def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:

@@ -43,8 +43,7 @@ _SPANS = {
 """Shading of spans that a lesser model planned than others of the run."""
 
 
-_PAD = 0.08
-"""Room between panels, and at the edges, inches."""
+_PAD = 0.08  # room between panels, and at the edges, inches
 
 
 def _legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:

@@ -19,14 +19,9 @@ if TYPE_CHECKING:
 PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
 """Colours of the predictions, in all figures."""
 
-_COLUMNS = 600
-"""Columns of a chart, each with its extremes; the widest has 900 pixels."""
-
-_HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255
-"""Height of the only panel, and of one of several, px."""
-
-_FONT_SIZE = 13
-"""Size of all text of a chart, px."""
+_COLUMNS = 600  # columns of a chart, each with its extremes; the widest has 900 pixels
+_HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255  # height of the only panel, and of one of several, px
+_FONT_SIZE = 13  # size of all text of a chart, px
 
 _AXES: dict[str, Any] = {
     "gridcolor": "#e8ecf0",

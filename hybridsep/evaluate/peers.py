@@ -56,11 +56,8 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     return FirstOrderLag(math.exp(best.x), late)
 
 
-_BRIDGED = 0.5
-"""Share of a row's lags that may be interpolated, as they were not measured."""
-
-_BLOCK = 4096
-"""Rows that are factorised at once."""
+_BRIDGED = 0.5  # share of a row's lags that may be interpolated, as they were not measured
+_BLOCK = 4096  # rows that are factorised at once
 
 
 class MinimumNorm:
@@ -163,8 +160,7 @@ def _interpolated(y: Array) -> Array:
     return np.where(np.isnan(y), np.asarray(Akima1DInterpolator(measured, y[measured])(k)), y)
 
 
-ARX_LAGS = (20, 40)
-"""Lags of the ARX models."""
+ARX_LAGS = (20, 40)  # lags of the ARX models
 
 LAG_HOLD, STATE_SPACE, FROZEN, REFITTED = "lag + hold", "N4SID", "frozen", "refitted"
 """Names of the lag whose last residual is held, and of the state-space model; ways to fit ARX: to the training samples,

@@ -14,14 +14,9 @@ from scipy.linalg import hankel
 
 from ..base.signals import Array
 
-_LAGS, _ORDERS = 40, range(1, 9)
-"""Samples of the past that the state is of, and orders that are tried."""
-
-_JUDGING = 5000
-"""Last samples of each record on which the orders are compared."""
-
-_BLOCK = 4096
-"""Rows that are factorised at once."""
+_LAGS, _ORDERS = 40, range(1, 9)  # samples of the past that the state is of, and orders that are tried
+_JUDGING = 5000  # last samples of each record on which the orders are compared
+_BLOCK = 4096  # rows that are factorised at once
 
 
 class StateSpace(NamedTuple):

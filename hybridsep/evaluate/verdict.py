@@ -13,35 +13,25 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array, Indices
 from ..cosim.run import Run
 
-ALIKE = 0.02
-"""Relative difference of two RMS errors below which they count as equal."""
-
-WINDOWS_MIN = 3
-"""Windows below which nothing is judged: what one or two of them show is chance."""
+ALIKE = 0.02  # relative difference of two RMS errors below which they count as equal
+WINDOWS_MIN = 3  # windows below which nothing is judged: what one or two of them show is chance
 
 WINDOWS_ENOUGH = 20
 """Windows from which on a judgement is stated without caution: some moves, each with its beginning and its end."""
 
-_LEAST_SHARE = 0.01
-"""Share of the samples from which on a place is judged."""
-
-STANDSTILL = 1e-3
-"""Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
+_LEAST_SHARE = 0.01  # share of the samples from which on a place is judged
+STANDSTILL = 1e-3  # commanded motion of a sample, relative to the largest, below which the axis is at rest
 
 _UNSTABLE = 3.0
 """Largest change of the prediction, relative to the largest residual, from which on the model counts as unstable."""
 
-_LITTLE_MOTION = 0.1
-"""Share of samples in motion below which there is too little of it to learn from."""
-
-_N_EARLY = 10
-"""Windows that count as the beginning of a run."""
+_LITTLE_MOTION = 0.1  # share of samples in motion below which there is too little of it to learn from
+_N_EARLY = 10  # windows that count as the beginning of a run
 
 _N_THIRDS = 3
 _THIRDS = ("first third", "second third", "last third")
 _MOTIONS = ("standstill", "motion")
-_PEERS = ("the physics model", "hold")
-"""Peers of every hybrid model, whose errors also tell why it is worse."""
+_PEERS = ("the physics model", "hold")  # peers of every hybrid model, whose errors also tell why it is worse
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from .replay import Replay
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
 
-OF_ITSELF = "What the controller says of itself"
-"""Heading of :meth:`Judged.of_the_controller`."""
+OF_ITSELF = "What the controller says of itself"  # heading of :meth:`Judged.of_the_controller`
 
 _KNOWN = (
     "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log of the axis."
@@ -184,11 +183,8 @@ def peers_in_words(judged: Judged) -> str:
     return "; ".join(words) + "."
 
 
-_ALL = 0.995
-"""Share of a file's samples from which on it counts as used, all of it."""
-
-_RATE = 0.01
-"""Relative difference from the file's own rate from which on both are said."""
+_ALL = 0.995  # share of a file's samples from which on it counts as used, all of it
+_RATE = 0.01  # relative difference from the file's own rate from which on both are said
 
 
 def extent(logs: Sequence[Log]) -> str:

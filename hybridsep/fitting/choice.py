@@ -18,17 +18,10 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, replay
 
-WORTH = 0.05
-"""Relative gain below which the default settings stay: less may be chance."""
-
-_SHARES = (0.1, 0.25, 1.0)
-"""Numbers of lags ``p`` that are tried besides the default, in windows."""
-
-_Q = (1,)
-"""Numbers of lags ``q`` of the physics-based position that are tried besides the default."""
-
-_GAIN = 0.9
-"""Ratio of the errors with and without a period below which it is worth a hint."""
+WORTH = 0.05  # relative gain below which the default settings stay: less may be chance
+_SHARES = (0.1, 0.25, 1.0)  # numbers of lags ``p`` that are tried besides the default, in windows
+_Q = (1,)  # numbers of lags ``q`` of the physics-based position that are tried besides the default
+_GAIN = 0.9  # ratio of the errors with and without a period below which it is worth a hint
 
 
 @dataclass(frozen=True)

@@ -39,17 +39,10 @@ _SCALE = 0.05
 be ten times as fast: then no stop operator is as short as a belt's friction before sliding, and a warm loop has 1.16
 times the error of a cold one instead of 0.97. Predictions alone are 2 % worse with it on recorded axes."""
 
-_CHANGED = ("acceleration", "jerk", "change_max")
-"""Entries of ``[drive_limits]`` whose cost is said."""
-
-FACTORS = (0.5, 1.0, 2.0)
-"""By which each limit is changed, one at a time, to say what it costs."""
-
-_GAIN = 0.05
-"""Relative gain from which on a limit twice as large is advised."""
-
-COSTS_MAX = 4000
-"""Leading samples over which that is tried: eight runs."""
+_CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]`` whose cost is said
+FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
+_GAIN = 0.05  # relative gain from which on a limit twice as large is advised
+COSTS_MAX = 4000  # leading samples over which that is tried: eight runs
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "

@@ -59,11 +59,8 @@ from .report import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LOOK_AHEAD = 0.1
-"""Look-ahead, s, of a controller of which nothing is known."""
-
-_SHARE = 0.5
-"""Share of each log's samples for training; the rest is held out for the test."""
+_LOOK_AHEAD = 0.1  # look-ahead, s, of a controller of which nothing is known
+_SHARE = 0.5  # share of each log's samples for training; the rest is held out for the test
 
 _TRIED_MAX = 20_000
 """Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz, and a compensator

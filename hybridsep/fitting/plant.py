@@ -25,32 +25,18 @@ from ..model.physics import ModalModel, Mode
 from ..plants.stage_drive import StageDrive
 from .replay import Recording
 
-_FITTED = 2 / 3
-"""Share of the training samples that the fit takes; the others choose."""
-
-_WORTH = 0.9
-"""Error relative to the identified model's alone from which a disturbance is kept."""
-
-_EVALUATIONS = 30
-"""Most evaluations of a fit; the example log's needs 30, a third of a second."""
-
-_SETTLED = 0.01
-"""Share of an initial motion that is left when samples begin to count."""
-
-_TRIED_MAX = 20_000
-"""Most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for."""
-
-_LEAD_IN = 100
-"""Samples at rest before the commands to try with."""
-
-_AT_REST = 1e-3
-"""Velocity at rest, relative to the largest."""
+_FITTED = 2 / 3  # share of the training samples that the fit takes; the others choose
+_WORTH = 0.9  # error relative to the identified model's alone from which a disturbance is kept
+_EVALUATIONS = 30  # most evaluations of a fit; the example log's needs 30, a third of a second
+_SETTLED = 0.01  # share of an initial motion that is left when samples begin to count
+_TRIED_MAX = 20_000  # most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for
+_LEAD_IN = 100  # samples at rest before the commands to try with
+_AT_REST = 1e-3  # velocity at rest, relative to the largest
 
 _MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
 """Steps and bounds of a mode's changes: log f_n, log zeta, alpha/ω² and beta/ω."""
 
-_SMALLEST_SPREAD = 1e-3
-"""Least velocity over which friction changes sign, relative to the largest commanded one."""
+_SMALLEST_SPREAD = 1e-3  # least velocity over which friction changes sign, relative to the largest commanded one
 
 
 @dataclass(frozen=True)

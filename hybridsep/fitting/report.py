@@ -20,11 +20,8 @@ from ..logs.units import stated_unit
 from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
 from .choice import WORTH, Tried
 
-_NAMES = ("physics model", "hold the last residual", "hybrid")
-"""Names of what a replay predicts by."""
-
-_COLOURS = (PHYSICS, HOLD, HYBRID)
-"""Their colours."""
+_NAMES = ("physics model", "hold the last residual", "hybrid")  # names of what a replay predicts by
+_COLOURS = (PHYSICS, HOLD, HYBRID)  # their colours
 
 _COMMAND = "#1d2733"
 
@@ -243,8 +240,7 @@ class Move(NamedTuple):
     settling: float  # s from the end of the command until the error stays within the window; inf where it never does
 
 
-_REST = 10
-"""Samples without a change of the command that end a move."""
+_REST = 10  # samples without a change of the command that end a move
 
 
 def moves_of(x_d: Array, x: Array, T_s: float, in_position: float) -> list[Move]:

@@ -32,8 +32,7 @@ from ..base.files import atomic_open, data_folder, named_errors
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
 
-ZIG = "ziglang 0.17.1"
-"""The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
+ZIG = "ziglang 0.17.1"  # the compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement
 
 FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-fstack-protector-strong")
 """Options of every compiler, gcc 4.9, clang 3.5 or newer. Never ``-ffast-math``: every platform is to give the same
@@ -75,12 +74,10 @@ _FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
 }
 """FMI 2.0's names of platforms, which users know."""
 
-TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)
-"""Allowed targets."""
+TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)  # allowed targets
 
 
-Library = tuple[str, str]
-"""A kind and a platform, a key of :data:`TARGETS`."""
+Library = tuple[str, str]  # a kind and a platform, a key of :data:`TARGETS`
 
 
 @dataclass(frozen=True)
@@ -190,8 +187,7 @@ def universal(libraries: Sequence[bytes]) -> bytes:
 
 
 _SHIPPED = Path(__file__).resolve().parents[1] / "_data" / "binaries"
-_KEPT_VERSIONS = 4
-"""Versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each."""
+_KEPT_VERSIONS = 4  # versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each
 
 
 def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:

@@ -28,8 +28,7 @@ from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTI
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
-COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}
-"""Name of the component of each model."""
+COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}  # name of the component of each model
 
 
 _NAME_MAX = 47 - len("..look-ahead")

@@ -19,13 +19,11 @@ from .variables import INTERPOLATED, FmuTable, Variable
 _TEMPLATES = Path(__file__).parent / "templates"
 
 _FMI3_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
-_WHOLE = ("Integer", "Int32", "UInt64", "Enumeration")
-"""Kinds whose numbers are whole."""
+_WHOLE = ("Integer", "Int32", "UInt64", "Enumeration")  # kinds whose numbers are whole
 
 _TIME = Variable("time", "Real", "independent", "continuous", "simulation time", unit="s")
 
-_OWN_STEPS = ("FeedDrive",)
-"""Models whose internal steps divide the communication step; all others sample at T_s."""
+_OWN_STEPS = ("FeedDrive",)  # models whose internal steps divide the communication step; all others sample at T_s
 
 
 def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int | None]]:

@@ -2,11 +2,8 @@
 
 from ..base.errors import FmuError
 
-FLAVOURS = ("native", "python")
-"""The default first."""
-
-FMI_VERSIONS = ("2", "3")
-"""FMI 2.0 and FMI 3.0; the default first."""
+FLAVOURS = ("native", "python")  # the default first
+FMI_VERSIONS = ("2", "3")  # FMI 2.0 and FMI 3.0; the default first
 
 
 def check_version(flavour: str, fmi: str) -> None:

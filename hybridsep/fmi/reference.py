@@ -26,18 +26,12 @@ REFERENCE_FOLDER = "documentation/reference"
 AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}
 """Decimals, m, to which a model's reference agrees; else 11. The iteration for a bounded plan amplifies rounding."""
 
-_SAMPLES = 600
-"""Length of a run; a look-ahead's is longer if its fill and warm-up are."""
-
-_COMPENSATED_SAMPLES = 750
-"""Length of a compensator's run: the hybrid model has planned half of it, on all machines."""
+_SAMPLES = 600  # length of a run; a look-ahead's is longer if its fill and warm-up are
+_COMPENSATED_SAMPLES = 750  # length of a compensator's run: the hybrid model has planned half of it, on all machines
 
 _SAMPLES_MAX = 3000
-_WINDOW_MAX = 1000
-"""Longest look-ahead with a reference, samples: with a longer one no short run contains a prediction."""
-
-_RESOLUTION = 9
-"""Decimals of an input, m; the result is computed from the rounded values."""
+_WINDOW_MAX = 1000  # longest look-ahead with a reference, samples: with a longer one no short run contains a prediction
+_RESOLUTION = 9  # decimals of an input, m; the result is computed from the rounded values
 
 _RESULT_RESOLUTION = 11
 """Decimals of a result: what platforms agree on, so that an archive has the same bytes wherever it is built."""
@@ -68,8 +62,7 @@ def reference_run(spec: FmuSpec) -> dict[str, bytes]:
     return files
 
 
-Rows = list[tuple[list[float], list[float]]]
-"""Outputs at each communication point, and the inputs that go in there."""
+Rows = list[tuple[list[float], list[float]]]  # outputs at each communication point, and the inputs that go in there
 
 
 def _command(machine: Machine, n: int) -> list[float]:

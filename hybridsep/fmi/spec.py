@@ -150,8 +150,7 @@ def _modes(model: ModalModel) -> tuple[dict[str, float], ...]:
 
 
 AUTHOR = "the hybridsep authors"
-COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"
-"""The line of LICENSE."""
+COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
 
 _TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",

@@ -24,8 +24,7 @@ from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
 
-SSP_VERSIONS = ("1", "2")
-"""SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""
+SSP_VERSIONS = ("1", "2")  # SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first
 
 _REALS = ("Real", "Float64")
 

@@ -13,8 +13,7 @@ from typing import Any
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
-Value = float | int | bool
-"""A start value."""
+Value = float | int | bool  # a start value
 
 _PREDICTOR = PredictorSettings.fmi_parameters()
 

@@ -69,8 +69,7 @@ def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title:
     return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
 
 
-_DEAD_TIMES = 21
-"""Dead times that are tried with given gains, samples."""
+_DEAD_TIMES = 21  # dead times that are tried with given gains, samples
 
 
 def of_cascade(

@@ -14,11 +14,8 @@ from scipy.optimize import least_squares
 from ..base.signals import Array, Indices, as_measured, as_samples
 from .structure import Structure, free_responses, responses, sections_of
 
-SAMPLES_MAX = 60_000
-"""Samples that are used of long recordings: the parts in which the axis moves most."""
-
-_PIECE = 6_000
-"""Samples of one part of a long recording."""
+SAMPLES_MAX = 60_000  # samples that are used of long recordings: the parts in which the axis moves most
+_PIECE = 6_000  # samples of one part of a long recording
 
 
 @dataclass(frozen=True)
@@ -89,15 +86,13 @@ def in_time(x_d: Array, x: Array, n_late: int) -> tuple[Array, Array]:
     return x_d[: max(0, len(x_d) - n_late)], x[n_late:]
 
 
-_EVALUATIONS_MAX = 20
-"""Largest number of iterations of one start; a good one converges within 15."""
+_EVALUATIONS_MAX = 20  # largest number of iterations of one start; a good one converges within 15
 
 _ROWS_MAX = 4000
 """Residuals that take part in a search, evenly spaced: the filters run over every sample, but neighbouring residuals
 tell the same."""
 
-_EDGE = 0.01
-"""Distance from a bound, in the logarithm of a parameter, within which it counts as at the bound."""
+_EDGE = 0.01  # distance from a bound, in the logarithm of a parameter, within which it counts as at the bound
 
 
 @dataclass(frozen=True, order=True)

@@ -19,23 +19,15 @@ PREDICTED = 0.35
 """Share of the variance in one half that the other predicts, both ways, from which a period is believed: at most 0.18
 on recorded axes, 0.03 on simulated ones without a period, 0.5 and more with one of 2 µm beside 5 µm of friction."""
 
-_PERIODS_MIN = 3.0
-"""Periods within the travel, at least; fewer look like stiffness, which is learned without a period."""
-
-SAMPLES_MIN = 4.0
-"""Samples a period at the fastest motion, at least."""
+_PERIODS_MIN = 3.0  # periods within the travel, at least; fewer look like stiffness, which is learned without a period
+SAMPLES_MIN = 4.0  # samples a period at the fastest motion, at least
 
 _MOVING = 0.02
 """Velocity in multiples of the largest below which the axis counts as at rest, where samples tell of no position."""
 
-_ROWS_MAX, _LINES_MAX = 4000, 6000
-"""Samples and lines of a spectrum at most: its cost is their product."""
-
-_OVERSAMPLED = 5.0
-"""Lines a width of the spectrum's resolution, the reciprocal of the travel."""
-
-_RESOLVED = 0.02
-"""Part of the resolution to which a period is rounded."""
+_ROWS_MAX, _LINES_MAX = 4000, 6000  # samples and lines of a spectrum at most: its cost is their product
+_OVERSAMPLED = 5.0  # lines a width of the spectrum's resolution, the reciprocal of the travel
+_RESOLVED = 0.02  # part of the resolution to which a period is rounded
 
 
 def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_s: float, input_hold: str) -> float:

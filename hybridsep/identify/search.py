@@ -8,8 +8,7 @@ from ..base.signals import Array
 from .output_error import Delay, Fit, Segment, fit_structure
 from .structure import DECAY_MIN, SLOWEST, Structure
 
-_DEAD_TIME_MAX = 0.25
-"""Longest dead time that is tried, s, and at most a quarter of the recording."""
+_DEAD_TIME_MAX = 0.25  # longest dead time that is tried, s, and at most a quarter of the recording
 
 
 def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:

@@ -51,17 +51,10 @@ def _parts(mode: Mode) -> Iterator[tuple[float, float, float]]:
         yield pole / (2 * np.pi), (alpha - beta * pole) / (other - pole) / pole, 0.0
 
 
-HELD_OUT = 0.35
-"""Part of the commanded motion that is held out."""
-
-SETTLING = 10
-"""The first 1/10 of a segment is not scored: it may start in motion, where the model starts at rest."""
-
-_BLOCKS = 12
-"""Blocks of the held-out part whose errors are compared pair by pair."""
-
-TOLERANCE = 0.02
-"""Relative increase of the held-out error that a simpler structure may always have."""
+HELD_OUT = 0.35  # part of the commanded motion that is held out
+SETTLING = 10  # the first 1/10 of a segment is not scored: it may start in motion, where the model starts at rest
+_BLOCKS = 12  # blocks of the held-out part whose errors are compared pair by pair
+TOLERANCE = 0.02  # relative increase of the held-out error that a simpler structure may always have
 
 _EXCESS_MAX = 0.1
 """Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
@@ -83,11 +76,8 @@ _CANCELLING_WORTH = 0.6
 but cancel is taken: a slow part that fits friction and cables leaves 0.64 to 0.85, one that is in the drive's loops
 less."""
 
-_GROWTH = 2
-"""Orders above the best one that are tried before the search ends."""
-
-_LAGS = 20
-"""Lags at which the residual's correlation is looked at: nothing is left to model where it is white."""
+_GROWTH = 2  # orders above the best one that are tried before the search ends
+_LAGS = 20  # lags at which the residual's correlation is looked at: nothing is left to model where it is white
 
 
 @dataclass(frozen=True)

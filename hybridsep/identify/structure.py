@@ -21,8 +21,7 @@ FASTEST = 0.25
 """Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
 not resolve a mode, and its replay is refused."""
 
-DECAY_MIN = 5.0
-"""Time constants of a pole within the recording, at least; a slower one cannot be told from drift."""
+DECAY_MIN = 5.0  # time constants of a pole within the recording, at least; a slower one cannot be told from drift
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,8 @@ from ..base.signals import Array
 from .output_error import Fit, Segment, affine, delayed, without
 from .structure import free_responses, responses, sections_of
 
-_BATCHES = 30
-"""Batches of the residual: enough for a variance, and each long beside a servo's memory."""
-
-_STEP = 1e-5
-"""Step of the differences in the logarithms of the poles, and of the relative ones in the delta method."""
+_BATCHES = 30  # batches of the residual: enough for a variance, and each long beside a servo's memory
+_STEP = 1e-5  # step of the differences in the logarithms of the poles, and of the relative ones in the delta method
 
 
 @dataclass(frozen=True)

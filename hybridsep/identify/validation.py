@@ -16,17 +16,13 @@ from scipy.signal import get_window, lfilter
 from ..base.signals import Array
 from ..model.physics import ModalModel
 
-_SEGMENTS = 24
-"""Segments that a response is averaged over at least: with fewer, coherence is high by chance."""
-
-_LENGTHS = tuple(2**i for i in range(12, 5, -1))
-"""Samples of a segment; the longest of which there are enough is taken."""
+_SEGMENTS = 24  # segments that a response is averaged over at least: with fewer, coherence is high by chance
+_LENGTHS = tuple(2**i for i in range(12, 5, -1))  # samples of a segment; the longest of which there are enough is taken
 
 _FLOOR = 1e-8
 """Power of the command, relative to its largest, below which it may be leakage: the window's lobes are at -92 dB."""
 
-_AVERAGES = 6.0
-"""Segments that must share the power at a frequency: coherence is 1 where one of them has it all."""
+_AVERAGES = 6.0  # segments that must share the power at a frequency: coherence is 1 where one of them has it all
 
 _HALF = 0.25
 """Half of the 95 % interval, relative, up to which a response is known. Chance alone is so at one frequency in 5e4 with

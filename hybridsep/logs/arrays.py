@@ -16,11 +16,8 @@ from .names import known_names
 from .source import ArraysSource, past_midnights
 from .text import with_own_names
 
-_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Durations, s, of the units of Arrow's times."""
-
-_OWN = (TypeError, AttributeError, LookupError)
-"""Errors whose messages tell of the library's own names."""
+_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # durations, s, of the units of Arrow's times
+_OWN = (TypeError, AttributeError, LookupError)  # errors whose messages tell of the library's own names
 
 
 @contextmanager

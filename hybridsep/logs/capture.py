@@ -12,8 +12,7 @@ from .source import ArraysSource
 
 _SIGNALS = b'"SignalListHFData"'
 _COUNTER = "CYCLE"
-_TIME = "t"
-"""Name of the time column, which is made from the counter of cycles."""
+_TIME = "t"  # name of the time column, which is made from the counter of cycles
 
 _ROTARY = ("A", "B", "C", "SP", "S")
 """Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""

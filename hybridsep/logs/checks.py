@@ -22,8 +22,7 @@ from .log import Log
 from .remedies import uneven
 from .units import POSITION_UNITS, UNIT_OPTIONS
 
-_SAMPLES_MIN = 100
-"""Samples below which nothing can be learned and judged: a window of the default length."""
+_SAMPLES_MIN = 100  # samples below which nothing can be learned and judged: a window of the default length
 
 _LAG_MAX, _LAGS, _SPAN = 1000, 48, 20_000
 """Largest lag of a mixture, samples, number of its lags, and samples, those with most motion, that it is fitted to."""
@@ -35,8 +34,7 @@ _BETTER, _BETTER_SWAPPED = 4.0, 20.0
 """Ratio of what the given reading leaves to what another leaves from which the other is believed. Good logs have at
 most 1.01, and at most 10 with their columns exchanged: an axis whose feed-forward is too large leads its command."""
 
-_NOISIER = 3.0
-"""Ratio of the columns' noise from which the noisier one is the measured one."""
+_NOISIER = 3.0  # ratio of the columns' noise from which the noisier one is the measured one
 
 _GAINS, _KNOWN = (0.1, 5.0), 0.03
 """Gains beyond which no position loop is: a small servo under load was recorded at 0.25; and relative distance from the
@@ -48,15 +46,13 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 _START = 0.25
 """Velocity between the first samples, relative to the largest, from which a start is in motion; EMPS has 0.12."""
 
-_LATE = 0.1
-"""Lag, s, from which it is noted: the look-ahead of a controller of which nothing is known."""
+_LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
 _ALONE, _SIZE = 10.0, 0.02
 """Size of an outlier in the usual steps, of an offset in the spread of the error, and of each relative to
 the travel, from which it is noted."""
 
-_USUAL = 0.98
-"""Quantile of what is usual, beyond which are the samples that are looked for."""
+_USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
 _HELD, _REPEATED = 0.1, 0.2
 """Way of the command, relative to its travel, while the measured position is held; and share of the samples in fast

@@ -17,8 +17,7 @@ from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, 
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
-_GAP = 1.5
-"""Intervals of the slower column between two samples of the faster one from which on the latter has a gap."""
+_GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 
 _SAME = 1e-6
 """Largest difference of two channels' times, relative to their interval, at which they are the same: rounding."""

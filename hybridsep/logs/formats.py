@@ -17,8 +17,7 @@ from .source import Source
 from .text import TextSource
 from .twincat import TwinCatSource
 
-EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")
-"""The example log, 20 s of a simulated axis at 1 kHz."""
+EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")  # the example log, 20 s of a simulated axis at 1 kHz
 
 READERS: tuple[type[Source], ...] = (
     NpzSource,
@@ -34,8 +33,7 @@ READERS: tuple[type[Source], ...] = (
 
 _HEAD = 4096
 
-_TEXT = (".csv", ".txt", ".log")
-"""Ends of the names of texts, in which no reader but theirs can say what is damaged."""
+_TEXT = (".csv", ".txt", ".log")  # ends of the names of texts, in which no reader but theirs can say what is damaged
 
 _SAVE = "save its columns t, x_d and x as CSV"
 _PANDAS = "import pandas; pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"

@@ -15,8 +15,7 @@ from .text import TextSource, split, with_own_names
 _PERIOD = re.compile(rb"#\s*Sampling period is\s+(-?\d{1,18})\s+ns\s")
 """First line."""
 
-_TIME = "t"
-"""Name of the time column, which is made from the period."""
+_TIME = "t"  # name of the time column, which is made from the period
 
 _COMMANDED, _MEASURED = ("motor-pos-cmd", "pos-cmd"), ("motor-pos-fb", "pos-fb")
 """Ends of the names of HAL pins with positions of a joint, at the motor first: between the two lies the servo."""

@@ -21,8 +21,7 @@ from .source import Block, Source
 from .times import NOT_LATER, given_times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-_OWN_NAMES = ("x_d", "x", "x_meas")
-"""Names of columns of positions that leave no doubt."""
+_OWN_NAMES = ("x_d", "x", "x_meas")  # names of columns of positions that leave no doubt
 
 
 class Table(Protocol):

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from .units import stated_unit
 
-ROLES = ("t", "x_d", "x")
-"""Time, commanded and measured position."""
+ROLES = ("t", "x_d", "x")  # time, commanded and measured position
 
 SIGNALS: Mapping[str, str] = {
     "planned_position": "DES_POS",

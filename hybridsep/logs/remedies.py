@@ -15,11 +15,8 @@ from ..base.signals import Array, Indices
 
 _TURN = 2 * math.pi
 
-_JUMP = 3.0
-"""Largest difference of a jump from a whole turn, in the largest steps that are no jumps."""
-
-_WITHIN = 1.05
-"""Largest range, in turns, of a position modulo one turn with its noise."""
+_JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
+_WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
 
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any

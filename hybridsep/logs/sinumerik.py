@@ -27,8 +27,7 @@ _COMMANDED = re.compile(r"cmdpos|despos", re.IGNORECASE)
 _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGNORECASE))
 """Names of the signals of positions, the measured ones by precedence."""
 
-_NOT_A_NUMBER = 9.2188684e18
-"""Values above are the bits of a NaN, written as a whole number: there is none."""
+_NOT_A_NUMBER = 9.2188684e18  # values above are the bits of a NaN, written as a whole number: there is none
 
 
 @dataclass

@@ -28,23 +28,15 @@ from .source import Block, Source, line_number, past_midnights
 from .timestamps import SECOND, nanoseconds, stamp_kind
 from .units import plain_name, position_unit, time_unit
 
-_HEAD_LINES = 1000
-"""Lines, blank ones aside, in which names and numbers must begin."""
-
-_BLOCK = 10_000
-"""Lines that are converted at once."""
+_HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
+_BLOCK = 10_000  # lines that are converted at once
 
 _COMMENTS = ("#", "%", "//", "!")
 """Beginnings of a comment line."""
 
-_DELIMITERS = (";", "\t", ",", None)
-"""Delimiters by precedence; None is blanks."""
-
-_NO_UNITS = ("", "-", "1", "[-]")
-"""Entries of a row of units where a column has none."""
-
-_BLANK = -math.inf
-"""Stands for a blank cell of the command until it is filled."""
+_DELIMITERS = (";", "\t", ",", None)  # delimiters by precedence; None is blanks
+_NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
+_BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 
 _MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|null|none", re.IGNORECASE)
 """Spellings of a missing number: of C libraries, R, databases and Excel."""

@@ -18,14 +18,12 @@ _CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _D
 _PLAUSIBLE = (2e-6, 0.5)
 """Intervals, s, of a log of an axis; where none is stated, the unit of the times is unknown beyond."""
 
-_COUNTED = 10
-"""Fewest times whose unit is doubted: two or three seconds are no index yet."""
+_COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
 NOT_LATER = 0.05
 """Share of times not above the one before from which on they are rounded too coarsely to tell an interval or a gap."""
 
-_RESOLVED = 0.2
-"""Largest resolution of times of single precision, in intervals, with which they tell a gap."""
+_RESOLVED = 0.2  # largest resolution of times of single precision, in intervals, with which they tell a gap
 
 _GAP, _LATE, _AROUND = 1.5, 0.6, 9
 """Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how

@@ -2,8 +2,7 @@
 
 import re
 
-SECOND = 1_000_000_000
-"""In nanoseconds, which doubles count exactly over a day."""
+SECOND = 1_000_000_000  # in nanoseconds, which doubles count exactly over a day
 
 _ONE_DATE = r"""
     \d{4} [-/.] \d{1,2} [-/.] \d{1,2}                       # 2026-03-05

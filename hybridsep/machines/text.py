@@ -7,8 +7,7 @@ from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, Limits
 from .machine import Machine
 
-_COLUMN = 32
-"""Column of the comments, for alignment."""
+_COLUMN = 32  # column of the comments, for alignment
 
 
 def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: bool = False) -> str:

@@ -8,8 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ..base.settings import check
 from ..base.signals import Array
 
-BLOCK_MAX = 256
-"""Largest size of the lifted matrices, for memory's sake; longer windows are split into blocks."""
+BLOCK_MAX = 256  # largest size of the lifted matrices, for memory's sake; longer windows are split into blocks
 
 StateSpace = tuple[Array, Array, Array]
 

@@ -23,11 +23,8 @@ from .discrete import BLOCK_MAX, DiscreteModel
 if TYPE_CHECKING:
     import control
 
-_LOOK_AHEAD_MAX = 2000
-"""Longest preview of a compensator, samples."""
-
-MODES_MAX = 100
-"""Largest number of modes; the discrete model's tables grow with its square."""
+_LOOK_AHEAD_MAX = 2000  # longest preview of a compensator, samples
+MODES_MAX = 100  # largest number of modes; the discrete model's tables grow with its square
 
 
 @dataclass(frozen=True)
@@ -244,8 +241,7 @@ class ModalModel:
         return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)
 
 
-_REPEATED = 1e-3
-"""Relative distance below which two poles count as repeated: rounding splits a fivefold one by 7e-4."""
+_REPEATED = 1e-3  # relative distance below which two poles count as repeated: rounding splits a fivefold one by 7e-4
 
 _REPEATED_MODES = "G_pb has repeated modes, which a sum of modes as in eq. (15) cannot express; separate them slightly"
 

@@ -21,8 +21,7 @@ from ..base.settings import Limits, samples_before
 from ..base.signals import Array
 from .trajectory import read_trajectory, rest_to_rest
 
-Points = NDArray[np.complexfloating[Any, Any]]
-"""Planar positions, ``(n,)``, m: X + iY."""
+Points = NDArray[np.complexfloating[Any, Any]]  # planar positions, ``(n,)``, m: X + iY
 
 _PROGRAM = re.compile(r"(?:\s|\([^)]*\)|[;%][^\n]*)*/?[GMNOFST]\d", re.IGNORECASE)
 """Begin of a program: comments, then a word; a table begins with numbers or names."""
@@ -36,8 +35,7 @@ _WITHOUT_EFFECT = {17.0, 40.0, 43.0, 49.0, 54.0, 61.0, 61.1, 64.0, 80.0, 91.1, 9
 _IGNORED = frozenset("GMNOSTZHD")
 """Letters of words that are not read as an argument; Z moves do not change the path in the plane."""
 
-_ROUNDED = 5e-6
-"""Distance up to which the two radii of an arc, or two centres, are the same one rounded, m."""
+_ROUNDED = 5e-6  # distance up to which the two radii of an arc, or two centres, are the same one rounded, m
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
-INTERNAL_STEP = 1e-4
-"""Longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval."""
+INTERNAL_STEP = 1e-4  # longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval
 
 RATE_MAX = 1e5
 """Fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps per millisecond."""
@@ -25,8 +24,7 @@ RATE_MAX = 1e5
 STATE_MAX = 1e100
 """Largest magnitude of a drive's state; beyond it the state counts as overflowed, before its square does."""
 
-_STEPS_MAX = 1_000_000
-"""Largest number of internal steps in one step, which bounds its cost."""
+_STEPS_MAX = 1_000_000  # largest number of internal steps in one step, which bounds its cost
 
 
 class Plant(Protocol):

@@ -9,8 +9,7 @@ from ..base.signals import check_position
 from ..model.physics import ModalModel, Mode
 from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
-_STEPS_MAX = 60
-"""Largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end."""
+_STEPS_MAX = 60  # largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end
 
 
 def velocity_under_friction(w: float, gain: float, scale: float, last: float) -> float:

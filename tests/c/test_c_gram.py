@@ -19,11 +19,8 @@ from hybridsep.predict.regression import RidgeRegression
 Array = NDArray[np.float64]
 NO_PENALTY = 1e-40
 
-ABREAST = 4
-"""HSEP_SOLUTION_ABREAST."""
-
-TOGETHER = 4
-"""HSEP_GRAM_TOGETHER."""
+ABREAST = 4  # HSEP_SOLUTION_ABREAST
+TOGETHER = 4  # HSEP_GRAM_TOGETHER
 
 WORDS = ("n_head", "n_tail", "room", "begun", "factored", "waiting", "finished", "completed", "square", "last_square")
 OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "last", "work", "abreast")

@@ -20,8 +20,7 @@ pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 WINDOWS = 40
 WARM = {kind: Case(kind, 20, 20, WINDOWS, warm=True) for kind in KINDS}
-AGREES = {"predictor": 1e-11, "compensator": 1e-9}
-"""Difference that ARCHITECTURE.md allows, m."""
+AGREES = {"predictor": 1e-11, "compensator": 1e-9}  # difference that ARCHITECTURE.md allows, m
 
 
 def played(target: str, case: Case, folder: Path, *, plain_math: bool = True, options: tuple[str, ...] = ()) -> Replay:

@@ -8,8 +8,7 @@ from hybridsep.plants.path import PlanarPath
 from hybridsep.plants.trajectory import archimedean_spiral
 
 T_S = 1e-3
-LAG = 0.01
-"""Time constant of both axes, s."""
+LAG = 0.01  # time constant of both axes, s
 
 
 def test_a_lag_makes_a_circle_smaller() -> None:

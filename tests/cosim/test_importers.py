@@ -17,8 +17,7 @@ from hybridsep import build_fmu, cosimulate, load_machine, staircase
 
 TOLERANCE = 1e-12  # m; libcosim's step sizes are rounded differences of times
 SHIFT = 0.1  # m
-N_MOVED = 800
-"""Samples of the shorter run at another place."""
+N_MOVED = 800  # samples of the shorter run at another place
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from places import ROOT
 
 from hybridsep.logs import formats
 
-ROWS = 2001
-"""Lines of the example log that are left: of the others the pages tell."""
+ROWS = 2001  # lines of the example log that are left: of the others the pages tell
 
 
 @pytest.mark.slow

@@ -17,8 +17,7 @@ from hybridsep.fmi.compile import TARGETS, host_target
 
 Folders = Callable[[str], Path]
 
-HEAD = 96
-"""Bytes of a table before the start values."""
+HEAD = 96  # bytes of a table before the start values
 
 
 @pytest.mark.parametrize(

@@ -15,17 +15,10 @@ from hybridsep import load_machine
 from hybridsep.base.signals import Array
 from hybridsep.machines.machine import Machine
 
-X = ROOT / "integrations" / "linuxcnc" / "simulation" / "x.toml"
-"""250 mm/s, 2500 mm/s², 10 000 m/s³; 1 kHz."""
-
-PREVIEW = ("compensator.preview=60",)
-"""Look-ahead in the tests, periods: shorter than the machine's, so that they are."""
-
-V, A = 0.25, 2.5e-3
-"""Its limits, mm a period and mm a period²."""
-
-FOLLOWS = 0.15
-"""Share of its distance to the command that the simulated drive goes in a period."""
+X = ROOT / "integrations" / "linuxcnc" / "simulation" / "x.toml"  # 250 mm/s, 2500 mm/s², 10 000 m/s³; 1 kHz
+PREVIEW = ("compensator.preview=60",)  # look-ahead in the tests, periods: shorter than the machine's, so that they are
+V, A = 0.25, 2.5e-3  # its limits, mm a period and mm a period²
+FOLLOWS = 0.15  # share of its distance to the command that the simulated drive goes in a period
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,7 @@ from hybridsep.base.errors import LogError
 from hybridsep.logs.formats import open_source
 from hybridsep.logs.log import read_log
 
-SECOND = 1_000_000_000
-"""In nanoseconds, in which the truth is computed."""
+SECOND = 1_000_000_000  # in nanoseconds, in which the truth is computed
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "hybridsep/predict/averaging").glob("*.py"))
 CORE = sorted((ROOT / "fmu_src/c/core/predict/averaging").glob("*.[ch]"))
 
-PLAIN = {0.0, 0.5, 1.0, 2.0}
-"""Magnitudes that need no reason."""
+PLAIN = {0.0, 0.5, 1.0, 2.0}  # magnitudes that need no reason
 
 LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor"}
 """Constants are generated for C; its regression is below ``numeric``, its predictor below ``online``."""

@@ -16,8 +16,7 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.features import Disturbance
 from hybridsep.predict.predictor import HybridPredictor
 
-START, WALL = 0.3, 0.302
-"""Position of rest, and that beyond which a spring acts, m."""
+START, WALL = 0.3, 0.302  # position of rest, and that beyond which a spring acts, m
 
 
 def spring(x: Array, v: Array) -> Array:

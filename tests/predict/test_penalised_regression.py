@@ -10,8 +10,7 @@ from properties import examples
 from hybridsep.base.signals import Array
 from hybridsep.predict.regression import RidgeRegression
 
-LAM = 1e-40
-"""λ of a factor whose penalties come with each solution."""
+LAM = 1e-40  # λ of a factor whose penalties come with each solution
 
 
 def rows_of(kind: str, k: int, n: int, rng: np.random.Generator) -> Array:

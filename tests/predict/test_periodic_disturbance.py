@@ -4,8 +4,7 @@ import pytest
 
 from benchmarks.periodic import errors
 
-COGGING = 20e-6, 0.005
-"""Amplitude and pitch, m; the noise is 1 µm."""
+COGGING = 20e-6, 0.005  # amplitude and pitch, m; the noise is 1 µm
 
 
 @pytest.mark.parametrize("second_start", [0.0, 0.0313])

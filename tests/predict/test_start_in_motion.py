@@ -19,8 +19,7 @@ STAGE = ModalModel(
 )
 """Two modes of unit static gain together."""
 
-CUT = 400
-"""Samples of a motion before a run."""
+CUT = 400  # samples of a motion before a run
 
 
 def in_motion(model: ModalModel, hold: str = "zoh", size: float = 1.0) -> tuple[Array, Array]:

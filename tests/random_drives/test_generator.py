@@ -16,12 +16,10 @@ Array = NDArray[np.float64]
 SEED = 1
 N = 40
 
-SHORTEST = (3, 18, 57)
-"""Drives of about 6 s, which take the least time."""
+SHORTEST = (3, 18, 57)  # drives of about 6 s, which take the least time
 
 EXPECTED_KINDS = ["cycles", "cycles", "spiral"]
-EXPECTED_RMS = [51.24528299, 580.85925701, 30.61436502]
-"""Their servo errors, µm, against the measured position."""
+EXPECTED_RMS = [51.24528299, 580.85925701, 30.61436502]  # their servo errors, µm, against the measured position
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 
 SEED = 2
-CHEAP = 1
-"""A drive at 250 Hz."""
+CHEAP = 1  # a drive at 250 Hz
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,7 @@ from hybridsep.predict.averaging.experts import ARX_COMMAND, ARX_RESIDUAL, EXPER
 AVERAGING: dict[str, Value] = {"averaging": True, "t_init": 0.0}
 DELAY = 5
 
-CUT = 1060
-"""Sample of the staircase in the middle of a move, at 80 mm/s."""
+CUT = 1060  # sample of the staircase in the middle of a move, at 80 mm/s
 
 
 @cache

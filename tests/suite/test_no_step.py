@@ -10,8 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from stream import COMPENSATOR, OUTPUTS, Array, Stream
 from streams import StreamMaker, on_all
 
-FADED = 20 + 60
-"""Samples after which the change has faded: the window and the preview of the streams."""
+FADED = 20 + 60  # samples after which the change has faded: the window and the preview of the streams
 
 NEAR = 4 * 2
 """Samples of a spline, whose spacing is 2 in the streams: that far before and behind a command that exceeds a limit."""

@@ -60,8 +60,7 @@ TOGETHER: dict[str, list[Case]] = {
 }
 """Refusals of several parameters, or of one because of another, by model."""
 
-ODD = (-1e-12, -123456.789, -1e16, -5e-324, -1e22, -0.25)
-"""Numbers that are written in as many ways."""
+ODD = (-1e-12, -123456.789, -1e16, -5e-324, -1e22, -0.25)  # numbers that are written in as many ways
 
 
 def out_of_range(model: str) -> list[Case]:

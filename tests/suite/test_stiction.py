@@ -12,8 +12,7 @@ from streams import StreamMaker, on_all
 
 from hybridsep.base.metrics import coverage, rms
 
-_STEPS = 20
-"""Steps of integration in a sample."""
+_STEPS = 20  # steps of integration in a sample
 
 
 def servo(

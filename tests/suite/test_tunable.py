@@ -10,8 +10,7 @@ from library_stream import LookAheadStream
 from stream import COMPENSATOR, OUTPUTS, Array, RefusedStreamError, Stream
 from streams import StreamMaker, on_adapters
 
-TOLERANCE = 1e-9
-"""Of a plan, m: 1 nm."""
+TOLERANCE = 1e-9  # of a plan, m: 1 nm
 
 N_RUN = 440
 CHANGES = {129: ("compensate", 0), 248: ("compensate", 2), 311: ("change_max", 5e-6), 395: ("change_max", 1e-3)}

@@ -12,11 +12,8 @@ from hybridsep.predict.averaging.model import AveragedModel
 from hybridsep.predict.predictor import HybridPredictor
 
 TS = 1e-3  # s
-PERIOD = 1000
-"""Samples of a cycle."""
-
-FRICTION = 2e-5
-"""Offset of the command, m, that friction is worth."""
+PERIOD = 1000  # samples of a cycle
+FRICTION = 2e-5  # offset of the command, m, that friction is worth
 
 
 def averaged(**changes: Any) -> HybridPredictor:

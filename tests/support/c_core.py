@@ -48,8 +48,7 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 }
 """The staircase drive's linear part, as one mode of eq. (15)."""
 
-STAGE_MODES = tuple(asdict(mode) for mode in load_machine("als25010_x").model.modes)
-"""The stage's X axis, Table 1."""
+STAGE_MODES = tuple(asdict(mode) for mode in load_machine("als25010_x").model.modes)  # the stage's X axis, Table 1
 PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS}), "averaging": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {

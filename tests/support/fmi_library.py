@@ -42,8 +42,7 @@ class Library:
         "String": ctypes.c_char_p,
     }
     enumeration, real = "Integer", "Real"
-    initialization: tuple[Any, ...] = ()
-    """Arguments of EnterInitializationMode."""
+    initialization: tuple[Any, ...] = ()  # arguments of EnterInitializationMode
 
     def __init__(self, folder: Path, largest: int = 1 << 26) -> None:
         described = fmpy.read_model_description(str(folder), validate=False)
@@ -294,8 +293,7 @@ def steps(fmu: Library, instance: int | None, first: int, last: int) -> None:
         assert fmu.do_step(instance, k * 1e-3, 1e-3) == OK
 
 
-HEADER_SIZE, CHECKSUM_PLACE = 120, 72
-"""Bytes of a serialised state before its values, and where its checksum stands."""
+HEADER_SIZE, CHECKSUM_PLACE = 120, 72  # bytes of a serialised state before its values, and where its checksum stands
 
 
 def repair_checksum(block: bytearray) -> None:

@@ -15,8 +15,7 @@ from hybridsep import ModalModel, Mode
 from hybridsep.base.signals import Array
 from hybridsep.logs.log import Log
 
-_N = 3000
-"""Samples of a log."""
+_N = 3000  # samples of a log
 
 Numbers = np.random.Generator
 

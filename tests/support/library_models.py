@@ -26,8 +26,7 @@ from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
 
-RUNAWAY = 1e5
-"""Pole of the recursion that diverges: e_h grows by it with each sample."""
+RUNAWAY = 1e5  # pole of the recursion that diverges: e_h grows by it with each sample
 
 
 def numbered(modes: Sequence[Mapping[str, float]]) -> dict[str, float]:

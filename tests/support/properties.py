@@ -2,8 +2,7 @@
 
 from hypothesis import HealthCheck, settings
 
-LEFT_OUT = ("nightly", "release")
-"""Marks of tests that run where they are named in ``-m``, or by their own names."""
+LEFT_OUT = ("nightly", "release")  # marks of tests that run where they are named in ``-m``, or by their own names
 
 _SHARE = 6
 _all = False

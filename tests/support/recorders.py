@@ -12,8 +12,7 @@ import pyarrow.parquet as pq
 
 from hybridsep.base.signals import Array
 
-Rated = Mapping[str, tuple[float, Array]]
-"""Sampling interval, s, and values by column."""
+Rated = Mapping[str, tuple[float, Array]]  # sampling interval, s, and values by column
 
 
 def write_parquet(path: Path, data: Mapping[str, Any]) -> Path:

@@ -3,8 +3,7 @@
 import struct
 import zlib
 
-_HEAD, _SETTING = 32, 32
-"""Bytes of the head, and of a setting: its name in 24, its value."""
+_HEAD, _SETTING = 32, 32  # bytes of the head, and of a setting: its name in 24, its value
 
 
 def sealed(body: bytes) -> bytes:

@@ -15,8 +15,7 @@ Array = NDArray[np.float64]
 Value = float | int | bool
 
 LIBRARY, CORE, NATIVE = IMPLEMENTATIONS = ("library", "C core", "native FMU")
-FMI3 = "FMI 3.0 FMU"
-"""Beside them in the tests of what an adapter does; its values are the native FMU's, bit for bit."""
+FMI3 = "FMI 3.0 FMU"  # beside them in the tests of what an adapter does; its values are the native FMU's, bit for bit
 
 PREDICTOR, COMPENSATOR, TRAJECTORY = "HybridPredictor", "SepCompensator", "ReferenceTrajectory"
 STAGE_PREDICTOR, STAGE_COMPENSATOR = "HybridPredictor_als25010_x", "SepCompensator_als25010_x"
@@ -59,8 +58,7 @@ OUTPUTS = {
     DRIVE: ("x", "v", "x_meas"),
 }
 
-WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")
-"""Arrays that a predictor shows."""
+WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")  # arrays that a predictor shows
 
 
 class RefusedStreamError(Exception):

@@ -36,17 +36,10 @@ _CONFIG: dict[str, Any] = {
 }
 """Settings of a cluster that is started here."""
 
-_ALONE = 2
-"""Attempts alone of a task that is blamed: it may not even have run, as it waited behind another."""
-
-_COUNTED = 1.0
-"""Time for which a count of workers is kept before they are counted again, s."""
-
-_REACHED = 10.0
-"""Time within which a scheduler answers, s."""
-
-_CLOSED = 30.0
-"""Time within which a cluster closes, s: rarely, Dask has waited for a worker without end."""
+_ALONE = 2  # attempts alone of a task that is blamed: it may not even have run, as it waited behind another
+_COUNTED = 1.0  # time for which a count of workers is kept before they are counted again, s
+_REACHED = 10.0  # time within which a scheduler answers, s
+_CLOSED = 30.0  # time within which a cluster closes, s: rarely, Dask has waited for a worker without end
 
 _ENDED = "the process that worked on it ended, twice: out of memory, or a fault of a library{limit}"
 

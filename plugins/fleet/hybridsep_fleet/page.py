@@ -20,8 +20,7 @@ _WORSE, _SHIFT, _FRICTION, _RESIDUAL = 1.03, 0.05, 0.3, 0.5
 frequency, of friction and of the error since the logs before. Two fits of one axis on recordings of different motions
 differ by less on the recorded axes; these are the first rows of a list, not alarms."""
 
-_FIRST_MOST = 20
-"""Axes of a kind that are listed first."""
+_FIRST_MOST = 20  # axes of a kind that are listed first
 
 _KINDS = ("Failed", "Worse than a baseline", "Changed since the logs before", "Faults of recording")
 """What speaks for looking at an axis, by gravity."""

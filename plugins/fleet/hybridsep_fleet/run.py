@@ -13,11 +13,8 @@ from .results import Results
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import find_logs
 
-_EVERY = 5.0
-"""Time after which the rows that are there are written, s: as much work as is lost if the run is killed."""
-
-_MOST = 500
-"""Rows after which they are written."""
+_EVERY = 5.0  # time after which the rows that are there are written, s: as much work as is lost if the run is killed
+_MOST = 500  # rows after which they are written
 
 Progress = Callable[[str, float], object]
 

@@ -19,8 +19,7 @@ from hybridsep.logs.formats import READERS
 _ENDINGS = tuple(sorted({ending for reader in READERS for ending in reader.endings}))
 """Endings of the names by which logs in a folder are told from other files; a pattern takes any."""
 
-_DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])(?!\d)")
-"""A date in a name."""
+_DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])(?!\d)")  # a date in a name
 
 
 @dataclass(frozen=True)

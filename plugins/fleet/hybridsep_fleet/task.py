@@ -28,8 +28,7 @@ from hybridsep.predict.predictor import HybridPredictor
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 
-_FAST = 0.1
-"""Share of the largest velocity from which on an axis counts as moving, for the estimate of friction."""
+_FAST = 0.1  # share of the largest velocity from which on an axis counts as moving, for the estimate of friction
 
 
 @dataclass

@@ -11,8 +11,7 @@ from .sample import Sample
 HELD_MAX = 64
 """Most samples that wait for one that is late; a network that reorders more would be slower than any window."""
 
-_WAIT = 1.0
-"""Longest wait for a sample that is late while none comes, s."""
+_WAIT = 1.0  # longest wait for a sample that is late while none comes, s
 
 _BACK_MAX = 10_000
 """Samples by which a number may be behind and still be a repeated one: further back, the sender has begun anew."""

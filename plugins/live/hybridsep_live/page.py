@@ -23,14 +23,9 @@ if TYPE_CHECKING:
 _FOREIGN = "BOKEH_"
 """Begin of variables that would let a page load its scripts from elsewhere, or take sessions from other origins."""
 
-_WAITING_MAX = 1000
-"""Most batches that wait for the page's process; beyond, the page misses some, and the core none."""
-
-_LOOKED = 0.2
-"""Time between two looks at the page's process, s: Windows has no signal for who waits for one."""
-
-_FLUSHED = 5.0
-"""Longest wait for the page's process, s."""
+_WAITING_MAX = 1000  # most batches that wait for the page's process; beyond, the page misses some, and the core none
+_LOOKED = 0.2  # time between two looks at the page's process, s: Windows has no signal for who waits for one
+_FLUSHED = 5.0  # longest wait for the page's process, s
 
 
 class Page:

@@ -29,20 +29,11 @@ from .state import State
 
 HOST = "127.0.0.1"
 
-_FAREWELL = 0.3
-"""Time that pages have to be told the end, s: several frames."""
-
-_DAY = 86_400
-"""Time for which a page that is open may connect again, s."""
-
-FRAME = 50
-"""Time between two frames, ms."""
-
-SPANS = (2, 10, 60)
-"""Spans that can be chosen, s."""
-
-_LOST = 1.0
-"""Time after which a frame counts as painted, s: a browser paints none behind another window."""
+_FAREWELL = 0.3  # time that pages have to be told the end, s: several frames
+_DAY = 86_400  # time for which a page that is open may connect again, s
+FRAME = 50  # time between two frames, ms
+SPANS = (2, 10, 60)  # spans that can be chosen, s
+_LOST = 1.0  # time after which a frame counts as painted, s: a browser paints none behind another window
 
 _TEMPLATES = Path(__file__).parent / "templates"
 

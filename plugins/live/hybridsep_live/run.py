@@ -13,11 +13,8 @@ from .order import Order
 from .sample import Sample
 from .sources import LiveSource
 
-_PUBLISHED = 0.03
-"""Time between two batches of rows, s: shorter than a frame of the page."""
-
-_ROWS_MAX = 1000
-"""Most rows of a batch."""
+_PUBLISHED = 0.03  # time between two batches of rows, s: shorter than a frame of the page
+_ROWS_MAX = 1000  # most rows of a batch
 
 
 class Sink(Protocol):

@@ -12,11 +12,8 @@ from hybridsep.logs.source import Block, Source
 from hybridsep.logs.text import is_number, split
 from hybridsep.logs.units import stated_unit
 
-NUMBER, AHEAD = "k", "x_d_ahead"
-"""Names of the sample number, and of a command that the drive gets a look-ahead later."""
-
-_MESSAGE_MAX = 1_000_000
-"""Most characters of a message; a thousand samples have a tenth."""
+NUMBER, AHEAD = "k", "x_d_ahead"  # names of the sample number, and of a command that the drive gets a look-ahead later
+_MESSAGE_MAX = 1_000_000  # most characters of a message; a thousand samples have a tenth
 
 
 class Sample(NamedTuple):
@@ -38,8 +35,7 @@ class Reading(NamedTuple):
     si: str = "m"  # {"m", "rad"}: unit of the machine
 
 
-AS_NAMED = Reading()
-"""By the known names, in the units that they state."""
+AS_NAMED = Reading()  # by the known names, in the units that they state
 
 
 class _Names(Source):

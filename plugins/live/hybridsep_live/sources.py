@@ -26,20 +26,14 @@ _UDP = re.compile(r"udp:(?:(?P<host>[^:\s]+|\[[^\]\s]+\]):)?(?P<port>\d+)", re.A
 _LOCAL = "127.0.0.1"
 _PORT_MAX = 65535
 
-_IDLE = 0.05
-"""Longest time for which a source waits before it says that nothing came, s."""
-
-_PAUSE = 1e-3
-"""Time for which a replay sleeps at least, s; samples due meanwhile come together."""
-
-_BUFFER = 4 << 20
-"""Bytes that the system is asked to keep of datagrams while the core is busy; it may grant fewer."""
+_IDLE = 0.05  # longest time for which a source waits before it says that nothing came, s
+_PAUSE = 1e-3  # time for which a replay sleeps at least, s; samples due meanwhile come together
+_BUFFER = 4 << 20  # bytes that the system is asked to keep of datagrams while the core is busy; it may grant fewer
 
 _PIECE, _PIECES_MAX = 1 << 16, 64
 """Bytes that are read of standard input at once, and pieces that wait at most; the writer waits then."""
 
-_LINE_MAX = 1_000_000
-"""Bytes of a line at most: what has no end of a line is no CSV, and must not fill the memory."""
+_LINE_MAX = 1_000_000  # bytes of a line at most: what has no end of a line is no CSV, and must not fill the memory
 
 Opened = TypeVar("Opened", bound="LiveSource")
 

@@ -14,14 +14,12 @@ from .core import Row
 COLUMNS = ("t", "x_d", "x_meas", "x_pb", "x_h", "x_h_std", "active", "step", "k")
 """Columns of a row as the page gets it."""
 
-_BAND = 2.0
-"""Half width of the band in standard deviations: 95 % of the samples, if they are distributed normally."""
+_BAND = 2.0  # half width of the band in standard deviations: 95 % of the samples, if they are distributed normally
 
 DRAWN = ("t", "x_d", "x_meas", "e_meas", "e_pb", "e_h", "e_low", "e_high", "r_pb", "r_h", "r_low", "r_high", "step")
 """Columns of :func:`signals`."""
 
-CAPACITY = 200_000
-"""Rows that are kept: three minutes at 1 kHz, in some 30 MB."""
+CAPACITY = 200_000  # rows that are kept: three minutes at 1 kHz, in some 30 MB
 
 _PIXELS, _PAUSED_PIXELS = 400, 2000
 """Columns of pixels that lines are drawn for, two values each: while they move, with few, as a browser without a

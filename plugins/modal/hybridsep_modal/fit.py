@@ -18,32 +18,15 @@ from .vector_fitting import starting_poles, vector_fit
 
 Complex = NDArray[np.complex128]
 
-MODES_MAX = 10
-"""Most modes that are tried where their number is not given."""
-
-PATIENCE = 2
-"""Numbers of modes without a smaller criterion after which the search ends."""
-
-EXACT = 1e-9
-"""Relative error that counts as none: rounding in the file, or a response that was computed."""
-
-THINNED = 1500
-"""Lines that vector fitting uses, about; the polish uses all."""
-
-PASSES = 3
-"""Passes in which weights and the hold's part follow the last fit; each reduces their error a hundredfold."""
-
-ROUGH = 40
-"""Evaluations of a fit from one of several starts, of which the best is refined."""
-
-_MARGIN = 3.0
-"""Distance of log ω from the lines, beyond which a mode is straight within them."""
-
-_LOG_ZETA = (-11.0, 7.0)
-"""Range of log ζ."""
-
-_FAST = 10.0
-"""Ratio of the second pole, which starts a mode from a single real pole, to the first."""
+MODES_MAX = 10  # most modes that are tried where their number is not given
+PATIENCE = 2  # numbers of modes without a smaller criterion after which the search ends
+EXACT = 1e-9  # relative error that counts as none: rounding in the file, or a response that was computed
+THINNED = 1500  # lines that vector fitting uses, about; the polish uses all
+PASSES = 3  # passes in which weights and the hold's part follow the last fit; each reduces their error a hundredfold
+ROUGH = 40  # evaluations of a fit from one of several starts, of which the best is refined
+_MARGIN = 3.0  # distance of log ω from the lines, beyond which a mode is straight within them
+_LOG_ZETA = (-11.0, 7.0)  # range of log ζ
+_FAST = 10.0  # ratio of the second pole, which starts a mode from a single real pole, to the first
 
 
 @dataclass(frozen=True)

@@ -23,15 +23,13 @@ from hybridsep.model.physics import ModalModel
 
 from .fit import MODES_MAX, Complex, Lines, ModalFit, fits_by_size
 
-LINES_MIN = 8
-"""Lines below which nothing is fitted."""
+LINES_MIN = 8  # lines below which nothing is fitted
 
 WORTH = 10.0
 """Decrease of the criterion from which more modes are taken, very strong evidence by Kass and Raftery, J. Am. Stat.
 Assoc. 90 (1995) 773."""
 
-DEVIATIONS = 3.0
-"""Standard deviations by which a damping ratio is above 0, at least."""
+DEVIATIONS = 3.0  # standard deviations by which a damping ratio is above 0, at least
 
 FRICTION_WORTH = 0.6
 """Ratio of the weighted errors, with and without them, at which modes that do not oscillate, or slow modes that zeros

@@ -22,14 +22,9 @@ from .frequency_response import IdentifiedResponse
 
 HEADER = "time,accel_x,accel_y,accel_z"
 
-BAND = (5.0, 135.0)
-"""Default band of Klipper's test, Hz."""
-
-ZETA_MAX = 0.4
-"""Damping ratio above which the magnitude has no peak to speak of."""
-
-WINDOW = 0.5
-"""Length of a window of Welch's method, s, as Klipper uses."""
+BAND = (5.0, 135.0)  # default band of Klipper's test, Hz
+ZETA_MAX = 0.4  # damping ratio above which the magnitude has no peak to speak of
+WINDOW = 0.5  # length of a window of Welch's method, s, as Klipper uses
 
 
 class Acceleration(NamedTuple):

@@ -18,15 +18,13 @@ from hybridsep.base.signals import Array, as_samples
 COHERENCE_MIN = 0.8
 """Squared coherence below which a line is left out: it would tell little, and its deviation is not well known."""
 
-POWER_MIN = 1e-3
-"""Least power of the command at a line, in multiples of what nine tenths of the lines stay below."""
+POWER_MIN = 1e-3  # least power of the command at a line, in multiples of what nine tenths of the lines stay below
 
 SMOOTHED = 9
 """Neighbouring lines over which the spectra are averaged for the coherence; over more of them, a resonance's own slope
 would lower it."""
 
-FLOOR = 301
-"""Neighbouring lines whose median is the noise, which is smooth over frequency."""
+FLOOR = 301  # neighbouring lines whose median is the noise, which is smooth over frequency
 
 _CORRECTION = SMOOTHED / (SMOOTHED - 1)
 """Factor of the noise power that remains after one complex parameter was fitted to each average."""

@@ -15,11 +15,8 @@ Complex = NDArray[np.complex128]
 ITERATIONS_MAX = 25
 """Largest number of relocations; without noise ten are enough, with noise the poles then wander within their spread."""
 
-_CONVERGED = 1e-9
-"""Relative movement of the poles at which the relocation ends."""
-
-_ZETA_START = 0.01
-"""Damping ratio of the starting poles, as recommended by the authors."""
+_CONVERGED = 1e-9  # relative movement of the poles at which the relocation ends
+_ZETA_START = 0.01  # damping ratio of the starting poles, as recommended by the authors
 
 
 def starting_poles(omega: Array, n_modes: int) -> Complex:

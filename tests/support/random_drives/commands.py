@@ -10,14 +10,9 @@ from hybridsep.base.signals import Array
 from hybridsep.plants.trajectory import along_path, archimedean_spiral, rest_to_rest
 from random_drives.drive import Draws
 
-T_S = 1e-3
-"""Sampling interval, s."""
-
-V_MAX = 0.2
-"""Largest velocity, m/s."""
-
-Move = tuple[float, float]
-"""Distance, m, and rest after it, s."""
+T_S = 1e-3  # sampling interval, s
+V_MAX = 0.2  # largest velocity, m/s
+Move = tuple[float, float]  # distance, m, and rest after it, s
 
 
 def random_command(draws: Draws) -> tuple[str, Array]:

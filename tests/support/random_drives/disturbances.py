@@ -7,11 +7,8 @@ from random_drives.drive import Draws
 PRESLIDING_SLOPE = 2.0
 """Largest stiffness of the presliding friction relative to the drive's: rolling guides are below 1."""
 
-CUBIC_SHARE = 0.05
-"""Largest effect of the cubic stiffness relative to the stroke."""
-
-COGGING_SLOPE = 0.05
-"""Largest amplitude of the cogging relative to its pitch: a stiffness of 0.3 of the drive's."""
+CUBIC_SHARE = 0.05  # largest effect of the cubic stiffness relative to the stroke
+COGGING_SLOPE = 0.05  # largest amplitude of the cogging relative to its pitch: a stiffness of 0.3 of the drive's
 
 
 @dataclass(frozen=True)

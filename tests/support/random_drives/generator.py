@@ -13,8 +13,7 @@ from random_drives.disturbances import Disturbances, random_disturbances
 from random_drives.drive import Draws, Drive
 from random_drives.simulation import simulate
 
-MODEL_ERROR = 0.2
-"""Largest relative error of each parameter of the physics model."""
+MODEL_ERROR = 0.2  # largest relative error of each parameter of the physics model
 
 
 @dataclass(frozen=True)
@@ -104,11 +103,8 @@ def nominal_drive(true: ModalDrive, draws: Draws) -> ModalDrive:
     return replace(nominal, text=f"{text}, static gain {100 * (nominal.gain / true.gain - 1):+.1f} %")
 
 
-SEED = 1
-"""Seed of the 1 000 drives that figures are given for."""
-
-CHUNK = 125
-"""Drives simulated at once: their states stay in the processor's cache."""
+SEED = 1  # seed of the 1 000 drives that figures are given for
+CHUNK = 125  # drives simulated at once: their states stay in the processor's cache
 
 
 @dataclass(frozen=True)

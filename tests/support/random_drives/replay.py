@@ -17,8 +17,7 @@ from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from random_drives.drive import Drive
 
-DIVERGED = 1.0
-"""Largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes."""
+DIVERGED = 1.0  # largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes
 
 Replayed = Callable[[str, ModalModel, PredictorSettings, Array, Array], Array]
 """Replay of a predictor of :data:`PREDICTORS`, with the physics model and the drive's settings, over commanded and

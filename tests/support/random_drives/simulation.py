@@ -15,8 +15,7 @@ from hybridsep.model.physics import ModalModel
 from random_drives.commands import T_S
 from random_drives.disturbances import Disturbances
 
-SUB_STEPS = 8
-"""Internal steps in a sampling interval."""
+SUB_STEPS = 8  # internal steps in a sampling interval
 
 MODES_MAX = 4
 CUBIC_MAX = 2.0

@@ -165,11 +165,8 @@ class Axis:
         return ", ".join(parts)
 
 
-RATES = (250, 500, 1000, 2000, 4000, 8000)
-"""Sampling rates, Hz."""
-
-LEAST_DAMPING = 0.03
-"""Least damping ratio of a loop: slower gains are taken until it is reached."""
+RATES = (250, 500, 1000, 2000, 4000, 8000)  # sampling rates, Hz
+LEAST_DAMPING = 0.03  # least damping ratio of a loop: slower gains are taken until it is reached
 
 
 @dataclass(frozen=True)

@@ -14,17 +14,10 @@ from two_mass.commands import random_command
 from two_mass.nominal import nominal_model
 from two_mass.plant import TwoMassDrive
 
-SEED = 2
-"""Seed of the 250 drives that figures are given for."""
-
-CHUNK = 25
-"""Drives of one task: they take seconds each, and very different times."""
-
-DURATION = (3.0, 5.0)
-"""Length of a run, s."""
-
-LOOK_AHEAD, NP_RANGE = (0.02, 0.1), (10, 400)
-"""Look-ahead, s, and samples in a window."""
+SEED = 2  # seed of the 250 drives that figures are given for
+CHUNK = 25  # drives of one task: they take seconds each, and very different times
+DURATION = (3.0, 5.0)  # length of a run, s
+LOOK_AHEAD, NP_RANGE = (0.02, 0.1), (10, 400)  # look-ahead, s, and samples in a window
 
 
 @dataclass(frozen=True)

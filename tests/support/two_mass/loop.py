@@ -17,17 +17,10 @@ from two_mass.axis import Axis, LinearLoop
 from two_mass.generator import Recipe
 from two_mass.plant import TwoMassDrive
 
-DURATION = 2.5
-"""Longest run, s."""
-
-KNOTS, SETTLING = 0.002, 0.15
-"""Time between the knots of a plan, and time of a preview beyond the window, s."""
-
-SPARE = (2.0, 3.0, 5.0)
-"""Limits of velocity, acceleration and jerk relative to the trajectory's."""
-
-Sensor = Callable[[int, float], float]
-"""Called as ``sensor(k, x_meas)``; returns what is measured in its place."""
+DURATION = 2.5  # longest run, s
+KNOTS, SETTLING = 0.002, 0.15  # time between the knots of a plan, and time of a preview beyond the window, s
+SPARE = (2.0, 3.0, 5.0)  # limits of velocity, acceleration and jerk relative to the trajectory's
+Sensor = Callable[[int, float], float]  # called as ``sensor(k, x_meas)``; returns what is measured in its place
 
 
 class Loop(NamedTuple):
@@ -103,14 +96,9 @@ def closed_loop(
     return Loop(*out[:, late:])
 
 
-SATURATED = 0.6
-"""Motor force beyond friction, relative to that which the trajectory needs."""
-
-RINGING = 0.015
-"""Damping ratio of the mode that begins to ring."""
-
-CHANGE = 0.4
-"""Part of a run after which the plant changes or the measurement fails."""
+SATURATED = 0.6  # motor force beyond friction, relative to that which the trajectory needs
+RINGING = 0.015  # damping ratio of the mode that begins to ring
+CHANGE = 0.4  # part of a run after which the plant changes or the measurement fails
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,8 @@ from random_drives.drive import Draws
 from hybridsep.model.physics import ModalModel, Mode
 from two_mass.axis import LinearLoop
 
-MODEL_ERROR = 0.4
-"""Largest relative error of a parameter."""
-
-CANCELLING = 3.0
-"""Sum of the magnitudes of the modes' static gains from which on they cannot be wrong one by one."""
+MODEL_ERROR = 0.4  # largest relative error of a parameter
+CANCELLING = 3.0  # sum of the magnitudes of the modes' static gains from which on they cannot be wrong one by one
 
 
 def nominal_model(draws: Draws, loop: LinearLoop, dead_time: int) -> tuple[ModalModel, str]:
