@@ -234,10 +234,9 @@ def slopes_of(
     x_d, x_pb, start, _ = window
     v_d, spread = static.velocity(state, x_d), static.spread(velocity_scale)
     v, half = v_d[:, None], reach * velocity_scale
-    if half > 0.0:
-        friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
-    else:
-        friction = (1.0 - np.tanh(v / spread) ** 2) / spread
+    # tanh a − tanh b = tanh(a − b)·(1 − tanh a·tanh b), which cancels nothing where a and b are close
+    friction = 1.0 - np.tanh((v + half) / spread) * np.tanh((v - half) / spread)
+    friction *= np.tanh(2.0 * half / spread) / (2.0 * half) if half > 0.0 else 1.0 / spread
     of_position = []
     if static.period > 0.0:
         angle, turns = static.angle(start + x), 2.0 * np.pi / static.period
@@ -367,7 +366,7 @@ class AveragedPlanner:
         P = W.T @ W + self._jerk_weight * (third.T @ third)
         target = self._x_d - start.x_h + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
-        cost = PlanCost.regular(P, v)
+        cost = PlanCost.regular(P, v, n_pinned)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=TOLERANCE)
         if found is None:
             return start

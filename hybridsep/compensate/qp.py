@@ -261,9 +261,11 @@ class DriveBounds:
             Share of ``change_max`` that bounds ``|δ|``.
         """
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
-        command = np.concatenate((x_d_before, x_d)) + past
+        command = np.concatenate((x_d_before, x_d))
+        # Their sum would be rounded to what a position is, which is much coarser than a third difference of a change
         offsets = [
-            np.diff(past if order == 0 else command, order)[3 - order :] / bound for order, bound in self._scales
+            (np.diff(past, order) + (np.diff(command, order) if order else 0.0))[3 - order :] / bound
+            for order, bound in self._scales
         ]
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
         offset = offset + self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]

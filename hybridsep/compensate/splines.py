@@ -42,15 +42,16 @@ class PlanCost:
     v: Array  # (n,), m
 
     @classmethod
-    def regular(cls, P: Array, v: Array) -> PlanCost:
-        """Return the cost with ``P``, which is changed, made positive definite.
+    def regular(cls, P: Array, v: Array, n_pinned: int = 0) -> PlanCost:
+        """Return the cost with ``P``, which is changed, made positive definite; the first ones will not change.
 
         Parameters
         ----------
         P : (n, n) array
         v : (n,) array, m
+        n_pinned : int
         """
-        P[np.diag_indices_from(P)] += _RIDGE * np.max(np.diag(P))
+        P[np.diag_indices_from(P)] += _RIDGE * np.max(np.diag(P)[n_pinned:])
         return cls(P, v)
 
     def without(self, pinned: Array) -> PlanCost:

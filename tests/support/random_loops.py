@@ -34,6 +34,7 @@ class Loop:
     values: dict[str, Any]  # FMI parameters of the compensator
     r: Array  # (n,), m: commanded positions, as they enter the look-ahead; they begin at the position of rest
     noise_seed: int  # of the encoder
+    quantum: float = 0.0  # m: of the encoder and of the commands; 0: none
 
     @property
     def model(self) -> str:
@@ -47,6 +48,16 @@ class Loop:
         plant = machine.new_plant()
         plant.reset(float(self.r[0]))
         return plant, Encoder(machine.plant.noise_std, self.noise_seed)
+
+    def rounded(self, x: Any) -> Any:
+        """Return positions, m, as numbers of quanta."""
+        return self.quantum * np.round(x / self.quantum) if self.quantum else x
+
+    def at_rest_at(self, start: float, n_rest: int) -> "Loop":
+        """Return the same loop in micrometres, from another position, m, where it rests for ``n_rest`` samples."""
+        loop = replace(self, quantum=1e-6)
+        r = loop.rounded(self.r - self.r[0] + start)
+        return replace(loop, r=np.concatenate((np.full(n_rest, r[0]), r))[: len(r)])
 
 
 def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: float) -> Loop:
@@ -84,15 +95,18 @@ def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: f
     return Loop(machine or drawn, {**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
 
 
-def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
-    """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
+def run_library(loop: Loop, *, nudged: bool = False) -> tuple[Array, NDArray[np.int64]]:
+    """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both.
+
+    Where the loop is ``nudged``, the last binary place of each measured position is one more.
+    """
     plant, encoder = loop.drive()
     start = float(loop.r[0])
     values = {**loop.values, **numbered(TABLES[loop.model].modes)}
     ahead = LookAhead(library_compensator(values), start)
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):
-        x_meas = encoder.measure(plant.x)
+        x_meas = float(np.nextafter(x := loop.rounded(encoder.measure(plant.x)), np.inf if nudged else x))
         x_dm[k], states[k] = ahead.x_dm, ahead.sep_state
         plant.step(ahead.x_dm, TS)
         ahead.sample(float(r), x_meas)
@@ -106,7 +120,7 @@ def run_c(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     model = CModel(loop.model, {**loop.values, "x_d_ahead": start, "x_meas": start}).initialise()
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):
-        x_meas = encoder.measure(plant.x)
+        x_meas = float(loop.rounded(encoder.measure(plant.x)))
         x_dm[k], states[k] = model["x_dm"], model["sep_state"]
         plant.step(model["x_dm"], TS)
         model["x_d_ahead"], model["x_meas"] = float(r), x_meas

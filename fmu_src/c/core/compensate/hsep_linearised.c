@@ -200,7 +200,8 @@ static void linearised_slopes(
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(model);
     const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
-    hsep_real spread[HSEP_FEATURES_N_FRICTION], stops[HSEP_FEATURES_N_STOPS], distances[HSEP_FEATURES_N_STOPS];
+    hsep_real spread[HSEP_FEATURES_N_FRICTION], steepest[HSEP_FEATURES_N_FRICTION];
+    hsep_real stops[HSEP_FEATURES_N_STOPS], distances[HSEP_FEATURES_N_STOPS];
     hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = (hsep_int *)hsep_at(self, self->at_stop);
     for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
         stops[i] = disturbances->before.stops[i];
@@ -208,6 +209,7 @@ static void linearised_slopes(
     }
     for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
         spread[i] = hsep_disturbances_spread(scale, i);
+        steepest[i] = half > 0.0 ? hsep_tanh(2.0 * half / spread[i]) / (2.0 * half) : 1.0 / spread[i];
     }
     for (hsep_int j = self->n; j-- > 0; slopes += self->count) {
         const hsep_real step = x_d[j] - last, v_d = step / disturbances->T_s;
@@ -219,12 +221,10 @@ static void linearised_slopes(
             *at_stop++ = last_at[i];
         }
         for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
-            if (half > 0.0) {
-                slopes[i] = (hsep_tanh((v_d + half) / spread[i]) - hsep_tanh((v_d - half) / spread[i])) / (2.0 * half);
-            } else {
-                const hsep_real sign = hsep_tanh(v_d / spread[i]);
-                slopes[i] = (1.0 - sign * sign) / spread[i];
-            }
+            /* tanh a - tanh b = tanh(a - b) (1 - tanh a tanh b), which cancels nothing where a and b are close */
+            const hsep_real sign = hsep_tanh((v_d + half) / spread[i]);
+            const hsep_real other = half > 0.0 ? hsep_tanh((v_d - half) / spread[i]) : sign;
+            slopes[i] = (1.0 - sign * other) * steepest[i];
         }
         const hsep_real v = hsep_disturbances_damped_velocity(disturbances, x_pb, x, self->n, j);
         slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * hsep_fabs(x[j]);

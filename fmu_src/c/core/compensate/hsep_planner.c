@@ -103,19 +103,20 @@ HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
-    hsep_real last = self->x_d_before[2], now[HSEP_ORDERS] = {0.0};
+    /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
+    hsep_real path[HSEP_ORDERS] = {0.0}, change[HSEP_ORDERS] = {0.0};
     planner_own(self, x_d);
     for (int i = 0; i < 3; i++) {
-        hsep_differ(now, self->x_d_before[i] + self->delta_before[i]);
+        hsep_differ(path, self->x_d_before[i]);
+        hsep_differ(change, self->delta_before[i]);
     }
     for (hsep_int k = 0; k < preview; k++) {
-        const hsep_real delta = hsep_planner_delta(self, k), step = x_d[k] - last;
-        last = x_d[k];
-        moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
-        hsep_differ(now, x_d[k] + delta);
-        total[k] = delta * splines->share[0];
+        hsep_differ(path, x_d[k]);
+        hsep_differ(change, hsep_planner_delta(self, k));
+        moves[k] = self->no_reversal ? (hsep_real)((path[1] > HSEP_QP_MOVES) - (path[1] < -HSEP_QP_MOVES)) : 0.0;
+        total[k] = change[0] * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            total[order * preview + k] = now[order] * splines->share[order];
+            total[order * preview + k] = (path[order] + change[order]) * splines->share[order];
         }
     }
 }
