@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 from bounded_oracle import clarabel_minimum
+from library_stream import LookAheadStream
 from numpy.typing import NDArray
 from places import ROOT
-from random_loops import random_loop, run_library
+from random_loops import random_loop, run
+from stream import COMPENSATOR
 
 from hybridsep.compensate import qp as _qp
 from hybridsep.compensate.qp import EXACT, Minimum, Tolerance, minimise
@@ -28,7 +30,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
         return minimum
 
     monkeypatch.setattr(_qp, "minimise", spy)
-    run_library(random_loop(seed, n, "spring_mass_damper", **fixed))
+    run(LookAheadStream(COMPENSATOR), random_loop(seed, n, **fixed))
     return found  # type: ignore[return-value]
 
 
