@@ -1,8 +1,8 @@
 """An axis at rest whose command rounds in its last places learns no scale from them, in every implementation."""
 
 import numpy as np
-from driving import T_S
-from stream import COMPENSATOR, OUTPUTS, PREDICTOR, Array, Stream
+from driving import run
+from stream import COMPENSATOR, OUTPUTS, PREDICTOR, Array, Stream, Value
 from streams import StreamMaker, on_all
 
 START, NP = 0.17453292519943295, 20
@@ -11,17 +11,11 @@ START, NP = 0.17453292519943295, 20
 def shown(stream: Stream, name: str, command: Array) -> Array:
     """Return an output over a run, m, of an axis that stands 1.2 mm off its first command."""
     start = float(command[0])
-    stream.initialise(
-        {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_d_ahead": start, "x_meas": start}
-        | ({"preview": 80, "spacing": 2, "compensate": 2} if stream.model == COMPENSATOR else {})
-    )
-    found = []
-    for k, ahead in enumerate(command.tolist()):
-        found.append(stream.outputs()[OUTPUTS[stream.model].index(name)])
-        stream.set("x_d_ahead", ahead)
-        stream.set("x_meas", start + 1.2e-3)
-        stream.step(k * T_S, T_S)
-    return np.array(found)
+    values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_meas": start}
+    if stream.model == COMPENSATOR:
+        values |= {"preview": 80, "spacing": 2, "compensate": 2}
+    outputs = run(stream, command, np.full(len(command), start + 1.2e-3), values)
+    return np.asarray(outputs[:-1, OUTPUTS[stream.model].index(name)])
 
 
 def motion() -> Array:

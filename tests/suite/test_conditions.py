@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from averaged_cases import averaged_model, change_learned
-from driving import T_S
+from driving import T_S, run
 from library_stream import LookAheadStream
 from staircase_data import commanded
-from stream import OUTPUTS, PREDICTOR, STAGE_PREDICTOR, Array, Stream, Value, machine_of
+from stream import OUTPUTS, PREDICTOR, STAGE_PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_all
 
 from hybridsep.evaluate.backtest import backtest
@@ -73,21 +73,6 @@ def changed(model: str, name: str, factor: float) -> tuple[Array, Array]:
     return x_d, np.concatenate((np.full(100, x_d[0]), x))[: len(x_d)]
 
 
-def run(stream: Stream, inputs: tuple[Array, Array], values: dict[str, Value], *, saved_at: int = -1) -> Array:
-    """Return the outputs before each sample and after the last; saved and restored once."""
-    r, x = inputs
-    stream.initialise({**values, "x_d_ahead": float(r[0]), "x_meas": float(x[0])})
-    outputs = [stream.outputs()]
-    for k, (ahead, measured) in enumerate(zip(r.tolist(), x.tolist(), strict=True)):
-        if k == saved_at:
-            stream.restore(stream.save())
-        stream.set("x_d_ahead", ahead)
-        stream.set("x_meas", measured)
-        stream.step(k * T_S, T_S)
-        outputs.append(stream.outputs())
-    return np.array(outputs)
-
-
 _OF_LIBRARY: dict[object, Array] = {}
 
 
@@ -95,7 +80,7 @@ def of_library(model: str, inputs: tuple[Array, Array], values: dict[str, Value]
     """Return what the library shows; the same is run once for all that are compared with it."""
     key = (model, *(one.tobytes() for one in inputs), *sorted(values.items()), weights)
     if key not in _OF_LIBRARY:
-        _OF_LIBRARY[key] = run(LookAheadStream(model, weights), inputs, values)
+        _OF_LIBRARY[key] = run(LookAheadStream(model, weights), *inputs, values)
     return _OF_LIBRARY[key]
 
 
@@ -108,7 +93,7 @@ def assert_same(shown: Array, expected: Array, *, averaging: bool = True) -> Non
 
 def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], values: dict[str, Value]) -> None:
     expected = of_library(new_stream.model, inputs, values)
-    shown = run(new_stream(), inputs, values, saved_at=733)
+    shown = run(new_stream(), *inputs, values, saved_at=733)
     assert_same(shown, expected, averaging=bool(values.get("averaging")))
 
 
@@ -153,9 +138,9 @@ def test_a_known_delay_costs_little(new_stream: StreamMaker, averaging: bool) ->
     """At most 5 % more than without delay at the same horizon, but many times as much where the delay is not known."""
     values: dict[str, Value] = {**AVERAGING, "averaging": averaging}
     horizon = 100 + DELAY
-    sound = run(new_stream(), late(PREDICTOR, horizon, 0, 2700), values | {"Np": horizon})
-    known = run(new_stream(), late(PREDICTOR, 100, DELAY, 2700), values | {"measurement_delay": DELAY})
-    unknown = run(new_stream(), late(PREDICTOR, 100, DELAY, 2700), values)
+    sound = run(new_stream(), *late(PREDICTOR, horizon, 0, 2700), values | {"Np": horizon})
+    known = run(new_stream(), *late(PREDICTOR, 100, DELAY, 2700), values | {"measurement_delay": DELAY})
+    unknown = run(new_stream(), *late(PREDICTOR, 100, DELAY, 2700), values)
     assert last(known, "rms_pb") == pytest.approx(last(sound, "rms_pb"), rel=0.02)
     assert last(known, "rms_h") < 1.05 * last(sound, "rms_h")
     assert last(known, "rms_hold") < 1.1 * last(sound, "rms_hold")
@@ -167,7 +152,7 @@ def test_a_rejected_measurement_is_within_the_interval(new_stream: StreamMaker) 
     """Of the windows that follow, as long as it is rejected; a sensor that is set anew by 1 mm is so for a second."""
     r, x = late(PREDICTOR, 100, 0, 3000)
     x = x + 1e-3 * (np.arange(3000) >= 1830)
-    shown = dict(zip(OUTPUTS[PREDICTOR], run(new_stream(), (r, x), AVERAGING)[:-1].T, strict=True))
+    shown = dict(zip(OUTPUTS[PREDICTOR], run(new_stream(), r, x, AVERAGING)[:-1].T, strict=True))
     error, std = np.abs(x - shown["x_h"]), shown["x_h_std"]
     assert shown["n_rejected"][-1] == 1000
     assert error[1900:2830].min() > 9e-4
@@ -193,7 +178,7 @@ def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamM
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
 def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> None:
     inputs = cut(new_stream.model, 100, 0, 2000)
-    averaged, paper = (run(new_stream(), inputs, {**AVERAGING, "averaging": averaging}) for averaging in (True, False))
+    averaged, paper = (run(new_stream(), *inputs, {**AVERAGING, "averaging": averaging}) for averaging in (True, False))
     assert last(averaged, "rms_h") < 1.02 * last(averaged, "rms_pb")
     assert last(averaged, "rms_pb") < 0.97 * last(paper, "rms_pb")  # the state is found after the first window
 
@@ -216,7 +201,7 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
     name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
     inputs, weights = changed(model, name, factor), learned(model, leading)
     expected = of_library(model, inputs, AVERAGING, weights)
-    assert_same(run(new_stream.planted(weights), inputs, AVERAGING, saved_at=saved_at), expected)
+    assert_same(run(new_stream.planted(weights), *inputs, AVERAGING, saved_at=saved_at), expected)
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
@@ -229,7 +214,7 @@ def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
     inputs = changed(model, "f" if model == STAGE_PREDICTOR else "k_nl", factor)
     error = []
     for stream in (new_stream(), new_stream.planted(learned(model))):
-        shown = run(stream, inputs, AVERAGING)
+        shown = run(stream, *inputs, AVERAGING)
         x_h = shown[2000:-1, OUTPUTS[PREDICTOR].index("x_h")]
         error.append(np.sqrt(np.mean((x_h - inputs[1][2000:]) ** 2)))
     assert error[1] < most * error[0]

@@ -1,10 +1,8 @@
 """``rms_hold`` of every implementation, against what is recomputed from the ``x_pb`` that it shows and ``x_meas``."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from driving import T_S
+from driving import T_S, run
 from hold_oracle import held
 from staircase_data import commanded
 from stream import COMPENSATOR, LIBRARY, OUTPUTS, PREDICTOR, Array, Value, machine_of
@@ -50,18 +48,8 @@ def test_hold_is_the_residual_of_the_last_sample_measured(new_stream: StreamMake
         fill = 50  # which ends within a window
         values |= {"preview": fill, "compensate": 2}
     x_d, x = disturbed(new_stream.model, delay, missing=bool(values["averaging"]))
-    stream = new_stream()
-    stream.initialise({**values, "x_d_ahead": float(x_d[0]), "x_meas": float(x[0])})
-    shown: list[Any] = []
-    for k, (ahead, measured) in enumerate(zip(x_d.tolist(), x.tolist(), strict=True)):
-        if k == 437:
-            stream.restore(stream.save())
-        shown.append(stream.outputs())
-        stream.set("x_d_ahead", ahead)
-        stream.set("x_meas", measured)
-        stream.step(k * T_S, T_S)
-    shown.append(stream.outputs())
-    x_pb, rms_hold = (np.array(shown).T[OUTPUTS[new_stream.model].index(name)] for name in ("x_pb", "rms_hold"))
+    shown = run(new_stream(), x_d, x, values, saved_at=437)
+    x_pb, rms_hold = (shown.T[OUTPUTS[new_stream.model].index(name)] for name in ("x_pb", "rms_hold"))
     measured, n = x[delay:], N - delay
     error = measured - held(x_pb[:n], measured, 20, delay=delay, first=fill)
     begin = fill + round(float(values["t_init"]) / T_S)

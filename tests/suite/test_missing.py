@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from driving import T_S
+from driving import T_S, run
 from library_stream import LookAheadStream
 from staircase_data import commanded
-from stream import LIBRARY, OUTPUTS, PREDICTOR, Array, Stream, machine_of
+from stream import LIBRARY, OUTPUTS, PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
 
 from hybridsep.base.metrics import rms
@@ -38,14 +38,9 @@ def predicted(stream: Stream, missing: Indices) -> Array:
     x_d, x = measured()
     given = x.copy()
     given[missing] = np.nan
-    stream.initialise({"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_d_ahead": x_d[0], "x_meas": x_d[0]})
-    found = []
-    for k, (ahead, known) in enumerate(zip(x_d, np.concatenate((np.full(NP, x_d[0]), given)), strict=False)):
-        found.append(stream.outputs()[OUTPUTS[PREDICTOR].index("x_h")])
-        stream.set("x_d_ahead", float(ahead))
-        stream.set("x_meas", float(known))
-        stream.step(k * T_S, T_S)
-    return np.array(found[NP:])
+    values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_meas": x_d[0]}
+    outputs = run(stream, x_d, np.concatenate((np.full(NP, x_d[0]), given))[:N], values)
+    return np.asarray(outputs[NP:-1, OUTPUTS[PREDICTOR].index("x_h")])
 
 
 @cache

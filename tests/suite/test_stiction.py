@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from driving import T_S
+from driving import run
 from library_stream import LookAheadStream
 from stream import OUTPUTS, PREDICTOR, Array, Stream, Value
 from streams import StreamMaker, on_all
@@ -55,16 +55,8 @@ def shown(stream: Stream, name: str, Np: int) -> tuple[dict[str, Array], Array]:
     """Return the outputs over the servo's run, (n,) each, and what it measured, (n,), m."""
     x_d, x = slow_servo(name)
     values: dict[str, Value] = {"averaging": True, "Np": Np, "p": min(Np, 50), "q": 3, "t_init": 0.0}
-    stream.initialise({**values, "x_d_ahead": float(x_d[0]), "x_meas": float(x[0])})
-    outputs = []
-    for k, (ahead, measured) in enumerate(zip(x_d, np.concatenate((np.full(Np, x[0]), x)), strict=False)):
-        if k == 1234:
-            stream.restore(stream.save())
-        outputs.append(stream.outputs())
-        stream.set("x_d_ahead", float(ahead))
-        stream.set("x_meas", float(measured))
-        stream.step(k * T_S, T_S)
-    return dict(zip(OUTPUTS[PREDICTOR], np.array(outputs)[Np:].T, strict=True)), x[: len(x_d) - Np]
+    outputs = run(stream, x_d, np.concatenate((np.full(Np, x[0]), x))[: len(x_d)], values, saved_at=1234)
+    return dict(zip(OUTPUTS[PREDICTOR], outputs[Np:-1].T, strict=True)), x[: len(x_d) - Np]
 
 
 @on_all((PREDICTOR,), needs="figures")

@@ -98,6 +98,7 @@ def test_a_saved_state_carries_what_was_changed(new_stream: StreamMaker) -> None
         ("compensate", 3, "compensate must be 0 … 2, got 3"),
         ("change_max", -1.0, "change_max must be 1e-12 … 10 m, got -1.0"),
         ("change_max", float("nan"), "change_max must be finite, got nan"),
+        ("following_error_max", -1.0, "following_error_max must be 0 or 1e-12 … 10 m, got -1.0"),
     ],
 )
 def test_a_value_out_of_range_is_refused_when_it_is_set(

@@ -138,13 +138,30 @@ def _closed_loop(
     return Loop(values, r, x, np.array(outputs))
 
 
-def replay(stream: Stream, loop: Loop, first: int = 0, last: int | None = None, start_time: float = 0.0) -> Array:
-    """Step samples ``first … last − 1`` of a loop; return the outputs before each and after the last."""
+def replay(
+    stream: Stream,
+    loop: Loop,
+    first: int = 0,
+    last: int | None = None,
+    start_time: float = 0.0,
+    *,
+    saved_at: int = -1,
+) -> Array:
+    """Step samples ``first … last − 1`` of a loop, saved and restored before one; return the outputs, the first too."""
     T_s = float(loop.values.get("T_s", T_S))
     outputs = [stream.outputs()]
     for k in range(first, len(loop.r) if last is None else last):
+        if k == saved_at:
+            stream.restore(stream.save())
         stream.set("x_d_ahead", float(loop.r[k]))
         stream.set("x_meas", float(loop.x[k]))
         stream.step(start_time + k * T_s, T_s)
         outputs.append(stream.outputs())
     return np.array(outputs)
+
+
+def run(stream: Stream, r: Array, x: Array, values: Mapping[str, Value], *, saved_at: int = -1) -> Array:
+    """Return the outputs of a look-ahead over its inputs, (n,), m, which rest at their first ones before."""
+    given = {"x_d_ahead": float(r[0]), "x_meas": float(x[0]), **values}
+    stream.initialise(given)
+    return replay(stream, Loop(given, r, x, np.empty(0)), saved_at=saved_at)
