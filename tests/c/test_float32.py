@@ -119,4 +119,4 @@ def test_no_operation_of_a_sample_is_a_call(tmp_path: Path) -> None:
 
 def test_fmus_are_in_double_precision(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="FMUs compute in double precision"):
-        run_compiler([*FLOAT32[:1], *include_flags(), "-c", C_SOURCES / "model" / "hsep_state.c", "-o", tmp_path / "o"])
+        run_compiler([*FLOAT32[:1], *include_flags(), "-c", C_SOURCES / "model" / "hsep_check.c", "-o", tmp_path / "o"])

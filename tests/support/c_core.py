@@ -228,10 +228,6 @@ class CModel:
         self._call("step", self._state, self._values, ctypes.c_double(t), ctypes.c_double(h))
         self.values[list(self.slope_place.values())] = 0.0
 
-    def check_state(self, blob: bytes) -> None:
-        """Check that a blob is a state of this instance."""
-        self._call("check_state", ctypes.c_char_p(blob), ctypes.c_size_t(len(blob)), self._values)
-
     def window(self, name: str) -> Array:
         """Return a window variable's samples, as an adapter shows them."""
         if len(self.state):

@@ -40,7 +40,7 @@ CANNOT = {
     (
         CORE,
         "bad states",
-    ): "checksum and GUID are the adapter's; what it checks itself: tests/c/sanitise.c, support/fuzz_fmi.py",
+    ): "checksum, GUID and size are the adapter's",
     (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",
 }
 """(implementation, model or ability): why it is not there."""

@@ -9,11 +9,10 @@
 #include "hsep_calls.h"
 
 #include "hsep_check.h"
-#include "hsep_state.h"
 
 #include <string.h>
 
-#define SAVED_VERSION 3U
+#define SAVED_VERSION 31U /* changes whenever the layout of any state does */
 #define SAVED_BYTE_ORDER 0x01020304U
 #define SAVED_MAGIC "HSEPFMI2"
 
@@ -188,13 +187,23 @@ HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, v
     return HSEP_OK;
 }
 
+/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991). */
+static uint64_t saved_hash(const void *bytes, size_t size)
+{
+    const unsigned char *byte = bytes;
+    uint64_t hash = UINT64_C(0xCBF29CE484222325);
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ byte[i]) * UINT64_C(0x100000001B3);
+    }
+    return hash;
+}
+
 /* The checksum of a block. */
 static uint64_t saved_checksum(const hsep_saved *saved)
 {
     saved_header header = saved->header;
     header.checksum = 0;
-    return hsep_fnv(HSEP_FNV_BEGIN, &header, sizeof header) ^
-           hsep_fnv(HSEP_FNV_BEGIN, saved->values, (size_t)header.size - sizeof header);
+    return saved_hash(&header, sizeof header) ^ saved_hash(saved->values, (size_t)header.size - sizeof header);
 }
 
 HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size)
@@ -242,9 +251,11 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
         const int known = phase == HSEP_INSTANTIATED || phase == HSEP_INITIALIZATION;
         return known && state_size == 0 ? NULL : "it is inconsistent: its phase is unknown or has no model state";
     }
-    const double *state = saved->values + hsep_instance_n_values(instance);
-    return hsep_model_check_state(&instance->context, state, state_size, saved->values, message) == HSEP_OK ? NULL
-                                                                                                            : message;
+    size_t expected = 0;
+    if (hsep_model_size(&instance->context, saved->values, &expected, message) != HSEP_OK) {
+        return message;
+    }
+    return state_size == expected ? NULL : "it is inconsistent: its size is not that of its parameters";
 }
 
 HSEP_API hsep_status

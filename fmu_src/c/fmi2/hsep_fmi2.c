@@ -101,21 +101,21 @@ fmi2Status fmi2DoStep(
 }
 
 /* Variables. A call is checked as a whole first: if one is refused, none is touched. */
-#define FMI2_ACCESS(getter, setter, c_type, get, set) \
-    fmi2Status getter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, c_type value[]) \
+#define FMI2_ACCESS(type, get, set) \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) \
     { \
-        HSEP_GET(c, &hsep_fmi2_calls[HSEP_FMI2_##getter], vr, nvr, value, nvr, get) \
+        HSEP_GET(c, &hsep_fmi2_calls[HSEP_FMI2_fmi2Get##type], vr, nvr, value, nvr, get) \
         return (self == NULL) ? fmi2Error : fmi2OK; \
     } \
-    fmi2Status setter(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const c_type value[]) \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
     { \
-        HSEP_SET(c, &hsep_fmi2_calls[HSEP_FMI2_##setter], vr, nvr, value, nvr, c_type, set) \
+        HSEP_SET(c, &hsep_fmi2_calls[HSEP_FMI2_fmi2Set##type], vr, nvr, value, nvr, fmi2##type, set) \
         return (self == NULL) ? fmi2Error : fmi2OK; \
     }
 
-FMI2_ACCESS(fmi2GetReal, fmi2SetReal, fmi2Real, number, number)
-FMI2_ACCESS(fmi2GetInteger, fmi2SetInteger, fmi2Integer, hsep_values_integer(number), (double)number)
-FMI2_ACCESS(fmi2GetBoolean, fmi2SetBoolean, fmi2Boolean, number != 0.0, number ? 1.0 : 0.0)
+FMI2_ACCESS(Real, number, number)
+FMI2_ACCESS(Integer, hsep_values_integer(number), (double)number)
+FMI2_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])

@@ -10,6 +10,9 @@
 /* The calls that belong to an instance: CALL(function, states in which it is legal).
  * I: instantiated, M: Initialization Mode, S: stepping, T: terminated */
 /* clang-format off */
+#define HSEP_FMI2_ACCESS(CALL, type) \
+    CALL(fmi2Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2Set##type,                HSEP_I | HSEP_M | HSEP_S)
 #define HSEP_FMI2_CALLS(CALL) \
     CALL(fmi2SetDebugLogging,          HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi2SetupExperiment,          HSEP_I) \
@@ -17,14 +20,8 @@
     CALL(fmi2ExitInitializationMode,            HSEP_M) \
     CALL(fmi2Terminate,                                  HSEP_S) \
     CALL(fmi2Reset,                    HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2GetReal,                  HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2GetInteger,               HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2GetBoolean,               HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2GetString,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SetReal,                  HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi2SetInteger,               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi2SetBoolean,               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi2SetString,                HSEP_I | HSEP_M | HSEP_S) \
+    HSEP_FMI2_ACCESS(CALL, Real) HSEP_FMI2_ACCESS(CALL, Integer) \
+    HSEP_FMI2_ACCESS(CALL, Boolean) HSEP_FMI2_ACCESS(CALL, String) \
     CALL(fmi2GetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi2SetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi2FreeFMUstate,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \

@@ -14,6 +14,9 @@
 /* The calls that belong to an instance: CALL(function, states in which it is legal).
  * I: instantiated, C: Configuration Mode, M: Initialization Mode, S: Step Mode, T: terminated */
 /* clang-format off */
+#define HSEP_FMI3_ACCESS(CALL, type) \
+    CALL(fmi3Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3Set##type,                HSEP_I | HSEP_M | HSEP_S)
 #define HSEP_FMI3_CALLS(CALL) \
     CALL(fmi3SetDebugLogging,          HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi3EnterConfigurationMode,   HSEP_I) \
@@ -22,32 +25,12 @@
     CALL(fmi3ExitInitializationMode,                     HSEP_M) \
     CALL(fmi3Terminate,                                           HSEP_S) \
     CALL(fmi3Reset,                    HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetFloat64,               HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetInt32,                 HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetInt64,                 HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetBoolean,               HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetFloat32,               HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetInt8,                  HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetUInt8,                 HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetInt16,                 HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetUInt16,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetUInt32,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    HSEP_FMI3_ACCESS(CALL, Float32) HSEP_FMI3_ACCESS(CALL, Float64) HSEP_FMI3_ACCESS(CALL, Boolean) \
+    HSEP_FMI3_ACCESS(CALL, Int8)    HSEP_FMI3_ACCESS(CALL, Int16)   HSEP_FMI3_ACCESS(CALL, Int32) \
+    HSEP_FMI3_ACCESS(CALL, UInt8)   HSEP_FMI3_ACCESS(CALL, UInt16)  HSEP_FMI3_ACCESS(CALL, UInt32) \
+    HSEP_FMI3_ACCESS(CALL, Int64)   HSEP_FMI3_ACCESS(CALL, String)  HSEP_FMI3_ACCESS(CALL, Binary) \
     CALL(fmi3GetUInt64,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetString,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3GetBinary,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3SetFloat64,               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetInt32,                 HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetInt64,                 HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetBoolean,               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetFloat32,               HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetInt8,                  HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetUInt8,                 HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetInt16,                 HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetUInt16,                HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetUInt32,                HSEP_I | HSEP_M | HSEP_S) \
     CALL(fmi3SetUInt64,                HSEP_I | HSEP_C) \
-    CALL(fmi3SetString,                HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi3SetBinary,                HSEP_I | HSEP_M | HSEP_S) \
     CALL(fmi3GetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi3SetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(fmi3FreeFMUState,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \

@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <string.h>
 
 static const double check_position_max[] = {1e3, 1e6}; /* m; rad, as a rotary axis may turn on and on */
@@ -118,6 +119,28 @@ HSEP_API hsep_status hsep_check_position(
         hsep_message_add(message, "%s must be finite, got %s%s", name, hsep_number(number, value, HSEP_REAL), end);
     }
     return HSEP_REFUSED;
+}
+
+HSEP_API hsep_status hsep_check_bytes(double bytes, size_t *size, char message[])
+{
+    if (!(bytes < 0.5 * (double)SIZE_MAX)) {
+        return hsep_message_add(
+            message, "the state must fit into memory, got %.4g bytes for these parameters; lower Np, p or q", bytes);
+    }
+    *size = (size_t)bytes;
+    return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_check_memory(size_t needed, size_t size, char message[])
+{
+    if (needed != size) {
+        return hsep_message_add(
+            message,
+            "the state must have %.0f bytes, got memory for %.0f; its file in the resources has changed meanwhile: "
+            "initialise again",
+            (double)needed, (double)size);
+    }
+    return HSEP_OK;
 }
 
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[])

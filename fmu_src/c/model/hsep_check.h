@@ -33,6 +33,12 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
 HSEP_API hsep_status hsep_check_position(
     const hsep_context *context, const char *name, double value, const char *where, double at, char message[]);
 
+/* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
+HSEP_API hsep_status hsep_check_bytes(double bytes, size_t *size, char message[]);
+
+/* Check that a state has memory of the size that it needs: a resource may have changed since that was told. */
+HSEP_API hsep_status hsep_check_memory(size_t needed, size_t size, char message[]);
+
 /* Check that the simulation starts at a number. */
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[]);
 

@@ -102,9 +102,4 @@ HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const d
  * initialization ends. */
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[]);
 
-/* Check that a block of bytes, in any alignment and of a right checksum, is a state for the parameters in values: its
- * size, version and hash of parameters; message says why not. */
-HSEP_API hsep_status hsep_model_check_state(
-    const hsep_context *context, const void *state, size_t size, const double values[], char message[]);
-
 #endif

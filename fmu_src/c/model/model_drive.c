@@ -10,7 +10,6 @@
 
 #include "hsep_check.h"
 #include "hsep_plant.h"
-#include "hsep_state.h"
 #include "hsep_table.h"
 
 #include <math.h>
@@ -27,7 +26,6 @@ typedef hsep_stage drive_plant;
 static const double drive_time_tolerance = 0.5; /* of a step: rounding of the importer's times */
 
 typedef struct {
-    hsep_state_header header;
     double end; /* s, of the last step in the importer's time */
     hsep_encoder encoder;
     drive_plant plant; /* its arrays may follow */
@@ -144,7 +142,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
         drive_check(context, values, &bytes, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    return hsep_state_size((double)offsetof(drive_state, plant) + bytes, size, message);
+    return hsep_check_bytes((double)offsetof(drive_state, plant) + bytes, size, message);
 }
 
 /* Measure the position and write all outputs. */
@@ -161,8 +159,7 @@ HSEP_API hsep_status hsep_model_initialise(
     size_t needed = 0;
     drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK ||
+        hsep_check_memory(needed, size, message) != HSEP_OK || hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }

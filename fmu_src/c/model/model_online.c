@@ -14,7 +14,6 @@
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
 #include "hsep_math.h"
-#include "hsep_state.h"
 #include "hsep_table.h"
 #include "hsep_windows.h"
 
@@ -32,7 +31,6 @@ typedef hsep_compensator_parameters online_parameters;
 #endif
 
 typedef struct {
-    hsep_state_header header;
     hsep_inputs inputs;
     online_block online; /* its arrays follow */
 } online_state;
@@ -216,7 +214,7 @@ static hsep_status online_checked(
 static hsep_status online_size(const online_parameters *derived, size_t *size, char message[])
 {
     const double before = (double)(sizeof(online_state) - sizeof(online_block));
-    return hsep_state_size(before + ONLINE(block_size)(derived), size, message);
+    return hsep_check_bytes(before + ONLINE(block_size)(derived), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
@@ -300,8 +298,7 @@ HSEP_API hsep_status hsep_model_initialise(
     online_parameters derived;
     const double start = values[HSEP_VR_x_d_ahead];
     if (online_checked(context, values, &parameters, &derived, message) != HSEP_OK ||
-        online_size(&derived, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK ||
+        online_size(&derived, &needed, message) != HSEP_OK || hsep_check_memory(needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_check_clock(&self->inputs.clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;

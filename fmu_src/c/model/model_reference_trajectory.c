@@ -14,7 +14,6 @@
 
 #include "hsep_check.h"
 #include "hsep_resource.h"
-#include "hsep_state.h"
 #include "hsep_text.h"
 
 #include <math.h>
@@ -26,7 +25,6 @@
 static const double trajectory_tolerance = 1e-6; /* of T_s */
 
 typedef struct {
-    hsep_state_header header;
     hsep_clock clock;
     uint64_t count;   /* samples, >= 1 */
     double samples[]; /* m */
@@ -81,7 +79,7 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
 /* Size of a state with count samples, bytes. */
 static hsep_status trajectory_bytes(uint64_t count, size_t *size, char message[])
 {
-    return hsep_state_size((double)sizeof(trajectory_state) + (double)count * (double)sizeof(double), size, message);
+    return hsep_check_bytes((double)sizeof(trajectory_state) + (double)count * (double)sizeof(double), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
@@ -112,8 +110,7 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     /* Memory was taken for the samples that were there when hsep_model_size looked. */
-    if (trajectory_bytes(count, &needed, message) != HSEP_OK ||
-        hsep_state_begin(&self->header, context, values, needed, size, message) != HSEP_OK) {
+    if (trajectory_bytes(count, &needed, message) != HSEP_OK || hsep_check_memory(needed, size, message) != HSEP_OK) {
         fclose(file);
         return HSEP_REFUSED;
     }
