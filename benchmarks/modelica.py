@@ -24,11 +24,7 @@ from hybridsep.fmi.spec import fmu_name
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.trajectory import spiral, staircase
 
-MODELS = {
-    "spring_mass_damper": "SpringMassDamper",
-    "als25010_x": "ALS25010X",
-    "als25010_y": "ALS25010Y",
-}
+MODELS = {"spring_mass_damper": "SpringMassDamper", "als25010_x": "ALS25010X", "als25010_y": "ALS25010Y"}
 """Machines and their models in ``HybridSEP.Machines``."""
 
 TOLERANCES = (1e-6, 1e-9, 1e-12)

@@ -29,10 +29,7 @@ from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from c_coverage import count_in, table
 from command_line import Run
 from properties import LEFT_OUT, take_profile
-from quick_fits import (
-    without_larger_structures,
-    without_other_settings,
-)
+from quick_fits import without_larger_structures, without_other_settings
 
 sys.dont_write_bytecode = False  # of this process too
 

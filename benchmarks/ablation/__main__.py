@@ -67,7 +67,7 @@ NO_DOUBTING: Changes = {
         (
             "known[hsep_averaged_kind_of(self, i)] &&",
             "known[hsep_averaged_kind_of(self, i)] && i != HSEP_FRESH_START &&",
-        ),
+        )
     ],
     STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);\n", "")],
     **constants(discard_above=2.0),

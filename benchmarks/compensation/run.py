@@ -50,10 +50,7 @@ STAGE_SHARES = (1 / 2, 2 / 3)  # largest error of the hybrid's warm runs on eith
 
 LESS_THAN_5_PERCENT_WORSE = 1.05
 
-STAGE_HYBRIDS: dict[str, dict[str, float]] = {
-    "hybrid": {},
-    "hybrid, no_reversal = 0,": {"no_reversal": False},
-}
+STAGE_HYBRIDS: dict[str, dict[str, float]] = {"hybrid": {}, "hybrid, no_reversal = 0,": {"no_reversal": False}}
 """Settings of the hybrid runs on the stage."""
 STAGE_CASES = (
     *("none", "physics", "physics, no_reversal"),

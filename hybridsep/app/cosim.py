@@ -244,12 +244,7 @@ def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | No
 
 
 def _check_pair(
-    axis: Machine,
-    model: str,
-    predictor: Path | None,
-    plant: Path | None,
-    weights: Path | None,
-    entries: Sequence[str],
+    axis: Machine, model: str, predictor: Path | None, plant: Path | None, weights: Path | None, entries: Sequence[str]
 ) -> None:
     """Check the FMUs of a look-ahead ``model`` and a plant: those that are given, and that the others can be built."""
     from ..cosim.adapters import check_controller, check_plant

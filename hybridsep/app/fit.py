@@ -11,14 +11,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, Limits
-from .options import (
-    ForceOption,
-    JsonOption,
-    LogsArgument,
-    ReadingOptions,
-    takes_known,
-    takes_reading,
-)
+from .options import ForceOption, JsonOption, LogsArgument, ReadingOptions, takes_known, takes_reading
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit

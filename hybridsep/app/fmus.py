@@ -73,11 +73,7 @@ def build(
     from ..plants.trajectory import read_trajectory
     from .console import check_outputs, print_built, progress_bar, warn_of_estimates
 
-    native = {
-        "--embed-weights": embed_weights,
-        f"--for {controller}": controller is not None,
-        "--target": bool(target),
-    }
+    native = {"--embed-weights": embed_weights, f"--for {controller}": controller is not None, "--target": bool(target)}
     if wrong := [option for option, given in native.items() if given and flavour != "native"]:
         raise ParameterError(f"{wrong[0]} is for native FMUs; with --flavour {flavour} leave it out")
     if controller is not None and controller not in _CONTROLLERS:
@@ -192,11 +188,7 @@ def hal(
     # of an earlier call: the axis would start with them
     stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
     changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
-    check_outputs(
-        [("--out", path, ()) for path in (*changed, *stale)],
-        {"saved predictor": weights},
-        force=force,
-    )
+    check_outputs([("--out", path, ()) for path in (*changed, *stale)], {"saved predictor": weights}, force=force)
     for path, content in files.items():
         with atomic_open(path) as file:
             file.write(content)

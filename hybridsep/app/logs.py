@@ -63,16 +63,7 @@ def backtest(
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..predict.predictor import HybridPredictor
-    from .console import (
-        FIGURES,
-        RUNS,
-        check_outputs,
-        console,
-        print_json,
-        print_judged,
-        print_written,
-        progress_bar,
-    )
+    from .console import FIGURES, RUNS, check_outputs, console, print_json, print_judged, print_written, progress_bar
 
     if figure is not None:
         from ..evaluate.figures import prediction_figure

@@ -56,8 +56,7 @@ WeightsOption = Annotated[
     ),
 ]
 SavedOption = Annotated[
-    Path | None,
-    typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
+    Path | None, typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned.")
 ]
 LogArgument = Annotated[
     Path,

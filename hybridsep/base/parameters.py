@@ -97,17 +97,8 @@ class Parameter:
         return number
 
 
-_ANGULAR = {
-    "m": "rad",
-    "m2": "rad2",
-    "m/s": "rad/s",
-    "m/s2": "rad/s2",
-    "m/s3": "rad/s3",
-    "1/m": "1/rad",
-    "mm": "deg",
-    "um": "urad",
-    "mm/s": "deg/s",
-}
+_ANGULAR = {"m": "rad", "m2": "rad2", "m/s": "rad/s", "m/s2": "rad/s2", "m/s3": "rad/s3", "1/m": "1/rad"}
+_ANGULAR |= {"mm": "deg", "um": "urad", "mm/s": "deg/s"}
 """Unit of a linear axis, or unit in which it is shown → unit of a rotary axis."""
 
 

@@ -128,8 +128,6 @@ class PredictorSettings(Settings):
     AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period", "recall")
     """Fields of the residual model with averaging."""
 
-    """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
-
     KNOWN: ClassVar[tuple[str, ...]] = ("period", "measurement_delay")
     """Fields that are known of an axis, and not fitted to a log."""
 
@@ -137,10 +135,7 @@ class PredictorSettings(Settings):
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
     p: int = whole(
-        50,
-        1,
-        5000,
-        "number of past residuals e_pb (measured minus physics-based position) among the features",
+        *(50, 1, 5000, "number of past residuals e_pb (measured minus physics-based position) among the features"),
         learned=True,
     )
     q: int = whole(3, 0, 5000, "number of past physics-based predictions x_pb among the features", learned=True)
@@ -167,9 +162,7 @@ class PredictorSettings(Settings):
         learned=True,
     )
     averaging: bool = flag(
-        True,
-        "whether the residual is predicted by online model averaging; false: by the paper's model",
-        learned=True,
+        True, "whether the residual is predicted by online model averaging; false: by the paper's model", learned=True
     )
     effect: float = real(
         *(0.0, 0.0, 10.0, "m", "prior standard deviation of a feature's effect, with averaging; 0: from the residuals"),
@@ -401,11 +394,7 @@ _OTHERS = (
     real(None, 1e-3, 1e5, "Hz", "natural frequency of the mode", name="f_n", learned=True),
     real(None, 1e-6, 1e4, "1", "damping ratio of the mode", name="zeta", learned=True),
     real(
-        None,
-        -1e15,
-        1e15,
-        "1/s2",
-        "numerator of the mode's transfer function, constant term",
+        *(None, -1e15, 1e15, "1/s2", "numerator of the mode's transfer function, constant term"),
         name="alpha",
         learned=True,
     ),

@@ -115,10 +115,7 @@ def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:
 
 
 def demo(
-    out: str | Path,
-    *,
-    full: bool = False,
-    progress: Callable[[str, float], object] = lambda message, fraction: None,
+    out: str | Path, *, full: bool = False, progress: Callable[[str, float], object] = lambda message, fraction: None
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase, write figures, ``summary.json`` and ``index.html``.
 

@@ -199,11 +199,7 @@ class Peer:
 
 @one_blas_thread
 def predict_peers(
-    pieces: Sequence[Piece],
-    Np: int,
-    *,
-    delay: int = 0,
-    progress: Callable[[float], object] = lambda _done: None,
+    pieces: Sequence[Piece], Np: int, *, delay: int = 0, progress: Callable[[float], object] = lambda _done: None
 ) -> tuple[Peer, ...]:
     """Return the peers' predictions of all windows from each piece's ``first`` on; the pieces are in the order of time.
 

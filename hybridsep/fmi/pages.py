@@ -41,13 +41,7 @@ def filled(template: str, **values: object) -> str:
 
 
 def documentation(
-    spec: FmuSpec,
-    needs: str,
-    dependencies: str,
-    reference: Collection[str],
-    *,
-    limits: str = "",
-    sources: str = "",
+    spec: FmuSpec, needs: str, dependencies: str, reference: Collection[str], *, limits: str = "", sources: str = ""
 ) -> dict[str, bytes]:
     """Return the pages of an FMU, ``documentation/index.html`` among them: archive name → content.
 
@@ -65,11 +59,7 @@ def documentation(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
     )
-    run = {
-        "name": name,
-        "digits": AGREEMENT.get(model, 11),
-        "inputs": "",
-    }
+    run = {"name": name, "digits": AGREEMENT.get(model, 11), "inputs": ""}
     if model != "ReferenceTrajectory":
         run["inputs"] = f', fed with <a href="reference/{name}_in.csv">{name}_in.csv</a>'
     named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)

@@ -252,10 +252,7 @@ def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[st
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
     drive: dict[str, tuple[str, ...]] = {"Drive": ("m", "c", "k", "c_nl", "k_nl")}
-    stage = {
-        "Disturbance": ("f", "kappa", "friction_on", "v_friction"),
-        "Command": ("T_s", "dead_time", "input_hold"),
-    }
+    stage = {"Disturbance": ("f", "kappa", "friction_on", "v_friction"), "Command": ("T_s", "dead_time", "input_hold")}
     groups = {**(stage if modes else drive), "Encoder": ("noise_std", "seed")}
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),

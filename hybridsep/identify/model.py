@@ -61,11 +61,7 @@ class IdentifiedModel:
 
 def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title: str, **entries: Any) -> Machine:
     """Return the machine with an identified model; parameters as for :meth:`IdentifiedModel.machine`."""
-    physics = {
-        "mode": [vars(mode) for mode in model.modes],
-        "dead_time": model.dead_time,
-        "input_hold": input_hold,
-    }
+    physics = {"mode": [vars(mode) for mode in model.modes], "dead_time": model.dead_time, "input_hold": input_hold}
     return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
 
 

@@ -106,9 +106,7 @@ def identify_operation(
 def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
     """Return a model that follows its command, for recordings that cannot determine one; ``reason`` is its finding."""
     model = ModalModel(Structure(0).modes(np.empty(0), np.empty(0), T_s))
-    return IdentifiedModel(
-        *(model, "foh", T_s, "m", Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)),
-    )
+    return IdentifiedModel(*(model, "foh", T_s, "m", Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)))
 
 
 def _hindrance(segments: Sequence[Segment]) -> str:

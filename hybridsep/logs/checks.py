@@ -442,12 +442,7 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
         yield Finding(name, words, evidence, _over_time(log, name.capitalize()))
 
 
-_NOTES = (
-    _note_missing,
-    _note_rate,
-    _note_outliers,
-    _note_start,
-)
+_NOTES = (_note_missing, _note_rate, _note_outliers, _note_start)
 
 
 def _travel(x: Array) -> float:

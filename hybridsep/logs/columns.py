@@ -33,12 +33,7 @@ class Column:
 
 
 def choose_columns(
-    source: Source,
-    columns: Mapping[str, str] | None,
-    unit: str | None,
-    *,
-    axis: str | None = None,
-    time_needed: bool,
+    source: Source, columns: Mapping[str, str] | None, unit: str | None, *, axis: str | None = None, time_needed: bool
 ) -> dict[str, Column]:
     """Return the columns to read, by role.
 

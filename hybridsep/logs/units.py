@@ -79,27 +79,19 @@ def shown_in(unit: str) -> DisplayUnits:
 
 
 _SPELLINGS = {
-    "meter": "m",
-    "metre": "m",
-    "meters": "m",
-    "metres": "m",
-    "micron": "um",
-    "microns": "um",
-    "inch": "in",
-    '"': "in",
-    "°": "deg",
-    "degree": "deg",
-    "degrees": "deg",
-    "radian": "rad",
-    "radians": "rad",
-    "turn": "rev",
-    "turns": "rev",
-    "revolution": "rev",
-    "sec": "s",
-    "second": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "usec": "us",
+    spelling: name
+    for name, spellings in {
+        "m": "meter metre meters metres",
+        "um": "micron microns",
+        "in": 'inch "',
+        "deg": "° degree degrees",
+        "rad": "radian radians",
+        "rev": "turn turns revolution",
+        "s": "sec second seconds",
+        "ms": "msec",
+        "us": "usec",
+    }.items()
+    for spelling in spellings.split()
 }
 _SPELLINGS |= {
     f"{prefix}{word}": f"{short}{unit}"

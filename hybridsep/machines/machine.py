@@ -220,11 +220,7 @@ class Machine(Section):
             raise MachineError(
                 f"machine {self.name}: {error}; set averaging = true or measurement_delay = 0 in [compensator]"
             ) from error
-        return {
-            **predictor.to_fmi(),
-            **self.compensator_settings.to_fmi(),
-            "dead_time": self.physics.dead_time,
-        }
+        return {**predictor.to_fmi(), **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     @cached_property
     def _look_ahead(self) -> int:

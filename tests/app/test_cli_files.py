@@ -95,12 +95,7 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
 def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path, arguments: tuple[str, ...]) -> None:
     folder = tmp_path / "there"
     folder.mkdir()
-    names = {
-        "build": "FeedDrive.fmu",
-        "demo": "summary.json",
-        "init": "axis.toml",
-        "fit": "machine.toml",
-    }
+    names = {"build": "FeedDrive.fmu", "demo": "summary.json", "init": "axis.toml", "fit": "machine.toml"}
     there = folder / names.get(arguments[0], "run.png" if "--figure" in arguments else "run.csv")
     there.write_text("my own")
     words = [word.format(log=log, there=there, folder=folder) for word in arguments]

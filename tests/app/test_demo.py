@@ -137,10 +137,7 @@ def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.Mo
     written = {path for path in tmp_path.rglob("*") if path.is_file()}
     assert written <= set(demo_files(tmp_path, full=True))
     drawn = {path.stem for path in written if path.suffix == ".png"}
-    assert drawn == {
-        "spiral_contour",
-        *(f"spiral_{axis}{what}" for axis in "xy" for what in ("", "_compensated")),
-    }
+    assert drawn == {"spiral_contour", *(f"spiral_{axis}{what}" for axis in "xy" for what in ("", "_compensated"))}
 
 
 @pytest.mark.nightly

@@ -17,10 +17,7 @@ def without_measurement(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize(
     "command",
-    [
-        ("fit", "--out", "deep/new"),
-        ("backtest", *MACHINE, "--save", "new/run.csv", "--report", "new/page.html"),
-    ],
+    [("fit", "--out", "deep/new"), ("backtest", *MACHINE, "--save", "new/run.csv", "--report", "new/page.html")],
     ids=lambda command: command[0],
 )
 def test_a_log_without_any_measurement(

@@ -93,10 +93,6 @@ def test_the_weights_keep_their_digits_over_a_million_samples() -> None:
     regression = CRegression(55, 1e-12)
     regression.fold(rows, target, repetitions=200)
     scale = np.sqrt(np.longdouble(200))
-    exact = oracle.ridge_extended(
-        (rows * scale).astype(np.longdouble),
-        (target * scale).astype(np.longdouble),
-        1e-12,
-    )
+    exact = oracle.ridge_extended((rows * scale).astype(np.longdouble), (target * scale).astype(np.longdouble), 1e-12)
     error = np.linalg.norm((regression.weights - exact).astype(float)) / np.linalg.norm(exact.astype(float))
     assert error <= 1e-9

@@ -4,16 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanism import (
-    Drive,
-    coulomb,
-    linear_mode,
-    quadratic,
-    response,
-    simulate,
-    split,
-    squared_command,
-)
+from mechanism import Drive, coulomb, linear_mode, quadratic, response, simulate, split, squared_command
 from mechanism_cases import demonstrate
 
 from hybridsep.model.physics import ModalModel, Mode

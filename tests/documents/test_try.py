@@ -129,10 +129,7 @@ LINES = [f"{2 * k};{k % 7},5;{k % 5}" for k in range(1000)]
     [
         (["0;1;2", *LINES], "the first row must name the columns"),
         (["t;command;x_meas", *LINES], "choose commanded and measured"),
-        (
-            ["t;command_mm;x_meas", *LINES[:500], "1000;1;", *LINES[501:]],
-            'row 501, x_meas: "" is no number',
-        ),
+        (["t;command_mm;x_meas", *LINES[:500], "1000;1;", *LINES[501:]], 'row 501, x_meas: "" is no number'),
         (
             ["t_ms;command_mm;x_meas", *LINES[:600], *LINES[700:]],
             "row 601: the time changes by 0.202 s, elsewhere by 0.002 s",

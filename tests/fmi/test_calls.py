@@ -9,18 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fmi_library import (
-    ABSENT,
-    DISCARD,
-    ERROR,
-    OK,
-    STATES,
-    Library,
-    Library3,
-    library_of,
-    repair_checksum,
-    steps,
-)
+from fmi_library import ABSENT, DISCARD, ERROR, OK, STATES, Library, Library3, library_of, repair_checksum, steps
 
 from hybridsep import paper_machine
 from hybridsep.fmi.spec import table_of

@@ -45,10 +45,7 @@ RUNNERS = {
     "Linux": Runner(HERE, (), "", TARGETS[HERE].triple),
     "Windows": Runner("x86_64-windows", ("wine",), "wine wine64", TARGETS["x86_64-windows"].triple),
     "ARM": Runner(
-        "aarch64-linux",
-        ("qemu-aarch64", "-L", SYSROOT),
-        "qemu-user libc6-arm64-cross",
-        TARGETS["aarch64-linux"].triple,
+        "aarch64-linux", ("qemu-aarch64", "-L", SYSROOT), "qemu-user libc6-arm64-cross", TARGETS["aarch64-linux"].triple
     ),
     "musl": Runner(HERE, ("/lib/ld-musl-x86_64.so.1",), "musl", "x86_64-linux-musl"),
 }

@@ -76,8 +76,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("suffix", "kept"),
-    [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.99)],
+    ("suffix", "kept"), [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.99)]
 )
 def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
     path = write(tmp_path / f"log{suffix}", columns(500))
@@ -120,10 +119,7 @@ def time_at(i: int, value: float) -> Array:
         (1e6 + np.arange(50, dtype=np.float32) / 16, r"time 't' is rounded too coarsely, 0 % .*, about 0\.062 s"),
         (np.arange(50) * 4.0, r"has an interval of 4, no axis's in s, or a time in ms; give T_s"),
         (1.7e12 + np.arange(50), r"it is an index, or a time in ms since 1970; give T_s \(--T_s 0.001\), or"),
-        (
-            46_000 + np.arange(50) / 8_640_000,
-            r"an interval of 1\.15741e-07, .* in d since 1970; .*\(--T_s 0.01\)",
-        ),
+        (46_000 + np.arange(50) / 8_640_000, r"an interval of 1\.15741e-07, .* in d since 1970; .*\(--T_s 0.01\)"),
     ],
 )
 def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:

@@ -67,29 +67,17 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            "t,x_d [mm/s],x\n0,1,2\n",
-            r"column 'x_d \[mm/s\]' must be a position in one of m, .* its unit is 'mm/s'",
-        ),
-        (
-            "t,x_d [counts],x\n0,1,2\n",
-            r"'x_d \[counts\]' is in encoder counts; give the length of one.*--unit 0\.1um",
-        ),
+        ("t,x_d [mm/s],x\n0,1,2\n", r"column 'x_d \[mm/s\]' must be a position in one of m, .* its unit is 'mm/s'"),
+        ("t,x_d [counts],x\n0,1,2\n", r"'x_d \[counts\]' is in encoder counts; give the length of one.*--unit 0\.1um"),
         ("t,x_d,x (m/s)\n0,1,2\n", r"column 'x \(m/s\)' must be a position"),
         ("t,x_d [m],x [deg]\n0,1,2\n", r"'x_d \[m\]' is in m and column 'x \[deg\]' in deg; both must be lengths or"),
-        (
-            "t [h],x_d,x\n0,1,2\n",
-            r"time 't \[h\]' must be in one of s, ms, us, ns, min, its unit is 'h'; correct",
-        ),
+        ("t [h],x_d,x\n0,1,2\n", r"time 't \[h\]' must be in one of s, ms, us, ns, min, its unit is 'h'; correct"),
         ("t,x [mm],x_d,x_mm\n0,1,2,3\n", r"column x may be 'x \[mm\]', 'x_mm'; name it: --x NAME"),
         ("t;x_d;x\n0;1;2\n1;1.000,5;2\n", r"line 3: column 'x_d' must be .* got '1\.000,5'; write numbers without"),
         ("t,x_d,x\n0,1,2\n00:01.5,1,2\n", r"line 3: column 't' must be a number, got '00:01\.5'; write times of"),
         ("a\nb;c\n# d\n1;2\n", r"columns 't', 'x_d', 'x' are missing, the file has 'b', 'c'"),
         ("# nothing\n# else\n", r"columns 't', 'x_d', 'x' are missing, the file has 'nothing'"),
-        (
-            TWO_ROWS,
-            r"has no line of names, its first line is numbers \('0', '1', '2'\); put one above.* as t,x_d,x: ",
-        ),
+        (TWO_ROWS, r"has no line of names, its first line is numbers \('0', '1', '2'\); put one above.* as t,x_d,x: "),
         ("0,0,0\n1,0,0\n", r"its first line is numbers \('0', '0', '0'\);"),
         ("10:20:30,1,2\n10:20:31,3,4\n", "has no line of names, its first line is numbers"),
         ("t,x_d,x\n0,0,0\n1,nan,0\n", r"log\.csv, line 3: column 'x_d' must be finite, got nan$"),

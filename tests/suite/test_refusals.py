@@ -55,7 +55,7 @@ TOGETHER: dict[str, list[Case]] = {
             {"mode[1].f_n": 2e4},
             "2 pi f_n and 4 pi f_n zeta of mode[1] must be at most 100000 1/s in a plant, got 125664; "
             "lower f_n or zeta",
-        ),
+        )
     ],
 }
 """Refusals of several parameters, or of one because of another, by model."""

@@ -2,17 +2,7 @@
 
 import pytest
 from driving import SHORT, T_S, set_inputs, steps
-from stream import (
-    COMPENSATOR,
-    DRIVE,
-    LOOK_AHEADS,
-    PLANTS,
-    PREDICTOR,
-    STAGE,
-    STAGE_COMPENSATOR,
-    STAGE_PREDICTOR,
-    Value,
-)
+from stream import COMPENSATOR, DRIVE, LOOK_AHEADS, PLANTS, PREDICTOR, STAGE, STAGE_COMPENSATOR, STAGE_PREDICTOR, Value
 from streams import StreamMaker, on_all
 
 OTHERS = {PREDICTOR: STAGE_PREDICTOR, COMPENSATOR: STAGE_COMPENSATOR, DRIVE: STAGE, STAGE: DRIVE}

@@ -13,16 +13,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 import pytest
 from driving import T_S, initialise, position, set_inputs, steps
-from stream import (
-    CANNOT,
-    COMPENSATOR,
-    LOOK_AHEADS,
-    PLANTS,
-    PREDICTOR,
-    TRAJECTORY,
-    Array,
-    RefusedStreamError,
-)
+from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, Array, RefusedStreamError
 from streams import StreamMaker, on_adapters, on_all
 
 N_SAMPLES = 160
@@ -87,11 +78,7 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
 @pytest.mark.slow
 @every
 @pytest.mark.parametrize(
-    ("pattern", "start"),
-    [
-        *((pattern, 0.0) for pattern in ("0.04", "0.96", "3.7", "230")),
-        ("mixture", 1e9),
-    ],
+    ("pattern", "start"), [*((pattern, 0.0) for pattern in ("0.04", "0.96", "3.7", "230")), ("mixture", 1e9)]
 )
 def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern: str, start: float) -> None:
     points, outputs = in_steps(new_stream, steps_of(pattern), start)
@@ -114,11 +101,7 @@ def _sum_of_steps(n: int, T_s: float) -> Array:
 
 @pytest.mark.parametrize(
     ("times_of", "T_s", "warned"),
-    [
-        (_whole_nanoseconds, 1 / 3000, 0),
-        (_single_precision, 1 / 3000, 1),
-        (_sum_of_steps, 1 / 3000, 0),
-    ],
+    [(_whole_nanoseconds, 1 / 3000, 0), (_single_precision, 1 / 3000, 1), (_sum_of_steps, 1 / 3000, 0)],
 )
 @on_adapters((PREDICTOR, COMPENSATOR))
 def test_figures_with_an_importers_times_are_those_of_exact_steps(

@@ -20,13 +20,7 @@ from places import ROOT
 
 from hybridsep.base.parameters import Parameter
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.variables import (
-    AVERAGING_SETTINGS,
-    COMPENSATOR_SETTINGS,
-    INTERPOLATED,
-    PREDICTOR_SETTINGS,
-    FmuTable,
-)
+from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, FmuTable
 from hybridsep.machines.machine import load_machine
 
 Array = NDArray[np.float64]

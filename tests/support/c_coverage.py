@@ -70,10 +70,7 @@ def table(folder: Path) -> str:
 def _reports(folder: Path) -> Iterator[dict[str, Any]]:
     for counts in folder.glob("*/*.gcda"):
         done = subprocess.run(
-            ["gcov", "--json-format", "--stdout", counts],
-            cwd=counts.parent,
-            capture_output=True,
-            check=False,
+            ["gcov", "--json-format", "--stdout", counts], cwd=counts.parent, capture_output=True, check=False
         )
         if done.returncode == 0:
             text = gzip.decompress(done.stdout) if done.stdout[:2] == b"\x1f\x8b" else done.stdout

@@ -26,16 +26,11 @@ TS = 1e-3
 
 
 def compensator(
-    compensate: str = "hybrid",
-    limits: Limits | None = DRIVE_LIMITS,
-    *,
-    no_reversal: bool = True,
-    **changes: Any,
+    compensate: str = "hybrid", limits: Limits | None = DRIVE_LIMITS, *, no_reversal: bool = True, **changes: Any
 ) -> SepCompensator:
     predictor = HybridPredictor(MODEL, PredictorSettings(**{"averaging": False, **changes}))
     return SepCompensator(
-        predictor,
-        CompensatorSettings(preview=200, limits=limits, compensate=compensate, no_reversal=no_reversal),
+        predictor, CompensatorSettings(preview=200, limits=limits, compensate=compensate, no_reversal=no_reversal)
     )
 
 

@@ -139,13 +139,7 @@ def _closed_loop(
 
 
 def replay(
-    stream: Stream,
-    loop: Loop,
-    first: int = 0,
-    last: int | None = None,
-    start_time: float = 0.0,
-    *,
-    saved_at: int = -1,
+    stream: Stream, loop: Loop, first: int = 0, last: int | None = None, start_time: float = 0.0, *, saved_at: int = -1
 ) -> Array:
     """Step samples ``first … last − 1`` of a loop, saved and restored before one; return the outputs, the first too."""
     T_s = float(loop.values.get("T_s", T_S))

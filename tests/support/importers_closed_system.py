@@ -253,10 +253,7 @@ IMPORTERS: dict[str, tuple[Callable[[ClosedSystem, Path], Array], set[tuple[str,
     "fmpy SSP": (with_fmpy_ssp, None),
     "libcosim": (with_libcosim, _DESKTOP),  # libcosimpy 0.0.6 has wheels for these
     "ecos": (with_ecos, _DESKTOP),  # ecospy 0.7.2's wheel is for any platform, its libraries are for these
-    "fmucontainer -sequential": (
-        partial(with_fmucontainer, sequential=True),
-        _DESKTOP | {("Darwin", "arm64")},
-    ),
+    "fmucontainer -sequential": (partial(with_fmucontainer, sequential=True), _DESKTOP | {("Darwin", "arm64")}),
     "fmucontainer": (with_fmucontainer, _DESKTOP | {("Darwin", "arm64")}),  # likewise fmu-manipulation-toolbox 2.0's
 }
 """Importers: function that runs the system, and platforms with a library; None for all."""

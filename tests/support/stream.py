@@ -37,10 +37,7 @@ CANNOT = {
     (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
     (LIBRARY, "figures"): "the C core agrees with it to 1e-12 m, and its figures take a tenth of the time",
     (NATIVE, "figures"): "it agrees with the C core, which it is compiled from",
-    (
-        CORE,
-        "bad states",
-    ): "checksum, GUID and size are the adapter's",
+    (CORE, "bad states"): "checksum, GUID and size are the adapter's",
     (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",
 }
 """(implementation, model or ability): why it is not there."""

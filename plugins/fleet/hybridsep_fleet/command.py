@@ -29,8 +29,7 @@ def fleet(
         ),
     ] = None,
     Np: Annotated[
-        int | None,
-        typer.Option("--Np", min=1, help="Samples of the controllers' look-ahead; 100 ms if left out."),
+        int | None, typer.Option("--Np", min=1, help="Samples of the controllers' look-ahead; 100 ms if left out.")
     ] = None,
     axis: Annotated[
         list[str] | None, typer.Option(help="Axis that is read of logs with several; all of them if left out.")

@@ -42,13 +42,7 @@ class FleetSettings:
 
     def read(self, path: Path, axis: str) -> Log:
         """Read an axis of a log."""
-        return read_log(
-            path,
-            columns=dict(self.columns),
-            unit=self.unit,
-            T_s=self.T_s,
-            axis=axis or None,
-        )
+        return read_log(path, columns=dict(self.columns), unit=self.unit, T_s=self.T_s, axis=axis or None)
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,7 @@ def modal(
     hold: Annotated[str, typer.Option(help="Hold of the command: zoh or foh.")] = "zoh",
     dead_time: Annotated[int, typer.Option(help="Whole samples of dead time in the response.")] = 0,
     T_s: Annotated[
-        float | None,
-        typer.Option("--T_s", help="Sampling interval [s]: the model's, 1 ms if left out, or a log's."),
+        float | None, typer.Option("--T_s", help="Sampling interval [s]: the model's, 1 ms if left out, or a log's.")
     ] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of the positions of a log, where it does not say it.")] = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of a log's time column.")] = None,

@@ -51,10 +51,7 @@ def test_table_1_is_found_without_noise(axis: str) -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("axis", "seed"),
-    [("x", 0), ("y", 1)],
-)
+@pytest.mark.parametrize(("axis", "seed"), [("x", 0), ("y", 1)])
 def test_table_1_is_found_within_its_deviations(axis: str, seed: int) -> None:
     """X has modes at 42.53 and 42.60 Hz; 1 % noise."""
     truth = table_1(axis)

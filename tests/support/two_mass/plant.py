@@ -22,13 +22,7 @@ _FRICTION = ("coulomb", "stribeck", "v_stribeck", "bristle", "micro_damping")
 
 
 class _Loop(ctypes.Structure):
-    _fields_ = (
-        ("A", Real * 36),
-        ("B", Real * 30),
-        ("demand", Real * 8),
-        ("stiffness", Real),
-        ("damping", Real),
-    )
+    _fields_ = (("A", Real * 36), ("B", Real * 30), ("demand", Real * 8), ("stiffness", Real), ("damping", Real))
 
 
 class _Friction(ctypes.Structure):
