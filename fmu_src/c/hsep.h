@@ -151,7 +151,7 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API int hsep_compensator_change(
     hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max);
 
-/* End a trip where the level of the reset rises; what was learned stays. It trips where x_meas is farther from x_d than
+/* End a trip where the level of the reset rises; what was learned before stays. It trips where x_meas is farther from x_d than
  * following_error_max for three samples in a row: from the next window on the change fades, as with compensate off. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 

@@ -250,13 +250,14 @@ class SepCompensator:
         if pending is None:
             raise SignalError("update must follow plan: there is no planned window to measure")
         predictor, Np = self.predictor, self.predictor.Np
-        measured = as_measured(x, "x", Np)
-        predictor.update(measured, learn=predictor.k >= self.lead_in)
+        measured, monitor = as_measured(x, "x", Np).copy(), replace(self.monitor)
         x_d = np.concatenate((self._x_d_before, pending.x_d))
         first = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
-        for error in (measured - x_d[first : first + Np])[self.monitor.n_taken :].tolist():
-            self.monitor.take_in(error)
-        self.monitor.n_taken = 0
+        for i, error in enumerate((measured - x_d[first : first + Np]).tolist()[monitor.n_taken :], monitor.n_taken):
+            if not monitor.take_in(error) and predictor.settings.averaging:
+                measured[i] = np.nan
+        predictor.update(measured, learn=predictor.k >= self.lead_in)
+        self.monitor, monitor.n_taken = monitor, 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]

@@ -34,7 +34,8 @@ _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
 _ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
-_RESET = "a rising edge ends a trip; what was learned stays"  # no input: several masters set all inputs by setReal
+# no input: several masters set all inputs by setReal
+_RESET = "a rising edge ends a trip; what was learned before it stays"
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
     "input": "Inputs",

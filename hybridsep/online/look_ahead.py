@@ -323,8 +323,9 @@ class LookAhead:
         self.check(x_d_ahead, x_meas)
         if self.predictor.settings.measurement_delay < 0:
             x_meas, self._next = self._next, x_meas
-        self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
-        self.planner.monitor.take_in(float(x_meas - self._compared[0, self.k % self.Np]))
+        is_sound = self.planner.monitor.take_in(float(x_meas - self._compared[0, self.k % self.Np]))
+        self._ahead[self.k % self.delay] = x_d_ahead
+        self._measured[self.k % self.Np] = x_meas if is_sound or not self.may_miss else math.nan
         if self.k >= self._first_compared and not math.isnan(x_meas):
             self._residual = float(x_meas - self._compared[1, self.k % self.Np])
         if self.k >= self._first_scored and not math.isnan(x_meas):

@@ -32,18 +32,22 @@ class Monitor:
         """Whether the change of the command fades until a reset."""
         return self.n_over >= _N_OVER
 
-    def take_in(self, error: float) -> None:
-        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing."""
+    def take_in(self, error: float) -> bool:
+        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
+
+        Returns whether it is within the limit, and nothing has tripped: what is not is not learned.
+        """
         self.n_taken += 1
         if math.isnan(error):
             self.n_missing += 1
-            return
+            return True
         self.n_missing = 0
         if not self.is_tripped:
             self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
+        return self.n_over == 0
 
     def reset(self) -> None:
-        """End a trip; what was learned is kept."""
+        """End a trip; what was learned before it is kept."""
         self.n_over = 0
 
     def take_reset(self, level: bool) -> None:

@@ -70,6 +70,28 @@ def test_a_trip_fades_and_ends_with_a_rising_reset(new_stream: StreamMaker) -> N
         assert largest <= bound * (1 + 1e-6), name
 
 
+@on_adapters((COMPENSATOR,))
+def test_what_is_measured_above_the_limit_and_until_the_reset_is_not_learned(new_stream: StreamMaker) -> None:
+    seen = []
+    for beside in (BEYOND, -10 * BEYOND):
+        stream = new_stream()
+        initialise(stream, following_error_max=ALLOWED, **LIMITS)
+        outputs = []
+        for k in range(N_RUN):
+            set_inputs(stream, k * T_S)
+            if 200 <= k < 290:
+                stream.set("x_meas", position(k * T_S) + beside)
+            stream.set("reset", k == 300)
+            stream.step(k * T_S, T_S)
+            outputs.append(stream.outputs())
+        seen.append(np.array(outputs))
+        stream.close()
+    for name in ("x_dm", "x_h", "x_h_std", "sep_state", "alarm"):
+        np.testing.assert_array_equal(column(seen[0], name), column(seen[1], name))
+    assert column(seen[0], "alarm").nonzero()[0].tolist() == [*range(202, 300)]
+    assert column(seen[0], "sep_state")[-1] > 0.0
+
+
 @on_all((COMPENSATOR,))
 def test_the_papers_model_trips_alike(new_stream: StreamMaker) -> None:
     stream = new_stream()

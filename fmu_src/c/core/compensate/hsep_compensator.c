@@ -300,25 +300,28 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing. */
-static void compensator_monitor(hsep_compensator *self, hsep_real error)
+/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing. Return whether it is
+ * within the limit, and nothing has tripped: what is not is not learned. */
+static int compensator_monitor(hsep_compensator *self, hsep_real error)
 {
     if (isnan(error)) {
         self->missing += self->missing < self->n_lost;
-        return;
+        return 1;
     }
     self->missing = 0;
     if (self->over < HSEP_OVER) {
         self->over = self->error_max > 0.0 && hsep_fabs(error) > self->error_max ? self->over + 1 : 0;
     }
+    return self->over == 0;
 }
 
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
-    compensator_monitor(self, (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np]);
-    if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas)) {
+    const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np];
+    const int is_sound = compensator_monitor(self, error) || !self->averaged;
+    if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
         hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
         hsep_compensator_begin(self);

@@ -104,9 +104,9 @@ static int predictor_settled(hsep_predictor *self)
     return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
 }
 
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured)
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured, int is_sound)
 {
-    const hsep_real x_meas = self->early ? self->next : measured;
+    const hsep_real x_meas = self->early ? self->next : measured, learned = is_sound ? x_meas : NAN;
     const hsep_int i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
     self->next = measured;
     /* x_meas was measured late samples ago. */
@@ -114,12 +114,12 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_residual_append_command(hsep_predictor_model(self), x_d_ahead - self->start);
-    hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
+    hsep_at(self, self->past_e)[j] = learned - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     const hsep_residual_window window = hsep_predictor_window(self);
     const hsep_residual_sample sample = {
         .i = i,
         .settled = predictor_settled(self),
-        .relative = x_meas - self->start,
+        .relative = learned - self->start,
         .x = hsep_at(self, self->past_x) + j,
         .e = hsep_at(self, self->past_e) + j};
     hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);
@@ -279,7 +279,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     const hsep_real relative = x_d_ahead - self->start;
     hsep_real *ahead_pb = hsep_at(self, self->ahead_pb);
     hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
-    if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
+    if (!hsep_predictor_take_in(self, x_d_ahead, x_meas, 1)) {
         if (self->n_published < Np) {
             predictor_go_on(self);
         }

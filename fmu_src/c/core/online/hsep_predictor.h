@@ -100,8 +100,9 @@ static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);
 
-/* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas);
+/* Process sample k: learn it if it is sound, update the error sums, advance to k + 1; return whether the window has
+ * ended. */
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas, int is_sound);
 
 /* Predict at once what is left of the window, alone; later samples are the same. */
 HSEP_API void hsep_predictor_complete(hsep_predictor *self);
