@@ -184,13 +184,19 @@ def _starts(t: Array, T_s: float) -> Indices:
     """Return the samples that are later than the one before by over an interval, or earlier, and all after them."""
     steps = np.diff(t) / T_s
     at = np.flatnonzero((steps > _GAP) | (steps < 1.0 - _GAP)) + 1
-    if not len(at):
-        return at
-    phase = t / T_s - np.arange(len(t))
-    around = sliding_window_view(np.pad(phase, _AROUND, constant_values=np.nan), _AROUND)
-    # Window i ends before sample i, window i + _AROUND begins with it
-    late = np.nanmedian(around[at + _AROUND], axis=1) - np.nanmedian(around[at], axis=1)
-    return at[(np.abs(late) > _LATE) & (late * steps[at - 1] > 0.0)]
+    phase, found = np.append(0.0, np.cumsum(steps - 1.0)), at[:0]
+    while len(at):
+        around = sliding_window_view(np.pad(phase, _AROUND, constant_values=np.nan), _AROUND)
+        # Window i ends before sample i, window i + _AROUND begins with it
+        late = np.nanmedian(around[at + _AROUND], axis=1) - np.nanmedian(around[at], axis=1)
+        is_start = (np.abs(late) > _LATE) & (late * steps[at - 1] > 0.0)
+        if not is_start.any():
+            break
+        # Once more without these, which may hide one a few samples beside
+        jumps = np.zeros(len(t))
+        jumps[at[is_start]] = steps[at[is_start] - 1] - 1.0
+        phase, found, at = phase - np.cumsum(jumps), np.union1d(found, at[is_start]), at[~is_start]
+    return found
 
 
 def _mean_interval(t: Array) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from generated_logs import ACCUSED_BEFORE, generated_log, log_of
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from log_files import write
 from places import CASES, RECORDINGS, SO101
@@ -212,6 +212,7 @@ def test_numbers_without_bounds_are_checked() -> None:
     hold=st.sampled_from([1, 1, 1, 2, 7]),
     missing=st.sampled_from([0.0, 0.02, 0.3]),
 )
+@example(seed=3, n=120, gaps=[(0.5, 0.5), (0.46875, -1.0)], jitter=0.0, decimals=9, hold=2, missing=0.0)  # 4 between
 @examples(60)
 def test_any_log_that_is_read_keeps_its_samples_in_order(
     tmp_path_factory: pytest.TempPathFactory,
