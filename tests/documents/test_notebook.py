@@ -1,5 +1,6 @@
-"""The notebook of ``examples``: run from the first cell to the last, it ends in a compensated loop."""
+"""The notebook of ``examples``, run from the first cell to the last, and what a kernel shows of a figure."""
 
+import base64
 import gzip
 import json
 from pathlib import Path
@@ -32,3 +33,16 @@ def test_a_log_becomes_a_compensated_loop_in_ten_cells(tmp_path: Path, monkeypat
     assert hybrid < 0.05 * off
     assert (tmp_path / "report.html").is_file()
     assert (tmp_path / "my_axis" / "HybridPredictor_my_axis.fmu").is_file()
+
+
+@pytest.mark.slow
+def test_a_kernel_shows_a_figure_as_a_picture() -> None:
+    run_kernel = pytest.importorskip("jupyter_client.manager").run_kernel
+    shown: list[dict[str, Any]] = []
+    cell = (
+        "from hybridsep.base.metrics import line_plot\nline_plot([0.0, 1.0], {'error': [0.0, 2.0]}, 't [s]', 'e [µm]')"
+    )
+    with run_kernel(kernel_name="python3") as client:
+        client.execute_interactive(cell, timeout=120, output_hook=lambda message: shown.append(message["content"]))
+    (data,) = (one["data"] for one in shown if "data" in one)
+    assert base64.b64decode(data["image/png"]).startswith(b"\x89PNG")
