@@ -66,7 +66,7 @@ EXAMPLES = {
 
 
 class _Commands(TyperGroup):
-    """Commands, and those of plug-ins: functions that are installed as entry points ``hybridsep.commands``.
+    """Commands, ours and plug-ins': functions that are installed as entry points ``hybridsep.commands``.
 
     A refusal of an option's value names the value.
     """

@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, and where those of this installation are.
+"""Files: written whole or not at all, and where this installation's are.
 
 A file is written beside its target, flushed to the disk, and moved over it: the target is unchanged until the last byte
 is on the disk, so that a full disk, an exception, Ctrl-C or the end of the process loses the new file only. A killed

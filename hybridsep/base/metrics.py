@@ -102,7 +102,7 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late
     """Return the hold baseline: ``x_pb`` plus the last residual measured before each window; ``x_pb`` in the warm-up.
 
     It follows from what was published and measured, ``(n,)`` each, m, NaN where missing, no model or guard has a part
-    in it. The warm-up is over where samples are ``active``; measurements were ``late`` by so many samples.
+    in it. The warm-up is over where samples are ``active``; measurements were ``late`` samples late.
     """
     samples = np.arange(len(x_meas))
     measured = np.maximum.accumulate(np.where(np.isnan(x_meas), -1, samples))

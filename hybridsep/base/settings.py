@@ -353,7 +353,7 @@ class CompensatorSettings(Settings):
         if spacing is None:
             most = max(1, round((preview or look_ahead) / 100))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
-        if preview is None:  # enough behind a window that is longer than a tenth of it, too
+        if preview is None:  # enough after a window that is longer than a tenth of it, too
             preview = max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END)
             preview = min(preview, int(self.parameters()["preview"].maximum))
         problems = []

@@ -42,7 +42,7 @@ class Compensator(Protocol):
 
 
 class LibraryController:
-    """A predictor or compensator behind its look-ahead, with the FMU's timing.
+    """A predictor or compensator after its look-ahead, with the FMU's timing.
 
     ``t_init``: Warm-up, s; its own if left out.
     """

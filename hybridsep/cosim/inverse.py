@@ -1,4 +1,4 @@
-"""Rival in compensation, on the columns ``x_d`` and ``x`` of a log alone: a finite impulse response, inverted.
+"""Rival in compensation, on nothing but the columns ``x_d`` and ``x`` of a log: a finite impulse response, inverted.
 
 What the command was ahead of the motion, ``x_d − x``, is fitted by least squares to the velocities around it and to
 their signs, which are friction's; the command of a wanted motion then follows. Nothing of the rest of the package is in
@@ -13,7 +13,7 @@ import numpy as np
 from ..base.signals import Array, Indices
 
 _AHEAD, _PAST, _FAR, _SIGNS = 21, 10, 10, 5
-"""Taps from half a look-ahead ago to a whole one ahead; further back, geometrically, to so many look-aheads, as the
+"""Taps from half a look-ahead ago to a whole one ahead; further back, geometrically, to this many look-aheads, as the
 integrator of a drive remembers; and taps of the velocity's sign."""
 
 _RIDGE = 1e-6  # penalty of a tap, relative to the mean square of its column: neighbouring taps are nearly alike

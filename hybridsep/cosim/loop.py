@@ -3,7 +3,7 @@
 The Jacobi wiring: at ``t_k`` the drive gets the command that the controller gives it, the controller gets ``x_meas``
 and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, so ``r`` is held at its end for as many
 samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
-measured arrives so many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
+measured arrives that many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
 steps before the controller, as under a sequential (Gauss-Seidel) master.
 """
 

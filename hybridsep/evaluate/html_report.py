@@ -51,7 +51,7 @@ _SCRIPT = """\
 
 
 def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
-    """Return the indices at which lines are drawn: the extremes in each of so many columns of pixels.
+    """Return the indices at which lines are drawn: the extremes in each column of pixels.
 
     ``columns``: columns of pixels that the lines take; ``*rows``: (n,): lines over one abscissa; unknown where NaN. A
     column without any known sample stays a gap. Returns (m,): ascending, the first and the last among them; all where

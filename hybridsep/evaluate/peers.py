@@ -1,4 +1,4 @@
-"""Peers that a hybrid model is judged by, on the columns ``x_d`` and ``x`` of its log alone: lag + hold, ARX, N4SID.
+"""Peers that a hybrid model is judged by, on only the columns ``x_d`` and ``x`` of its log: lag + hold, ARX, N4SID.
 
 None of them shares code with what it judges. Each window is predicted from what was measured before it.
 """

@@ -75,7 +75,7 @@ def identified(records: Sequence[tuple[Array, Array]], Np: int) -> StateSpace | 
 
 
 def _of_orders(R: Array, n_rows: int) -> list[StateSpace]:
-    """Return the models; the rows of ``R``, ``[y(k) … y(k−40), u(k) … u(k−40), 1]``, stand for those of all samples."""
+    """Return the models; the rows of ``R``, ``[y(k) … y(k−40), u(k) … u(k−40), 1]``, stand for all samples' rows."""
     y, u = R[:, : _LAGS + 1], R[:, _LAGS + 1 : -1]
     now, past = np.column_stack((u[:, 0], R[:, -1])), np.hstack((y[:, 1:], u[:, 1:]))
     regressors = np.hstack((past, now))

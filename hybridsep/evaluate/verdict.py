@@ -141,7 +141,7 @@ def _causes(ratios: Sequence[float], change: float, largest: float, moving: floa
     """Return what explains a hybrid that is worse than some of :data:`_PEERS`.
 
     ``change`` is the largest of the prediction and ``largest`` the largest residual, m, ``moving`` the share of samples
-    in motion, ``later`` the sums of squares behind the beginning of a long run.
+    in motion, ``later`` the sums of squares after the beginning of a long run.
     """
     if change > _UNSTABLE * largest > 0.0:
         return [

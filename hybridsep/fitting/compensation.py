@@ -97,7 +97,7 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
 class LimitCosts:
     """What the drive's limits cost a compensator."""
 
-    # name of a limit, such as ``a_max`` → factor → :class:`ErrorSize` with this limit alone times the factor
+    # name of a limit, such as ``a_max`` → factor → :class:`ErrorSize` with only this limit times the factor
     effects: Mapping[str, Mapping[float, ErrorSize]]
     advised: Mapping[str, float]  # name → value of the limits that are advised in their place, SI; empty where none is
     advised_error: ErrorSize  # with these

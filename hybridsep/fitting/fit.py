@@ -286,7 +286,7 @@ def fit(
     T_s, unit, columns, axis
         Of arrays and of a table, as of :func:`~hybridsep.logs.log.read_log`: sampling interval, s, unit of the
         positions, m if left out, names, and one of several axes. What is returned has positions in m, of a rotary axis
-        in rad; its ``predict`` alone takes and gives the unit.
+        in rad; only its ``predict`` takes and gives the unit.
     Np : int, optional
         Samples in a window of the predictor, its look-ahead; 0.1 s of them if left out.
     p : sequence of int

@@ -1,7 +1,7 @@
 """Plant that a fit leaves to try with: modes, friction and stiffness, fitted together to the log (output error).
 
 ``x = G (x_d − d)`` with ``d = f·tanh(v_d/v_friction) + κ·x·|x|``, from the identified model on. It is kept where it is
-better on the last third of the training samples, else the identified model alone is the plant. It is no measurement:
+better on the last third of the training samples, else the identified model is the plant. It is no measurement:
 the compensator has features for just these disturbances, so results on this plant are optimistic.
 """
 

@@ -120,7 +120,7 @@ class Replay:
     def least(self) -> float:
         """Least RMS error, m, that the measurement's resolution shows: of one step of it in 10⁴ samples.
 
-        Rounding alone has more where the axis moves; but where it rests, command and measurement are rounded alike.
+        Rounding itself has more where the axis moves; but where it rests, command and measurement are rounded alike.
         """
         return 0.01 * min((resolution(one.x[~np.isnan(one.x)]) for one in self.recordings), default=0.0)
 

@@ -62,7 +62,7 @@ def build_fmu(
         File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
     fmi : {"2", "3"}
-        Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
+        Version of FMI, 2.0 or 3.0; the Python flavour has only 2.0.
     windows : bool
         Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
     embed_weights : bool

@@ -231,7 +231,7 @@ def c_sources(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
 
 
 def all_c(files: Sequence[str]) -> str:
-    """Return the C file that includes all others, in which the FMI functions alone have external linkage."""
+    """Return the C file that includes all others, in which only the FMI functions have external linkage."""
     includes = "".join(f'#include "{file}"\n' for file in files)
     return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI headers. */
 #define HSEP_API static inline /* see hsep_api.h */

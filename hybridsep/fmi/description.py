@@ -29,7 +29,7 @@ _OWN_STEPS = ("FeedDrive",)  # models whose internal steps divide the communicat
 def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int | None]]:
     """Return the variables by their value references, each with the length of its array, None if it is scalar.
 
-    Of FMI 2.0 those of the table. Of FMI 3.0, with its types: single ones, then the modes, then windows, then the time;
+    Of FMI 2.0 the table's. Of FMI 3.0, with its types: single ones, then the modes, then windows, then the time;
     where there are windows, Np sizes them.
     """
     if fmi == "2":

@@ -137,7 +137,7 @@ def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredi
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
     It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
-    (:func:`_learned_settings`), those of its predictor or compensator as ``kind`` says. Its window may be another one:
+    (:func:`_learned_settings`), its predictor's or compensator's as ``kind`` says. Its window may be another one:
     weights that a predictor learned serve a compensator.
 
     StateError if the file is not a saved predictor, one of another machine, naming all that differs, or has learned

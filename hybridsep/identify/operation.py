@@ -48,7 +48,7 @@ def identify_operation(
     """Identify the physics model from recordings of one axis in operation.
 
     The error of the simulated position is least over poles, zeros, gain, whole samples of dead time and the hold, for
-    structures from a gain alone to three modes; offset and state at the start of each recording are estimated beside
+    structures from a mere gain to three modes; offset and state at the start of each recording are estimated beside
     them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before; the chosen
     one is then fitted to everything.
 

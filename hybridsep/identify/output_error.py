@@ -1,7 +1,7 @@
 """Output-error fit of one structure: least squares of measured minus simulated position.
 
 The linear parameters, a constant offset and the state at the start of each segment are eliminated by variable
-projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search is over poles alone.
+projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search is only over poles.
 """
 
 from collections.abc import Iterable, Sequence

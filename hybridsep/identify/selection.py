@@ -141,7 +141,7 @@ def compare_structures(
 
 
 def held_out(segment: Segment) -> Indices:
-    """Return the samples of a split segment that judge: behind the fitted ones, settled, and measured."""
+    """Return the samples of a split segment that judge: after the fitted ones, settled, and measured."""
     first = max(segment.stop, len(segment.u) // SETTLING)
     return first + np.flatnonzero(segment.known[first:])
 

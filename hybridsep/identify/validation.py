@@ -25,7 +25,7 @@ _FLOOR = 1e-8
 _AVERAGES = 6.0  # segments that must share the power at a frequency: coherence is 1 where one of them has it all
 
 _HALF = 0.25
-"""Half of the 95 % interval, relative, up to which a response is known. Chance alone is so at one frequency in 5e4 with
+"""Half of the 95 % interval, relative, up to which a response is known. Chance is so at one frequency in 5e4 with
 the fewest averages, and less often with more."""
 
 

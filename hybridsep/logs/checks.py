@@ -41,7 +41,7 @@ _GAINS, _KNOWN = (0.1, 5.0), 0.03
 ratio of two units within which it is meant."""
 
 _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
-"""Largest travel, m, and acceleration, m/s² over so many samples, of a linear axis that states no unit."""
+"""Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25
 """Velocity between the first samples, relative to the largest, from which a start is in motion; EMPS has 0.12."""
@@ -205,8 +205,8 @@ def following(u: Array, x: Array) -> _Following:
         return _Following(1.0, 0.0, 0.0, 0.0, 0)
     A, y = A / scale, y / total
     squares, products = (A * A).sum(axis=0), A.T @ y
-    alone = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
-    one = int(np.argmax(alone))
+    singly = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
+    one = int(np.argmax(singly))
     basis, R = np.linalg.qr(A)
     h, _ = nnls(R, basis.T @ y, maxiter=len(lags) ** 2)
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))

@@ -235,7 +235,7 @@ def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[st
 def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
     """Return the columns without rows that repeat the one before, time included, and how many these are, in words.
 
-    Where others repeat a time alone, or many rows do, times are rounded, and all rows stay.
+    Where others repeat only a time, or many rows do, times are rounded, and all rows stay.
     """
     n = len(read["x_d"])
     same = {role: (one[1:] == one[:-1]) | (np.isnan(one[1:]) & np.isnan(one[:-1])) for role, one in read.items()}

@@ -27,7 +27,7 @@ _RESOLVED = 0.2  # largest resolution of times of single precision, in intervals
 
 _GAP, _LATE, _AROUND = 1.5, 0.6, 9
 """Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how
-much later or earlier the times must stay then, and over how many samples: jitter alone does not last."""
+much later or earlier the times must stay then, and over how many samples: jitter does not last."""
 
 _TOLERANCE = 0.01
 """Largest relative difference between a given interval and that of the times: more than any clock's drift."""
@@ -214,7 +214,7 @@ def _mean_interval(t: Array) -> tuple[float, float]:
             interval = float(steps[inner].sum() / inner.sum())
     n_pieces = len(steps) - int(inner.sum()) + 1
     deviation = float(np.std(steps[inner] / interval)) if inner.any() else 0.0
-    return interval, deviation * math.sqrt(n_pieces) / max(int(inner.sum()), 1)  # the ends of the pieces alone count
+    return interval, deviation * math.sqrt(n_pieces) / max(int(inner.sum()), 1)  # only the ends of the pieces count
 
 
 def _rounded(mean: float, tolerance: float) -> float:

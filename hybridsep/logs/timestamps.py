@@ -22,7 +22,7 @@ _STAMP = re.compile(
     [\s'"]*""",
     re.VERBOSE,
 )
-"""A time of day, with a date before it and a zone behind it or without."""
+"""A time of day, with a date before it and a zone after it or without."""
 
 
 def stamp_kind(text: str) -> str:

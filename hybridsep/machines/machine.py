@@ -101,7 +101,7 @@ class Machine(Section):
     def _check_compensator(self) -> None:
         """Raise ParameterError if the compensator's predictor is out of range, or cannot plan by its own entries.
 
-        A delay of the predictor's is refused where a compensator is made: the file may be for a predictor alone.
+        A delay of the predictor's is refused where a compensator is made: the file may be only for a predictor.
         """
         problems = []
         try:

@@ -162,7 +162,7 @@ class ModalModel:
         Parameters
         ----------
         T_s, input_hold
-            As those of :meth:`discretise`.
+            As of :meth:`discretise`.
         """
         discrete = self.discretise(T_s, input_hold)
         step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))

@@ -59,7 +59,7 @@ class PlanarPath:
 
 @dataclass(frozen=True)
 class _Move:
-    """A line, an arc about ``centre`` by ``sweep``, rad, or a rest of so many seconds; ``feed`` is in m/s."""
+    """A line, an arc about ``centre`` by ``sweep``, rad, or a rest, s; ``feed`` is in m/s."""
 
     begin: complex
     end: complex
