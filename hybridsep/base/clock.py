@@ -33,10 +33,7 @@ class SampleClock(NamedTuple):
 
     @classmethod
     def begin(cls, start: float, T_s: float) -> "SampleClock":
-        """Return the clock at ``start``, s.
-
-        FmuError if ``start`` is not finite, or so large that doubles near it do not resolve a quarter of ``T_s``.
-        """
+        """Return the clock at ``start``, s; FmuError if it cannot resolve a quarter of ``T_s``, or is infinite."""
         if not math.isfinite(start):
             raise FmuError(f"the start time must be finite, got {start} s")
         if not _resolution(start) <= 0.25 * T_s:
@@ -77,10 +74,7 @@ class SampleClock(NamedTuple):
 
     @classmethod
     def from_state(cls, state: Sequence[float]) -> "SampleClock":
-        """Return the clock of a :meth:`state`.
-
-        StateError if a field is out of range.
-        """
+        """Return the clock of a :meth:`state`; StateError if a field is out of range."""
         T_s, k, since, carry, end = map(float, state)
         fits = all(map(math.isfinite, (T_s, end))) and T_s > 0 and 0 <= since <= T_s
         if not (fits and 0 <= k < 2**53 and k == int(k) and abs(carry) <= since):

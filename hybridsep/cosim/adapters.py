@@ -35,10 +35,7 @@ class Compensator(Protocol):
         """Begin a run at rest at ``start``, m."""
 
     def step(self, x_d_ahead: float, x_meas: float) -> float:
-        """Process one sample: the command for ``delay`` samples later and the position measured now, m.
-
-        Return the command of the next sample, m.
-        """
+        """Process the command ``delay`` samples ahead and the position now, m; return the next sample's command, m."""
 
 
 class LibraryController:
@@ -172,10 +169,7 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
 
 
 class FmuController(_OpenedFmu):
-    """A predictor or compensator FMU.
-
-    FmuError if the archive is no FMU, or neither of the two.
-    """
+    """A predictor or compensator FMU; FmuError if the archive is no FMU, or neither of the two."""
 
     def __init__(self, path: str | Path, values: Mapping[str, Any], start_time: float) -> None:
         from .fmu import read_description  # fmpy is loaded where an FMU is
@@ -209,10 +203,7 @@ class FmuController(_OpenedFmu):
 
 
 class FmuDrive(_OpenedFmu):
-    """A plant FMU.
-
-    FmuError if the archive is no FMU, or no plant.
-    """
+    """A plant FMU; FmuError if the archive is no FMU, or no plant."""
 
     T_s: float | None = None
 

@@ -53,10 +53,7 @@ class Contour:
 
 
 def contours_of(x: Mapping[str, Run], y: Mapping[str, Run], path: PlanarPath | None = None) -> dict[str, Contour]:
-    """Return the contour errors of the true positions, of the runs of X and Y with the same key.
-
-    The path is the runs' commands if left out.
-    """
+    """Return the contour errors of runs of X and Y with the same key; their commands are the path if left out."""
     return {
         key: Contour.of(path or PlanarPath.of(one.x_d + 1j * y[key].x_d), one.x + 1j * y[key].x, one.T_s)
         for key, one in x.items()

@@ -227,10 +227,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def begin(
         self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
     ) -> None:
-        """Set structural parameters, enter Initialization Mode, set other parameters and start values.
-
-        For errors see :meth:`initialise`.
-        """
+        """Set structural parameters, enter Initialization Mode, set the others; errors as :meth:`initialise`."""
         slave, experiment = self.slave, {"startTime": start_time, "stopTime": stop_time}
         given = dict(values or {})
         structural = [name for name in given if self._variable(name).causality == "structuralParameter"]

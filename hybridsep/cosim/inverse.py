@@ -32,10 +32,7 @@ class FirInverse:
 
     @classmethod
     def fitted(cls, recordings: Sequence[tuple[Array, Array]], Np: int) -> "FirInverse | None":
-        """Return the rival that fits commands and measured positions ``(n,)``, m, NaN where missing; None if none does.
-
-        ``Np`` is the look-ahead, samples.
-        """
+        """Return the rival of look-ahead ``Np`` for commands and positions ``(n,)``, m, NaN if missing, or None."""
         given = [(x_d, _smooth(x), ~np.isnan(x)) for x_d, x in recordings if np.isfinite(x).sum() > _FAR]
         slow = _SLOW * max((float(np.abs(np.diff(x_d)).max()) for x_d, *_ in given), default=0.0)
         if not slow > 0.0:

@@ -61,10 +61,7 @@ _BLOCK = 4096  # rows that are factorised at once
 
 
 class MinimumNorm:
-    """Minimum-norm least squares of rows that arrive in blocks; what is kept, a triangular factor, does not grow.
-
-    ``n_columns``: regressors.
-    """
+    """Minimum-norm least squares of ``n_columns`` regressors, of rows in blocks; a triangular factor is kept."""
 
     def __init__(self, n_columns: int) -> None:
         self._n_columns = n_columns

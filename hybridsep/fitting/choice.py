@@ -42,10 +42,7 @@ def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
 def settings_to_try(
     settings: PredictorSettings, p: Sequence[int] = (), most: int = int(PARAMETERS["p"].maximum)
 ) -> list[PredictorSettings]:
-    """Return the settings themselves and others with the same window.
-
-    They have numbers of lags ``p`` if some are given, others of at most ``most``.
-    """
+    """Return the settings and others with the same window, with lags ``p`` if some are given, else at most ``most``."""
     Np = settings.Np
     lags = dict.fromkeys([settings.p, *(p or (min(max(1, round(share * Np)), most) for share in _SHARES))])
     found = [replace(settings, p=p) for p in lags]

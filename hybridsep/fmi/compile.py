@@ -89,10 +89,7 @@ class Compiler:
 
 
 def host_target() -> str:
-    """Return the name of this machine's platform, a key of :data:`TARGETS`.
-
-    FmuError if it is another one.
-    """
+    """Return the name of this machine's platform, a key of :data:`TARGETS`; FmuError if it is another one."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     name = f"{machine}-{platform.system().lower()}"
     if name not in TARGETS:
@@ -101,10 +98,7 @@ def host_target() -> str:
 
 
 def expanded(targets: Sequence[str]) -> tuple[str, ...]:
-    """Return the platforms, keys of :data:`TARGETS`, that some of :data:`TARGET_NAMES` mean.
-
-    FmuError if a name is unknown.
-    """
+    """Return the platforms, keys of :data:`TARGETS`, of some of :data:`TARGET_NAMES`; FmuError if a name is unknown."""
     if unknown := sorted(set(targets) - set(TARGET_NAMES)):
         raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
     several = {**_FMI2_PLATFORMS, "all": ALL_TARGETS}
@@ -131,10 +125,7 @@ def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]
 
 
 def compiler_for(target: str) -> Compiler:
-    """Return the compiler for a key of :data:`TARGETS`: ``ziglang``, or for the host ``$CC``, cc, gcc or clang.
-
-    FmuError if there is none.
-    """
+    """Return a platform's compiler: ``ziglang``, or for the host ``$CC``, cc, gcc or clang; FmuError without one."""
     if find_spec("ziglang") is not None:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
         return Compiler(zig, f"ziglang {version('ziglang')}")
@@ -239,10 +230,7 @@ def kept(library: Library) -> Path | None:
 
 
 def check_available(targets: Sequence[str]) -> None:
-    """Check, before any work, that the libraries for some platforms are there or can be compiled.
-
-    FmuError if not, or a target is unknown.
-    """
+    """Check that the libraries for some targets are there or can be compiled; FmuError if not, or one is unknown."""
     for target in expanded(targets):
         if not _all_kept(target):
             compiler_for(target)

@@ -88,10 +88,7 @@ _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "com
 
 
 def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> str:
-    """Return the header's text, with what an earlier run has learned.
-
-    FmuError if a compensator is asked for a machine without limits of its drive.
-    """
+    """Return the header's text, with what was learned; FmuError if a compensator has no limits of its drive."""
     compensates = model == "SepCompensator"
     if compensates:
         _check_limits(machine, "--predictor writes the header of a predictor")

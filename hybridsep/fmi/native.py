@@ -29,10 +29,7 @@ _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
 
 def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
-    """Return all files of one FMU: archive name → content; arguments as of :func:`hybridsep.fmi.archive.build_fmu`.
-
-    FmuError if it cannot be compiled.
-    """
+    """Return an FMU's files, name → content; arguments as of ``build_fmu``; FmuError if it cannot be compiled."""
     table, fmi = spec.table, spec.fmi
     model, name = table.model, table.name
     content = {f"sources/{file}": text for file, text in c_sources((fmi,)).items()}

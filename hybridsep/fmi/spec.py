@@ -161,10 +161,7 @@ _TITLES = {
 
 
 def _title(machine: Machine, model: str) -> str:
-    """Return the title, with the paper's settings of a predictor that it has figures for.
-
-    ReferenceTrajectory's is the same for every machine.
-    """
+    """Return the title, with a predictor's settings of the paper; ReferenceTrajectory's is every machine's."""
     if model == "ReferenceTrajectory":
         return _TITLES[model]
     title = f"{machine.title}: {_TITLES[model]}"
@@ -175,10 +172,7 @@ def _title(machine: Machine, model: str) -> str:
 
 
 def generation_time() -> str:
-    """Return ``generationDateAndTime``: the day of this version, or ``$SOURCE_DATE_EPOCH``, never the clock's.
-
-    FmuError if the variable is no number of seconds.
-    """
+    """Return ``generationDateAndTime``: of this version, or ``$SOURCE_DATE_EPOCH``; FmuError if that is no number."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return f"{VERSION_DATE}T00:00:00Z"

@@ -145,10 +145,7 @@ def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
 
 
 def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
-    """Return the modes that the variables ``mode[i].*`` describe.
-
-    ParameterError if one is out of its range, naming it with its place.
-    """
+    """Return the modes of the variables ``mode[i].*``; ParameterError, with its place, if one is out of its range."""
     n = sum(name.endswith(".f_n") for name in values)
     return [
         {

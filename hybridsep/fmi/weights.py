@@ -122,10 +122,7 @@ def _differences(name: str, then: float, now: float) -> list[str]:
 
 
 def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPredictor:
-    """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
-
-    StateError as :func:`load_trained`.
-    """
+    """Return a machine's predictor, with what a saved one has learned, if given; StateError as :func:`load_trained`."""
     if weights is None:
         return machine.new_predictor()
     predictor = load_trained(weights, machine, "HybridPredictor")

@@ -24,10 +24,7 @@ _UNIT = "halscope states no unit: positions are in the machine's, which unit='mm
 
 
 class HalscopeSource(TextSource):
-    """The channels of halscope: the period in a comment, names, then numbers between semicolons.
-
-    Joints are found by the names of their pins.
-    """
+    """Channels of halscope: the period in a comment, names, then numbers between semicolons; joints by their pins."""
 
     format = "LinuxCNC halscope"
     endings: ClassVar[tuple[str, ...]] = (".csv", ".log")

@@ -260,10 +260,7 @@ def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, 
 
 
 def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
-    """Raise LogError if a column that is read occurs several times, with values that differ.
-
-    Scopes write the time again beside each channel.
-    """
+    """Raise LogError if a column occurs several times with values that differ, as times beside channels may."""
     for role, column in columns.items():
         twins: Sequence[str] = source.twins.get(column.name, ())
         if not twins:

@@ -200,10 +200,7 @@ def _starts(t: Array, T_s: float) -> Indices:
 
 
 def _mean_interval(t: Array) -> tuple[float, float]:
-    """Return the mean interval, segments apart, and its relative standard error if times scatter independently.
-
-    Without gaps it is ``(t_end − t_0)/(n − 1)``.
-    """
+    """Return the mean interval, segments apart, and its relative standard error if times scatter independently."""
     steps = np.diff(t)
     interval = float(np.median(steps[steps > 0.0]))
     inner = np.ones(len(steps), dtype=np.bool_)

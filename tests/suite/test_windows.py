@@ -85,10 +85,7 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker) -> No
 
 @cache
 def directly_solved(n: int) -> Array:
-    """Return the prediction of the staircase by the oracle.
-
-    It shares no code with the library and solves each batch from all its rows.
-    """
+    """Return the prediction of the staircase by the oracle, which solves each batch from all its rows."""
     loop = closed_loop(PREDICTOR, n, {})
     numerator, denominator = np.array([C / M, K / M]), np.array([1.0, C / M, K / M])
     settings: dict[str, Any] = {"T_s": TS, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}

@@ -68,10 +68,7 @@ def built_once(path: Path, build: Callable[[Path], object]) -> Path:
 
 
 class BuiltFmus:
-    """The FMUs of all machines in both flavours, for this machine.
-
-    ``folder``: shared by all workers of a session.
-    """
+    """The FMUs of all machines in both flavours, for this machine; ``folder``: shared by a session's workers."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -137,10 +137,7 @@ class Context(ctypes.Structure):
 
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """Return the shared library of one of :data:`TABLES`, built when first asked for.
-
-    All processes of a test session share it.
-    """
+    """Return the shared library of one of :data:`TABLES`, built when first asked for, once a session."""
     folder = build_folder() / name
     write_header(name, folder)
     key = hashlib.sha256((folder / "hsep_fmu.h").read_bytes()).hexdigest()[:16]

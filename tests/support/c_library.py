@@ -143,10 +143,7 @@ def interface() -> ctypes.CDLL:
 
 
 class Library:
-    """A predictor or a compensator of the C library.
-
-    ``kind``: {"predictor", "compensator"}; ``settings``: those that differ from the defaults.
-    """
+    """A ``kind`` of the C library, "predictor" or "compensator"; ``settings``: those that differ from the defaults."""
 
     def __init__(self, kind: str, settings: Mapping[str, float], modes: Sequence[Mapping[str, float]]) -> None:
         self.kind, self.core = kind, interface()

@@ -53,10 +53,7 @@ class Results:
             parquet.write_table(pyarrow.Table.from_pylist(whole, schema=_SCHEMA), file)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return all rows, the oldest first.
-
-        StateError if a file is damaged.
-        """
+        """Return all rows, the oldest first; StateError if a file is damaged."""
         found: list[dict[str, Any]] = []
         for path in sorted(self._rows.glob(f"*{_ENDING}")):
             try:

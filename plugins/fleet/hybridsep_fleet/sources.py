@@ -49,10 +49,7 @@ def find_logs(sources: Iterable[str]) -> list[LogFile]:
 
 @contextmanager
 def local_copy(url: str) -> Iterator[Path]:
-    """Yield a path with the content of a log: its own, or a copy that is removed afterwards.
-
-    LogError if the store does not give it.
-    """
+    """Yield a path with a log's content, its own or a temporary copy's; LogError if the store does not give it."""
     if "://" not in url:
         yield Path(url)
         return

@@ -43,10 +43,7 @@ class _Judged:
 
 
 def look(task: tuple[LogFile, FleetSettings]) -> Looked:
-    """Return the hash of a log's content, and its axes.
-
-    LogError if it cannot be read.
-    """
+    """Return the hash of a log's content, and its axes; LogError if it cannot be read."""
     log, settings = task
     with local_copy(log.url) as path:
         content = hashlib.sha256()
@@ -59,10 +56,7 @@ def look(task: tuple[LogFile, FleetSettings]) -> Looked:
 
 
 def work(task: AxisTask) -> dict[str, Any]:
-    """Fit or replay an axis; return its row.
-
-    HybridSepError if the log, or the axis, cannot be used.
-    """
+    """Fit or replay an axis; return its row; HybridSepError if the log, or the axis, cannot be used."""
     begin = time.perf_counter()
     with one_blas_thread, local_copy(task.looked.log.url) as path:
         found = _replayed(task, path) if task.settings.machines else _fitted(task, path)

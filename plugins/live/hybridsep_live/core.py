@@ -24,10 +24,7 @@ _SHORTEST, _WIDTH, _BINS = 1e-7, math.log(1.02), 1000
 
 
 class StepTimes:
-    """Quantiles of step times in constant memory: a histogram whose bins are 2 % wide.
-
-    ``n``: number of times; ``longest``: the longest one, s.
-    """
+    """Quantiles of ``n`` step times, the longest ``longest``, s, in constant memory: bins that are 2 % wide."""
 
     def __init__(self) -> None:
         self.n, self.longest = 0, 0.0

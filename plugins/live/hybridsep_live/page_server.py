@@ -193,10 +193,7 @@ class _Tornado(BokehTornado):
 
 
 class PageServer:
-    """Server of a page.
-
-    ``fill``: fills the document of a session; ``port``: 0 for a free one. OSError if the port is taken.
-    """
+    """Server of a page that ``fill`` fills for each session, on ``port``, 0 for a free one; OSError if it is taken."""
 
     def __init__(self, fill: Callable[[Document], None], port: int, token: str) -> None:
         _log_without(token)

@@ -143,10 +143,7 @@ class MessageReader:
 
 
 class RowReader:
-    """Reader of CSV lines, the first of which are the names.
-
-    ``where``: the source, for messages.
-    """
+    """Reader of CSV lines, the first of which are the names; ``where``: the source, for messages."""
 
     def __init__(self, where: str, reading: Reading) -> None:
         self._where, self._reading = where, reading

@@ -70,10 +70,7 @@ class LiveSource(ABC):
 
 
 class RecordedSource(LiveSource):
-    """Samples of a log, at true or scaled speed.
-
-    ``speed``: times the recorded one; 0: as fast as they are taken. ParameterError if ``speed`` is negative.
-    """
+    """Samples of a log at ``speed`` times its own, 0: as fast as they are taken; ParameterError if that is negative."""
 
     def __init__(self, log: Log, speed: float = 1.0) -> None:
         if not 0.0 <= speed <= 1e6:

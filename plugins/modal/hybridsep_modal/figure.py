@@ -13,10 +13,7 @@ _MEASURED, _FITTED = {"color": "#7f7f7f", "linewidth": 4.0, "alpha": 0.6}, {"col
 
 
 def response_figure(found: IdentifiedResponse, title: str, path: Path) -> None:
-    """Draw magnitude, phase and error to a PNG; where no phase was measured, none, and the magnitude's error.
-
-    ``title``: heading.
-    """
+    """Draw magnitude, phase, if one was measured, and error to a PNG under this title."""
     ratios = [1.6, 1.2, 1.0] if found.phase_measured else [1.6, 1.0]
     figure = Figure(figsize=(9.0, 2.0 + 1.6 * sum(ratios)), layout="constrained")
     panels = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)

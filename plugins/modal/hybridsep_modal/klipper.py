@@ -46,10 +46,7 @@ def is_klipper(path: str | Path) -> bool:
 
 
 def read_klipper(path: str | Path) -> Acceleration:
-    """Return the accelerations of a file.
-
-    LogError if it is not one of Klipper's, or damaged.
-    """
+    """Return the accelerations of a file; LogError if it is not one of Klipper's, or damaged."""
     if not is_klipper(path):
         raise LogError(f"{path}: is no accelerometer file of Klipper, which begins with #{HEADER}")
     rows = []

@@ -140,10 +140,7 @@ class _Offsets:
         self.at_rest = self.step(rest, rest)
 
     def step(self, x: Array, dx: Array) -> Array:
-        """Return minus the offset over the next step.
-
-        ``x``: (m,), m: positions; ``dx``: (m,), m: displacements over the last step.
-        """
+        """Return minus the offset over the next step, of positions and last displacements, ``(m,)``, m."""
         # Stribeck: the bristle's limit falls from static to sliding friction.
         speed = dx * self.per_stribeck
         limit = self.v["presliding"] * (1 + self.excess / (1 + speed * speed))

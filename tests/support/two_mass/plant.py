@@ -60,10 +60,7 @@ def _library() -> ctypes.CDLL:
 
 
 class TwoMassDrive:
-    """A drive, at rest at ``start`` at first.
-
-    ``start``: m; ``step``: s: longest internal step.
-    """
+    """A drive at rest at ``start``, m, at first; ``step``: longest internal step, s."""
 
     def __init__(self, axis: Axis, start: float = 0.0, step: float = INTERNAL_STEP) -> None:
         self._library, self._start = _library(), start
