@@ -65,7 +65,7 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], Points, Array]:
     """Return where a polyline is nearest to each point, among segments ``around + first … around + end − 1``.
 
-    Returns ``segments``, ``nearest``, ``distance``: (n,): the segment, the point on it, and the distance, positive on
+    Returns ``segments``, ``nearest``, ``distance``, (n,): the segment, the point on it, and the distance, positive on
     the left.
     """
     along = np.diff(path, append=path[-1:])

@@ -89,7 +89,7 @@ class ArxRun:
     ``y(k) = Σ a_i y(k−i) + Σ b_j [x_d(k−j) − x_d(k−j−1)] + c`` with ``y = x − x_d``, ``i = 1 … n``, ``j = 0 … n``:
     free runs of minimum-norm least squares, what is missing before them bridged by free runs as well.
 
-    ``x_d``, ``x``: (n_samples,), m: commanded and measured positions, the latter NaN where missing; ``n``: lags;
+    ``x_d``, ``x``, (n_samples,), m: commanded and measured positions, the latter NaN where missing; ``n``: lags;
     ``delay``: samples by which the measurements are late: ``x(k)`` is the position at ``k − delay``.
     """
 
@@ -124,7 +124,7 @@ class ArxRun:
 
         It is one free run from the last sample that is measured then.
 
-        ``w``: (2 n + 2,): coefficients; ``begin``, ``end``: samples; ``begin`` never falls from call to call.
+        ``w``, (2 n + 2,): coefficients; ``begin``, ``end``: samples; ``begin`` never falls from call to call.
         """
         known = max(begin - self._delay, 0)
         self._bridge(w, known)

@@ -87,7 +87,7 @@ def judge(
 ) -> Verdict:
     """Return the verdict on predictions of whole windows, of which the last may be shorter.
 
-    ``x_d``, ``x``: (n,), m: commanded and measured positions, NaN where missing; ``predictions``: (3 or more, n), m:
+    ``x_d``, ``x``, (n,), m: commanded and measured positions, NaN where missing; ``predictions``, (3 or more, n), m:
     ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``; ``place``: (n,) of int: number of each sample in
     its window of ``Np``; ``further``: names of peers besides :data:`_PEERS`; ``least``: least RMS error, m, that the
     measurement's resolution shows: no ratio to a smaller one is formed; ``n_rejected``, ``n_missing``: measurements

@@ -86,8 +86,8 @@ class _Disturbed(NamedTuple):
 class _Piece:
     """Piece of a recording, relative to its first command.
 
-    ``u``, ``x``, ``v_d``: (n,): commands and measured positions, m; commanded velocity, m/s; ``path``: (n,), m:
-    position by the identified model, which the stiffness acts at; ``fitted``, ``choosing``, ``judging``: (n,):
+    ``u``, ``x``, ``v_d``, (n,): commands and measured positions, m; commanded velocity, m/s; ``path``, (n,), m:
+    position by the identified model, which the stiffness acts at; ``fitted``, ``choosing``, ``judging``, (n,):
     samples for fitting, for choosing, and for the test.
     """
 

@@ -168,7 +168,7 @@ def build_system(
 ) -> Path:
     """Write a system of three native FMUs as an SSP archive.
 
-    ``machine``: with a plant; ``path``: the archive; ``command``: (n,), m: commanded positions at the machine's
+    ``machine``: with a plant; ``path``: the archive; ``command``, (n,), m: commanded positions at the machine's
     ``T_s``, which the system's ReferenceTrajectory plays; all FMUs start at the first of them; ``compensate``:
     {"off", "physics", "hybrid"}: best model with which a SepCompensator modifies the command; if left out a
     HybridPredictor only predicts; ``targets``, ``weights``: as in :func:`hybridsep.fmi.archive.build_fmu`, for the

@@ -53,7 +53,7 @@ def frequency_response(
     is the model's plus that of its error: a window smears what it is long enough for, and of the model nothing then.
 
     ``recordings``: iterable of three (n,), m: commanded and measured positions without a gap, of the same instants,
-    and the measured ones minus the model's; a segment with NaN is left out; ``T_s``: s.
+    and the measured ones minus the model's; a segment with NaN is left out; ``T_s``, s.
     """
     pieces = [np.diff(signals, 2) for signals in recordings]
     for n in _LENGTHS:

@@ -11,8 +11,6 @@ it. A compensator plans from the beginning, so that it can act ahead of a move w
 what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -59,13 +57,13 @@ class PublishedWindow:
     state_before: int = 0
 
     @classmethod
-    def at_rest(cls, start: float, Np: int) -> PublishedWindow:
+    def at_rest(cls, start: float, Np: int) -> "PublishedWindow":
         """Return the window of a drive at rest at ``start``, m, without a prediction."""
         rest = np.full(Np, start)
         return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
 
     @classmethod
-    def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
+    def of_prediction(cls, x_d: Array, prediction: Prediction) -> "PublishedWindow":
         """Return the window of unmodified commands; SignalError if its prediction diverges."""
         return cls(x_d, x_d, prediction.x_pb, prediction.x_h, prediction.x_h_std, 0, prediction.n_warm_up)
 
@@ -98,7 +96,7 @@ class Planner(WindowPlanner, Protocol):
         """Return parameters and state, the predictor's included."""
 
     @classmethod
-    def from_bytes(cls, blob: bytes) -> Planner:
+    def from_bytes(cls, blob: bytes) -> "Planner":
         """Return the planner of :meth:`to_bytes`."""
 
 
@@ -107,11 +105,7 @@ class _Unmodified:
 
     The lead-in is one window, at rest, which is neither predicted nor learned.
 
-    Parameters
-    ----------
-    predictor : HybridPredictor
-    at_rest : bool
-        Whether the current window is the lead-in.
+    ``at_rest``: whether the current window is the lead-in.
     """
 
     def __init__(self, predictor: HybridPredictor, *, at_rest: bool) -> None:
@@ -351,7 +345,7 @@ class LookAhead:
         return pack(_KIND, {"unit": self.unit, "diverged": self.diverged}, arrays, {"model": self.model.to_bytes()})
 
     @classmethod
-    def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> LookAhead:
+    def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> "LookAhead":
         """Return the look-ahead of :meth:`to_bytes`.
 
         Parameters

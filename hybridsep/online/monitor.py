@@ -1,7 +1,5 @@
 """Monitor of the following error, as drives have one, and of measurements that are missing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -73,17 +73,8 @@ class PaperModel:
     def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> tuple[PaperModel, NDArray[np.bool_]]:
         """Learn from the measurement of a window; every sample is accepted.
 
-        Parameters
-        ----------
-        forecast : Forecast
-        x : (m,) array, m
-            Measured positions of its first ``m`` samples, relative to the start.
-        fold : bool
-            Whether they are learned; the next window starts from them in any case.
-
-        Returns
-        -------
-        PaperModel, (m,) array of bool
+        ``x``, (m,), m: measured positions of its first ``m`` samples, relative to the start; ``fold``: whether they
+        are learned; the next window starts from them in any case. Returns (m,).
         """
         m, Np = len(x), self.settings.Np
         measured, regression = forecast.window.x_pb[:m], self.regression
@@ -110,10 +101,7 @@ class PaperModel:
     def _free_run(self, x_pb: Array) -> Array:
         """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
 
-        Parameters
-        ----------
-        x_pb : (n,) array, m
-            Physics-based prediction, relative to the start.
+        ``x_pb``, (n,), m: physics-based prediction, relative to the start.
         """
         w, w_e = self.regression.weights, self.lag_weights
         # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)

@@ -5,8 +5,6 @@
 recursion from the last ``p`` measured residuals, affine in the command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,8 +30,7 @@ from .window import FeatureScales, Forecast, PredictedWindow, Prediction, Residu
 
 _KIND = "predictor"
 
-_ResidualModel: TypeAlias = PaperModel | AveragedModel
-"""Model of the residual: a record; its methods return another."""
+_ResidualModel: TypeAlias = PaperModel | AveragedModel  # model of the residual: a record; its methods return another
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,7 +354,7 @@ class HybridPredictor:
         return pack(_KIND, meta, arrays)
 
     @classmethod
-    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> HybridPredictor:
+    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
         """Return the predictor of :meth:`to_bytes`, given the ``disturbances`` that it was learned with.
 
         Raises
@@ -393,7 +390,7 @@ class HybridPredictor:
             file.write(blob)
 
     @classmethod
-    def load(cls, path: str | Path, disturbances: Sequence[Disturbance] = ()) -> HybridPredictor:
+    def load(cls, path: str | Path, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
         """Return the predictor of :meth:`save`; :meth:`restart` then begins a warm-started run.
 
         Raises

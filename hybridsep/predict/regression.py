@@ -22,11 +22,8 @@ from ..base.errors import ParameterError
 from ..base.settings import check
 from ..base.signals import Array
 
-_COLUMNS_AT_ONCE = 8
-"""Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
-
-_LEAST_DIAGONAL = 1e-150
-"""Bound on the factor's diagonal: its square is a normal number."""
+_COLUMNS_AT_ONCE = 8  # block size of dtpqrt, the fastest one measured for 50 to 200 features
+_LEAST_DIAGONAL = 1e-150  # bound on the factor's diagonal: its square is a normal number
 
 
 def lags(series: Array, n: int) -> Array:
@@ -37,13 +34,8 @@ def lags(series: Array, n: int) -> Array:
 def _folded(factor: Array, rows: Array, n_triangular: int = 0) -> Array:
     """Return the upper triangle ``R'`` of ``Q R' = [R; rows]``.
 
-    Parameters
-    ----------
-    factor : (n, n) array, column-major
-        ``R``.
-    rows : (m, n) array
-    n_triangular : int
-        Number of last rows that are upper trapezoidal themselves, which saves the work on their zeros.
+    ``factor``, (n, n), column-major: ``R``; ``rows``, (m, n); ``n_triangular``: number of last rows that are upper
+    trapezoidal themselves, which saves the work on their zeros.
     """
     found, _, _, info = lapack.dtpqrt(n_triangular, min(_COLUMNS_AT_ONCE, rows.shape[1]), factor, rows)
     if info != 0:  # an illegal argument, a fault of this module
@@ -77,17 +69,8 @@ class RidgeRegression:
     def init(cls, n_features: int, lam: float) -> RidgeRegression:
         """Return the regression without rows.
 
-        Parameters
-        ----------
-        n_features : int
-            Length ``n`` of a row φ.
-        lam : float
-            Ridge penalty λ > 0 on ‖w‖², in the unit of a row's entry squared (m² here).
-
-        Raises
-        ------
-        ParameterError
-            If ``n_features < 1`` or ``lam ≤ 0``.
+        ``n_features``: length ``n`` of a row φ; ``lam``: ridge penalty λ > 0 on ‖w‖², in the unit of a row's entry
+        squared (m² here). ParameterError if ``n_features < 1`` or ``lam ≤ 0``.
         """
         if n_features < 1:
             raise ParameterError(f"n_features must be ≥ 1, got {n_features}")
@@ -145,10 +128,7 @@ class RidgeRegression:
         They minimise ``Σ (target − wᵀφ)² + Σ_i penalties_i w_i²`` over the rows so far: the triangle of all features
         holds the triangle of the first ones, so a QR update with ``m`` rows of penalties suffices.
 
-        Parameters
-        ----------
-        penalties : (m,) array
-            Positive, ``1 ≤ m ≤ n_features``; they add to λ.
+        ``penalties``, (m,): positive, ``1 ≤ m ≤ n_features``; they add to λ.
         """
         m, target = len(penalties), self.factor[:, -1]
         factor, rows = np.zeros((m + 1, m + 1), order="F"), np.zeros((m, m + 1), order="F")

@@ -14,8 +14,6 @@ the beginning to the end of a window, moves until intervals of 50, 90 and 95 % m
 tails are heavier than normal, so that 50 % cover a little more and 95 % a little less.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -30,32 +28,21 @@ from ..base.signals import PREDICTION_MAX, Array
 _SHARES = (4.0, 2.0)
 """First variance of the error by each cause, relative to that cause: timing, variance of the experts."""
 
-_N_COMPONENTS = 1 + len(_SHARES)
-"""Of the variance."""
-
-_UNKNOWN_NOISE = 25.0
-"""First variance of a noise that is not known, relative to λ."""
-
-_FELT_FOR = 0.1
-"""Time constant of the averaging of timing and variance of the experts, in windows."""
-
-_LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4
-"""Bounds on the variance relative to its cause, relative to the first one."""
+_N_COMPONENTS = 1 + len(_SHARES)  # of the variance
+_UNKNOWN_NOISE = 25.0  # first variance of a noise that is not known, relative to λ
+_FELT_FOR = 0.1  # time constant of the averaging of timing and variance of the experts, in windows
+_LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4  # bounds on the variance relative to its cause, relative to the first one
 
 _THETA_LEAST = np.array([0.0, *(_LEAST_SHARE * share for share in _SHARES)])
 _THETA_MOST = np.array([PREDICTION_MAX, *(_MOST_SHARE * share for share in _SHARES)])
 
-_FLOOR = 1e-6
-"""Least variance relative to the recent mean square of the residual."""
-
-_LEAST_VARIANCE = 1e-100
-"""Variance, m², that no divisor is below."""
+_FLOOR = 1e-6  # least variance relative to the recent mean square of the residual
+_LEAST_VARIANCE = 1e-100  # variance, m², that no divisor is below
 
 _OUTLYING, _VANISHING = 16.0, 0.01
 """Largest square of an error, relative to its variance, that counts; least change of a component in one window."""
 
-_RECENT = 0.9
-"""Factor by which the mean square of the residual fades from window to window."""
+_RECENT = 0.9  # factor by which the mean square of the residual fades from window to window
 
 _MEMORY, _FIRST_EVIDENCE, _STEP = 0.97, 1.0, 6.0
 """Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
@@ -91,21 +78,16 @@ class Uncertainty:
     recent: float  # m²: recent mean square of the residual; 0 before the first window
 
     @classmethod
-    def init(cls, variance: float) -> Uncertainty:
+    def init(cls, variance: float) -> "Uncertainty":
         """Return what is assumed before the first window is measured, with the ``variance``, m², of the noise."""
         return cls(np.array([variance, *_SHARES]), np.zeros(_N_COMPONENTS), 1.0, 1.0, 0.0)
 
     def predict(self, x_pb: Array, e_h: Array, variance: Array | float, Np: int) -> PredictedError:
         """Return what is known of the error of the next window.
 
-        Parameters
-        ----------
-        x_pb, e_h : (n,) array, m
-            Physics-based prediction and published residual, relative to the start.
-        variance : (n,) array or float, m²
-            What the residual model knows of its error.
-        Np : int
-            Samples of a usual window.
+        ``x_pb``, ``e_h``, (n,), m: physics-based prediction and published residual, relative to the start;
+        ``variance``, (n,) or float, m²: what the residual model knows of its error; ``Np``: samples of a usual
+        window.
         """
         n = len(x_pb)
         bounded = e_h
@@ -122,18 +104,11 @@ class Uncertainty:
         std = np.minimum(c * np.sqrt(_variance(components, self.theta, self.recent)), PREDICTION_MAX)
         return PredictedError(bounded, components, std)
 
-    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_], Np: int) -> Uncertainty:
+    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_], Np: int) -> "Uncertainty":
         """Return the uncertainty with the measurement of a window.
 
-        Parameters
-        ----------
-        predicted : PredictedError
-        residuals : (m,) array, m
-            Measured residuals ``e_pb`` of its first ``m`` samples.
-        accepted : (m,) array of bool
-            Whether they count.
-        Np : int
-            Samples of a usual window.
+        ``residuals``, (m,), m: measured residuals ``e_pb`` of its first ``m`` samples; ``accepted``, (m,): whether
+        they count; ``Np``: samples of a usual window.
         """
         m = len(residuals)
         signals = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m], _from_middle(m, Np)

@@ -1,7 +1,5 @@
 """Look-ahead window: its prediction, pending and published, and its lifted affine operator."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -77,9 +77,9 @@ class CGram:
 class CSolution:
     """Weights of the first features with penalties, as hsep_experts.c solves for them.
 
-    ``gram``: its rows, settled; ``penalties``: (m,): of its first ``m`` features; where these are all, the second
+    ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; where these are all, the second
     half of them is the head, else there is none; ``other``, ``weight``: CGram and float: rows that are added with a
-    weight, settled; ``later``: (k, m + 1): rows ``[φ | target]`` that come once the solution has begun; ``amounts``:
+    weight, settled; ``later``, (k, m + 1): rows ``[φ | target]`` that come once the solution has begun; ``amounts``:
     list: Multiply-adds that are spent before each of them; what is left is done in the end; ``completed``: whether
     the factor is completed before the last of them; ``apart``: whether the last of them stays behind the factor.
     """

@@ -39,23 +39,23 @@ def test_there_are_at_most_40() -> None:
     assert 10 < len(fields(CONSTANTS)) <= 40
 
 
-def reasoned(tree: ast.Module) -> set[int]:
-    """Return the nodes of assignments with a docstring behind them."""
+def reasoned(text: str, tree: ast.Module) -> set[int]:
+    """Return the nodes of assignments with a comment or a docstring behind them."""
+    lines = text.splitlines()
     bodies = [tree.body, *(node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef))]
     return {
         id(node)
         for body in bodies
-        for statement, reason in itertools.pairwise(body)
+        for statement, after in itertools.pairwise([*body, None])
         if isinstance(statement, ast.Assign | ast.AnnAssign)
-        and isinstance(reason, ast.Expr)
-        and isinstance(reason.value, ast.Constant)
+        and ("  # " in lines[(statement.end_lineno or 0) - 1] or isinstance(after, ast.Expr))
         for node in ast.walk(statement)
     }
 
 
 def literals_of_library(text: str) -> Iterator[float]:
     tree = ast.parse(text)
-    known = reasoned(tree)
+    known = reasoned(text, tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and id(node) not in known:
             yield float(node.value)

@@ -57,13 +57,7 @@ class TestStaircase:
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 @pytest.mark.parametrize(
     ("Np", "p", "q", "t_init", "dead_time"),
-    [
-        (1, 1, 0, 0.0, 0),
-        (7, 7, 0, 0.010, 0),
-        (7, 1, 6, 0.0, 3),
-        (12, 12, 11, 0.0305, 1),
-        (300, 9, 2, 0.1, 0),
-    ],
+    [(1, 1, 0, 0.0, 0), (7, 7, 0, 0.010, 0), (7, 1, 6, 0.0, 3), (12, 12, 11, 0.0305, 1), (300, 9, 2, 0.1, 0)],
 )
 def test_equals_the_oracle_with_other_parameters(
     Np: int, p: int, q: int, t_init: float, dead_time: int, hold: str

@@ -35,8 +35,8 @@ def physics(
 ) -> list[float]:
     """Eq. (2): answer commands from rest, sample by sample.
 
-    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``: m: commands relative to the position of
-    rest; ``T_s``: s; ``hold``: {"zoh", "foh"}; ``dead_time``: samples. Returns list, m.
+    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``, m: commands relative to the position of
+    rest; ``T_s``, s; ``hold``: {"zoh", "foh"}; ``dead_time``: samples. Returns list, m.
     """
     # With the sampling interval as the unit of time the coefficients stay near one another.
     num = numerator * T_s ** -np.arange(len(numerator) - 1.0, -1.0, -1.0)
@@ -118,8 +118,8 @@ def run(
 ) -> OracleRun:
     """Predict batch after batch of a run from rest at ``x_d[0]``, eqs. (2) to (6).
 
-    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``, ``x``: (n,), m: commanded and measured
-    positions; the last batch may be short; ``T_s``, ``t_init``: s; ``lam``: m²; ``hold``: {"zoh", "foh"};
+    ``numerator``, ``denominator``: G_pb(s), highest power first; ``x_d``, ``x``, (n,), m: commanded and measured
+    positions; the last batch may be short; ``T_s``, ``t_init``, s; ``lam``, m²; ``hold``: {"zoh", "foh"};
     ``dead_time``: samples.
     """
     start = float(x_d[0])

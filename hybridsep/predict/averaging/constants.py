@@ -5,8 +5,6 @@ The C core's header is generated from here. ``benchmarks/ablation`` switches eac
 and drives of one seed; other recordings and seeds judge.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 
@@ -80,5 +78,4 @@ class AveragingConstants:
     patience: float = 1.0
 
 
-CONSTANTS = AveragingConstants()
-"""The product's."""
+CONSTANTS = AveragingConstants()  # the product's

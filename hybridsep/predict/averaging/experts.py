@@ -28,8 +28,7 @@ _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
 and on the correlation that a window shows."""
 
-_LAG_BOUND = 10.0
-"""Largest lag within a window, relative to the bound on a prediction: what is beyond has diverged."""
+_LAG_BOUND = 10.0  # largest lag within a window, relative to the bound on a prediction: what is beyond has diverged
 
 _RESOLUTION = 1e-13
 """Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
@@ -71,12 +70,8 @@ class ExpertErrors:
     def variance(self, target_square: float, first: float, least: float) -> float:
         """Return the variance of the noise that penalties come from, m².
 
-        Parameters
-        ----------
-        target_square : float, m²
-            Sum of the squares of the targets so far.
-        first, least : float, m²
-            Variance of the noise while it is not known, and the least one.
+        ``target_square``, m²: sum of the squares of the targets so far; ``first``, ``least``, m²: variance of the
+        noise while it is not known, and the least one.
         """
         return max(self.noise_variance or first, least, _RESOLUTION * target_square) * self.correlation
 
@@ -85,13 +80,8 @@ class ExpertErrors:
     ) -> ExpertErrors:
         """Return noise and correlation with the errors of a window.
 
-        Parameters
-        ----------
-        prediction : ExpertPrediction
-        measured, accepted : (m,) array, m and bool
-            Residuals of its first samples, and which count.
-        given : float, m²
-            Variance of the noise, if it is known; else 0.
+        ``measured``, ``accepted``, (m,), m and bool: residuals of its first samples, and which count; ``given``, m²:
+        variance of the noise, if it is known; else 0.
         """
         noise_variance, correlation = given or prediction.noise_variance, self.correlation
         if noise_variance > 0.0:
@@ -131,20 +121,10 @@ class SolvedExpert(NamedTuple):
         response. A prediction of variance ``τ²`` is shrunk by ``v/(v + τ²)``, ``v`` being the largest mean square of a
         window: at a first motion, a first reversal or in a region not seen yet the physics model remains.
 
-        Parameters
-        ----------
-        rows : (n, n_static) array
-            Features of the window without lags.
-        past : (≥ p,) array, m
-            Last residuals, newest first.
-        largest_square : float, m²
-            Largest mean square of a window.
-        bound : float, m
-            On the prediction.
-        held : ExpertPrediction, optional
-            Prediction whose shrinking is held; else it is computed.
-        counts : (n,) array, optional
-            Sample whose row counts for the variance of each sample; its own if left out.
+        ``rows``, (n, n_static): features of the window without lags; ``past``, (≥ p,), m: last residuals, newest
+        first; ``largest_square``, m²: largest mean square of a window; ``bound``, m: on the prediction; ``held``:
+        prediction whose shrinking is held; else it is computed; ``counts``, (n,): sample whose row counts for the
+        variance of each sample; its own if left out.
         """
         w_e = self.lag_weights
         p = len(w_e)
@@ -177,16 +157,9 @@ class SolvedExpert(NamedTuple):
 def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> SolvedExpert:
     """Return an expert with the weights that follow from all rows so far.
 
-    Parameters
-    ----------
-    evidence : RidgeRegression
-        Rows whose first features are the expert's.
-    variance : float, m²
-        Of the noise, by :meth:`ExpertErrors.variance`.
-    scales : (n_static,) array
-        Prior standard deviations of the weights of the features without lags, the first ones of a row.
-    p : int
-        Lags of the residual.
+    ``evidence``: rows whose first features are the expert's; ``variance``, m²: of the noise, by
+    :meth:`ExpertErrors.variance`; ``scales``, (n_static,): prior standard deviations of the weights of the features
+    without lags, the first ones of a row; ``p``: lags of the residual.
     """
     resolved = _RESOLUTION * evidence.target_square
     priors = np.concatenate((scales, np.sqrt(CONSTANTS.last_lag ** (np.arange(p) / max(p, 1)))))
@@ -206,8 +179,7 @@ def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
     return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
 
 
-_LEAST = 1e-150
-"""Magnitude of a feature that counts as 0."""
+_LEAST = 1e-150  # magnitude of a feature that counts as 0
 
 
 @dataclass(frozen=True)

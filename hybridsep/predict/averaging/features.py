@@ -13,8 +13,6 @@ The expert without a physics model, eq. (4) with ``G_pb = 1``, predicts the resi
 are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j = 0 … p``, beside ``p`` lags of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -54,11 +52,7 @@ class CommandFeatures:
     def rows(self, before: Array, x_d: Array) -> Array:
         """Return the features of a window, ``(n, p + 2)``: 1, and the increments.
 
-        Parameters
-        ----------
-        before : (n_before,) array, m
-            Commands before it, oldest first.
-        x_d : (n,) array, m
+        ``before``, (n_before,), m: commands before it, oldest first; ``x_d``, (n,), m.
         """
         increments = np.diff(np.concatenate((before, x_d))[: self.p + 1 + len(x_d)])
         return np.column_stack((np.ones(len(x_d)), lags(increments, self.p + 1)))
@@ -86,14 +80,9 @@ _RESOLVED = 32.0
 """Motion from one sample to the next, in units of the last place of the start, below which a command is at rest: the
 plans of an axis that stands are rounded."""
 
-LEAST_VELOCITY = 1e-200
-"""Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
-
-_OWN_MAX = 1e100
-"""Magnitude that a disturbance of the user's own must not exceed."""
-
-_DIFFERENCES = 3
-"""Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
+LEAST_VELOCITY = 1e-200  # velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow
+_OWN_MAX = 1e100  # magnitude that a disturbance of the user's own must not exceed
+_DIFFERENCES = 3  # largest order of a difference of ``x_pb``: velocity, acceleration and jerk
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,19 +214,9 @@ class StaticFeatures:
 
         Columns: 1; ``x_pb`` and its differences; the filtered disturbances; their first differences.
 
-        Parameters
-        ----------
-        state : StaticState
-        window : ResidualWindow
-        x : (n,) array, m
-            Position that the stiffness acts at, and whose velocity is damped with ``is_planned``.
-        velocity_scale : float
-            Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
-
-        Raises
-        ------
-        SignalError
-            If a disturbance of the user's own does not return a finite number for each sample.
+        ``x``, (n,), m: position that the stiffness acts at, and whose velocity is damped with ``is_planned``;
+        ``velocity_scale``: velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
+        SignalError if a disturbance of the user's own does not return a finite number for each sample.
         """
         x_d, x_pb, start, _ = window
         first, v_d, v = 2 + self.n_differences, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)

@@ -6,8 +6,6 @@ after it, until as many within reach have followed as there were beyond it: an a
 reads. After a second the axis has been moved, or its sensor set, and the value is believed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -34,16 +32,8 @@ def gated(
 
     Before the first motion, and over the first window that has a residual, all are.
 
-    Parameters
-    ----------
-    gate : InnovationGate
-    e : (n,) array, m
-        Measured residuals, NaN where missing.
-    largest : float, m
-        Largest residual believed before them.
-    fastest : float, m
-        Largest change of ``x_pb`` from sample to sample so far, of the window, too.
-    T_s : float, s
+    ``e``, (n,), m: measured residuals, NaN where missing; ``largest``, m: largest residual believed before them;
+    ``fastest``, m: largest change of ``x_pb`` from sample to sample so far, of the window, too; ``T_s``, s.
     """
     known = largest > 0.0 and fastest > 0.0
     believed, n_missing, n_beyond, farthest = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.farthest

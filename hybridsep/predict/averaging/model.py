@@ -138,13 +138,7 @@ class AveragedModel:
     ) -> AveragedModel:
         """Return the model at rest, with nothing learned.
 
-        Parameters
-        ----------
-        settings : PredictorSettings
-        discrete : DiscreteModel
-            ``G_pb``.
-        own : tuple of Disturbance
-            Of the user's own.
+        ``discrete``: ``G_pb``; ``own``: the user's own disturbances.
         """
         static, command = (
             StaticFeatures(discrete, settings.q, settings.period, own),
@@ -272,13 +266,8 @@ class AveragedModel:
     ) -> AveragedForecast:
         """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
 
-        Parameters
-        ----------
-        solved, window, scales
-        like : AveragedForecast, optional
-            Under other commands, with the same path: its shrinking is held.
-        counts : (n,) array, optional
-            As :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
+        ``like``: under other commands, with the same path: its shrinking is held; ``counts``, (n,): as
+        :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
         x, held = window.x_pb, {} if like is None else like.predictions
         memory = self.run.memory.append_commands(window.raw_commands, self.settings.Np) if like is None else like.memory
@@ -309,11 +298,7 @@ class AveragedModel:
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
         """Predict the residual over the next window.
 
-        Parameters
-        ----------
-        window : ResidualWindow
-        scales : FeatureScales, optional
-            By :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
+        ``scales``: by :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
         """
         scales = self.scales_of(window) if scales is None else scales
         return self.forecast_by(self.solved(scales), window, scales)
@@ -321,12 +306,7 @@ class AveragedModel:
     def begin_in_motion(self, window: ResidualWindow, scales: FeatureScales) -> AveragedModel:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
 
-        Parameters
-        ----------
-        window : ResidualWindow
-            The first one, with the motion before it.
-        scales : FeatureScales
-            Of the features in it.
+        ``window``: the first one, with the motion before it; ``scales``: of the features in it.
         """
         (x_d, x_pb, *_), command, static = window, self.command, self.run.static
         commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
@@ -342,19 +322,9 @@ class AveragedModel:
     ) -> tuple[AveragedModel, NDArray[np.bool_]]:
         """Learn from the measurement of a window.
 
-        Parameters
-        ----------
-        forecast : AveragedForecast
-            Of this state.
-        x : (m,) array, m
-            Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
-        fold : bool
-            Whether they are learned; the next window starts from them in any case.
-
-        Returns
-        -------
-        AveragedModel, (m,) array of bool
-            Which samples are accepted.
+        ``forecast``: of this state; ``x``, (m,), m: measured positions of its first ``m`` samples, relative to the
+        start; NaN where missing; ``fold``: whether they are learned; the next window starts from them in any case.
+        Returns (m,): which samples are accepted.
         """
         m, run = len(x), self.run
         window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])

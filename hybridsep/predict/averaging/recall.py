@@ -7,8 +7,6 @@ the least gives the residuals that were measured then. They count by ``1/(1 + (D
 the changes themselves, and a tolerance ``ρ``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
@@ -20,8 +18,7 @@ from .constants import CONSTANTS
 _UPDATES = 25
 """Samples of a window, at most, at which all lags are compared: a controller does it in the samples between them."""
 
-_ALIKE = 1e-100
-"""Square of a change, m², that counts as 0: sums of smaller ones would slow a processor down."""
+_ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +32,11 @@ class Memory:
     n_ahead: int  # commands that are known ahead of those that were predicted
 
     @classmethod
-    def init(cls, n: int, Np: int) -> Memory:
+    def init(cls, n: int, Np: int) -> "Memory":
         """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
         return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), 0.0, 0)
 
-    def restart(self) -> Memory:
+    def restart(self) -> "Memory":
         """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
 
         Commands that were known ahead and never measured are forgotten: each command stands beside its residual.
@@ -51,7 +48,7 @@ class Memory:
         residuals = np.append(self.residuals[1:], 0.0)[: len(self.residuals)]  # also with no memory
         return Memory(commands, residuals, np.zeros_like(self.distances), 0.0, 0)
 
-    def append_commands(self, path: Array, Np: int) -> Memory:
+    def append_commands(self, path: Array, Np: int) -> "Memory":
         """Return the memory that knows the commands ahead, ``(m,)``, m."""
         n, new = len(self.residuals), path[self.n_ahead :]
         stride = len(self.commands) - n
@@ -73,10 +70,7 @@ class Memory:
 
         They do not if the memory is shorter.
 
-        Parameters
-        ----------
-        n : int
-            Samples from the last measured one to the last known command.
+        ``n``: samples from the last measured one to the last known command.
         """
         size = len(self.residuals)
         if size <= n:
@@ -86,7 +80,7 @@ class Memory:
         alike = tolerated / (tolerated + distance) if distance > 0.0 else 0.0
         return self.residuals[size - lag : size - lag + n], float(self.residuals[size - lag - 1]), alike
 
-    def remember(self, residuals: Array) -> Memory:
+    def remember(self, residuals: Array) -> "Memory":
         """Return the memory with the residuals of measured samples, ``(m,)``, m."""
         m = len(residuals)
         both = np.concatenate((self.residuals, residuals))

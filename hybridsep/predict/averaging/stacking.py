@@ -1,7 +1,5 @@
 """Stack of experts: the convex sum of their predictions that would have erred least so far."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -11,12 +9,10 @@ from ...base.signals import Array
 from .constants import CONSTANTS
 from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert, Regression
 
-_LEAST_SQUARE = 1e-300
-"""Mean square, m², that counts as 0."""
+_LEAST_SQUARE = 1e-300  # mean square, m², that counts as 0
 
 
-_ROUNDING = 1e-6
-"""What rounding may have added to the sum of the weights."""
+_ROUNDING = 1e-6  # what rounding may have added to the sum of the weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +30,16 @@ class Stack:
     evidence: Array  # (2,): ``eᵀe`` so far, m², and samples
 
     @classmethod
-    def init(cls) -> Stack:
+    def init(cls) -> "Stack":
         """Return the stack without evidence."""
         n = len(EXPERTS)
         return cls(_first_weights(), np.zeros((n, n)), np.zeros(n), np.zeros(2))
 
-    def update(self, predicted: Array, measured: Array, least: float) -> Stack:
+    def update(self, predicted: Array, measured: Array, least: float) -> "Stack":
         """Return the stack with a measured window more.
 
-        Parameters
-        ----------
-        predicted : (n_experts, n) array, m
-            Predictions made before the window was measured.
-        measured : (n,) array, m
-        least : float, m²
-            Least mean square that errors are judged by.
+        ``predicted``, (n_experts, n), m: predictions made before the window was measured; ``measured``, (n,), m;
+        ``least``, m²: least mean square that errors are judged by.
         """
         gamma, n = CONSTANTS.gamma, len(measured)
         gram = gamma * self.gram + predicted @ predicted.T
@@ -74,13 +65,13 @@ class Stack:
         of_residual = self.weights[ARX_RESIDUAL.place] + self.weights[STATIC.place]
         return ARX_COMMAND if self.weights[ARX_COMMAND.place] > of_residual else ARX_RESIDUAL
 
-    def copy(self, expert: Expert, to: Expert) -> Stack:
+    def copy(self, expert: Expert, to: Expert) -> "Stack":
         """Return the stack with the evidence of an expert given to another, as if it had predicted the same so far."""
         order = np.arange(len(self.weights))
         order[to.place] = expert.place
         return replace(self, gram=self.gram[np.ix_(order, order)], cross=self.cross[order])
 
-    def forget(self, expert: Expert) -> Stack:
+    def forget(self, expert: Expert) -> "Stack":
         """Return the stack without an expert that predicts no more."""
         others = np.arange(len(self.weights)) != expert.place
         gram = np.where(others[:, None] & others, self.gram, 0.0)
@@ -95,11 +86,7 @@ def _first_weights() -> Array:
 def simplex_minimum(hessian: Array, linear: Array) -> Array:
     """Return the ``π ≥ 0``, ``Σπ ≤ 1`` that minimises ``½ πᵀHπ − lᵀπ``, ``(n,)``, by its active set.
 
-    Parameters
-    ----------
-    hessian : (n, n) array
-        Positive definite; ``n`` is small: ``2ⁿ`` sets are tried.
-    linear : (n,) array
+    ``hessian``, (n, n): positive definite; ``n`` is small: ``2ⁿ`` sets are tried; ``linear``, (n,).
     """
     n = len(linear)
     best, least = np.zeros(n), 0.0

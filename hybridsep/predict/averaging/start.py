@@ -5,8 +5,6 @@ moves, does not: what the axis did before decays as a free response of ``G_pb``,
 disturbances did before. Its state follows from the first window by least squares.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +18,7 @@ _MOVING = 0.05
 """Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
 motion: from rest a jerk-limited command needs time."""
 
-_SAMPLES = 4
-"""Samples for each number of the state that are needed to estimate it."""
+_SAMPLES = 4  # samples for each number of the state that are needed to estimate it
 
 _DAMPING = 1e-3
 """Ridge penalty on the change of the state, relative to a response of unit gain: modes that decay at once are not
@@ -44,16 +41,9 @@ def motion_before(
     The residuals decide, between rest and a motion at the first commanded velocity; the state is then the one that they
     are explained by best, near this motion's.
 
-    Parameters
-    ----------
-    model, discrete : ModalModel, DiscreteModel
-        ``G_pb``.
-    x_d : (n,) array, m
-        Commands of the first window, the first ``late`` of them from before the run.
-    residuals : (m,) array, m
-        Of its first ``m`` samples, relative to the prediction from rest; NaN where missing.
-    late : int
-        Samples by which the measurement is late.
+    ``model`` and ``discrete`` are ``G_pb``; ``x_d``, (n,), m: commands of the first window, ``late`` from
+    before the run; ``residuals``, (m,), m: of its first ``m`` samples, relative to the prediction from rest; NaN
+    where missing; ``late``: samples by which the measurement is late.
     """
     speed, known = np.abs(np.diff(x_d[late:])), np.isfinite(residuals)
     n = discrete.n_state - discrete.dead_time

@@ -9,8 +9,7 @@ import numpy as np
 from ...base.signals import Array
 from ..regression import RidgeRegression
 
-_NO_PENALTY = 1e-40
-"""λ of the factor itself, m²: penalties come with each solution."""
+_NO_PENALTY = 1e-40  # λ of the factor itself, m²: penalties come with each solution
 
 
 @dataclass(frozen=True, eq=False)

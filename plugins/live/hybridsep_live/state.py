@@ -66,7 +66,7 @@ def drawn(rows: Array, first: int, columns: int) -> Array:
 
     Stretches are of equal length and begin at multiples of it, so that a line that moves does not flicker.
 
-    ``rows``: (n, m): the first column is the time; ``first``: number of the first row; ``columns``: columns of
+    ``rows``, (n, m): the first column is the time; ``first``: number of the first row; ``columns``: columns of
     pixels. Returns (k, m): two rows a stretch, or all where there are at most two rows for each pixel.
     """
     if len(rows) <= 2 * columns:

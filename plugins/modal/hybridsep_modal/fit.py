@@ -75,8 +75,8 @@ def polish(
 ) -> ModalFit:
     """Return the least-squares fit that starts from poles.
 
-    ``omega``: (n,), rad/s; ``response``: (n,); ``weight``: (n,): reciprocal standard deviation of each line, up to a
-    factor; ``poles``: (n_modes, 2): ``log ω, log ζ`` to start from; ``unit_gain``: whether the static gains sum to 1;
+    ``omega``: (n,), rad/s; ``response``, (n,); ``weight``, (n,): reciprocal standard deviation of each line, up to a
+    factor; ``poles``, (n_modes, 2): ``log ω, log ζ`` to start from; ``unit_gain``: whether the static gains sum to 1;
     ``iterations``: largest number of evaluations.
     """
     s = np.asarray(1j * omega, dtype=np.complex128)

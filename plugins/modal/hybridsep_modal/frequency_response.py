@@ -92,8 +92,8 @@ def identify_frequency_response(
 ) -> IdentifiedResponse:
     """Identify the physics model from a frequency response.
 
-    ``frequency``: (n,), Hz: lines in any order; lines at 0, and where the response is 0 or not finite, are left out;
-    ``response``: (n,) array_like, m/m; ``std``: (n,): standard deviation of each line's complex error; a constant
+    ``frequency``, (n,), Hz: lines in any order; lines at 0, and where the response is 0 or not finite, are left out;
+    ``response``: (n,) array_like, m/m; ``std``, (n,): standard deviation of each line's complex error; a constant
     part of its magnitude if left out; ``n_modes``: number of modes; by the Bayesian information criterion  if left
     out; ``unit_gain``: whether the static gain is 1; ``T_s``: sampling interval of the machine, s; ``input_hold``:
     {"zoh", "foh"}; ``dead_time``: whole samples of dead time in the response; ``sampled``: whether the response was

@@ -42,7 +42,7 @@ class Response(NamedTuple):
 def h1(x_d: ArrayLike, x: ArrayLike, T_s: float, f_min: float = 0.0, f_max: float | None = None) -> Response:
     """Return the H1 estimate ``S_xd,x / S_xd,xd`` at the lines that the command excites.
 
-    ``x_d``, ``x``: (n,): commanded and measured positions, m, or both accelerations; at rest at both ends; ``T_s``:
+    ``x_d``, ``x``, (n,): commanded and measured positions, m, or both accelerations; at rest at both ends; ``T_s``:
     sampling interval, s; ``f_min``, ``f_max``: band, Hz; up to half of the Nyquist frequency if ``f_max`` is left
     out. IdentificationError if no line is coherent.
     """

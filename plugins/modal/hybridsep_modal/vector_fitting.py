@@ -28,7 +28,7 @@ def starting_poles(omega: Array, n_modes: int) -> Complex:
 def vector_fit(omega: Array, response: Complex, weight: Array, poles: Complex) -> Complex:
     """Return stable poles of a strictly proper model of the response, real ones and the upper half of the pairs.
 
-    ``omega``: (n,), rad/s: angular frequencies of the lines; ``response``: (n,); ``weight``: (n,): of each line's
+    ``omega``: (n,), rad/s: angular frequencies of the lines; ``response``, (n,); ``weight``, (n,): of each line's
     error, for example ``1/|response|``; ``poles``: (m,), rad/s: starting poles: real ones and the upper half of the
     pairs.
     """

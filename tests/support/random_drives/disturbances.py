@@ -68,7 +68,7 @@ class Disturbances:
 def random_disturbances(draws: Draws, stroke: float, in_antiphase: bool) -> Disturbances:
     """Return a random mixture; one in ten drives is linear.
 
-    ``stroke``: m: of the trajectory; ``in_antiphase``: whether modes are in antiphase. A stiffness that offsets the
+    ``stroke``, m: of the trajectory; ``in_antiphase``: whether modes are in antiphase. A stiffness that offsets the
     command would make such a drive oscillate by itself, so it acts as a force there.
     """
     if draws.chance(0.1):

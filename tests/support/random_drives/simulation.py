@@ -101,8 +101,8 @@ def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, su
 def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
     """Return the exact step by ``h``, s, of each mode, and its outputs.
 
-    Returns ``A``: (2, 2, 4); ``B``: (2, 4); ``command``: (2, 4): output weights of the response to the command;
-    ``force``: (2, 4): output weights of the response to a force at the tool: every mode in phase, without zeros,
+    Returns ``A``, (2, 2, 4); ``B``, (2, 4); ``command``, (2, 4): output weights of the response to the command;
+    ``force``, (2, 4): output weights of the response to a force at the tool: every mode in phase, without zeros,
     static gain 1.
     """
     A, b, c = model.state_space()
