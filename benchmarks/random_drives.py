@@ -21,10 +21,10 @@ from multiprocessing import get_context
 import numpy as np
 from random_drives import generator as modal
 from random_drives.drive import Drive
-from random_drives.faults import FAULTS, JITTER, OFFSET_STEP
 from random_drives.replay import PREDICTORS, Replay, Replayed, library_replay, physics_alone, replay
 from two_mass import generator as two_mass
 
+from benchmarks.sensor_faults import FAULTS, JITTER, OFFSET_STEP
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
