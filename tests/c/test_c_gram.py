@@ -12,11 +12,10 @@ import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from hybridsep.base.signals import Array
 from hybridsep.predict.regression import RidgeRegression
 
-Array = NDArray[np.float64]
 NO_PENALTY = 1e-40
 
 ABREAST = 4  # HSEP_SOLUTION_ABREAST

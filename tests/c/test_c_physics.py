@@ -11,9 +11,9 @@ import staircase_data as staircase
 from c_core import TS
 from numpy.typing import NDArray
 
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 
-Array = NDArray[np.float64]
 LongArray = NDArray[np.longdouble]
 
 MODES = {

@@ -10,11 +10,9 @@ import oracle
 import pytest
 import staircase_data as staircase
 from c_core import TS
-from numpy.typing import NDArray
 
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
-
-Array = NDArray[np.float64]
 
 
 class CRegression:

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from bounded_oracle import clarabel_minimum
 from library_stream import LookAheadStream
-from numpy.typing import NDArray
 from places import ROOT
 from random_loops import random_loop, run
 from stream import COMPENSATOR
 
+from hybridsep.base.signals import Array
 from hybridsep.compensate import qp as _qp
 from hybridsep.compensate.qp import EXACT, Minimum, Tolerance, minimise
-
-Array = NDArray[np.float64]
 
 Problem = tuple[Array, Array, Array, Array, Array, Array, float]
 

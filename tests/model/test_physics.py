@@ -5,10 +5,11 @@ import oracle
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from modal_cases import CASES, HOLDS, LIGHT, OVER, TS, UNDER, Array, command, transfer_function
+from modal_cases import CASES, HOLDS, LIGHT, OVER, TS, UNDER, command, transfer_function
 from properties import examples
 from scipy.linalg import expm
 
+from hybridsep.base.signals import Array
 from hybridsep.model.discrete import BLOCK_MAX
 from hybridsep.model.physics import ModalModel
 

@@ -7,16 +7,15 @@ import c_core
 import numpy as np
 import pytest
 from c_core import STAGE_DRIVE, CModel
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from hybridsep import ModalModel, Mode, simulate
 from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.signals import Array
 from hybridsep.plants.stage_drive import StageDrive, velocity_under_friction
 from hybridsep.plants.trajectory import spiral, staircase
 
-Array = NDArray[np.float64]
 FRICTION_VELOCITY = PARAMETERS["v_friction"].default
 TS = 1e-3
 

@@ -6,16 +6,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from c_core import STAGE_DRIVE, STAGE_MODES, CModel
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
 from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.signals import Array
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import spiral, staircase
 
-Array = NDArray[np.float64]
 TS = 1e-3
 
 

@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.averaging.experts import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.averaging.gate import InnovationGate, gated
 from hybridsep.predict.predictor import HybridPredictor
-
-Array = NDArray[np.float64]
 
 NP, T_S = 100, 1e-3
 

@@ -8,10 +8,11 @@ import pytest
 import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
-from predictor_cases import MODEL, Array, replay, small_signals, trained
+from predictor_cases import MODEL, replay, small_signals, trained
 from properties import examples
 
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -8,17 +8,15 @@ import pytest
 import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from properties import examples
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.base.state import arrays_of, restored
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
-
-Array = NDArray[np.float64]
 
 
 def problem(m: int, n: int, seed: int = 0) -> tuple[Array, Array]:

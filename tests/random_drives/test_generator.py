@@ -5,13 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from random_drives.disturbances import Disturbances
 from random_drives.generator import RandomDrive, Recipe, random_drives
 from random_drives.simulation import simulate
 from scipy.signal import cont2discrete, dlsim
 
-Array = NDArray[np.float64]
+from hybridsep.base.signals import Array
 
 SEED = 1
 N = 40

@@ -15,15 +15,13 @@ import numpy as np
 import pytest
 from built_once import SHARED_BUILDS, built_once
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
-from numpy.typing import NDArray
 from places import ROOT
 
 from hybridsep.base.parameters import Parameter
+from hybridsep.base.signals import Array
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, FmuTable
 from hybridsep.machines.machine import load_machine
-
-Array = NDArray[np.float64]
 
 TS = 1e-3  # s
 

@@ -2,12 +2,9 @@
 
 import numpy as np
 import oracle
-from numpy.typing import NDArray
 
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
-
-Array = NDArray[np.float64]
-
 
 TS = 1e-3
 

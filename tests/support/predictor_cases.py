@@ -5,15 +5,12 @@ from typing import Any
 
 import numpy as np
 import staircase_data as staircase
-from numpy.typing import NDArray
 
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.window import Prediction
-
-Array = NDArray[np.float64]
-
 
 MODEL = ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K)
 

@@ -10,10 +10,9 @@ with ``x_d`` held over each millisecond.
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from ruckig import InputParameter, Ruckig, Trajectory
 
-Array = NDArray[np.float64]
+from hybridsep.base.signals import Array
 
 M, C, K = 1.0, 15.7, 24674.0  # kg, N·s/m, N/m
 C_NL, K_NL = 100.0, 1000.0  # N·s²/m², N/m²
