@@ -180,11 +180,14 @@ def _defines(declared: Declared) -> list[str]:
 
 
 def _declared(module: ModuleType) -> list[str]:
-    """Return the names of a module's constants that C has: with a reason behind them."""
+    """Return the names of a module's constants that C has: with a reason, a comment or a text, behind them."""
     names: list[str] = []
-    body = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body
-    for statement, reason in itertools.pairwise(body):
-        if isinstance(statement, ast.Assign) and isinstance(reason, ast.Expr):
+    text = Path(module.__file__ or "").read_text(encoding="utf-8")
+    lines = text.splitlines()
+    for statement, after in itertools.pairwise([*ast.parse(text).body, None]):
+        if not isinstance(statement, ast.Assign):
+            continue
+        if "  # " in lines[(statement.end_lineno or 0) - 1] or isinstance(after, ast.Expr):
             nodes = ast.walk(statement.targets[0])
             names += [one.id for one in nodes if isinstance(one, ast.Name) and one.id.isupper()]
     return [name for name in names if name not in OF_LIBRARY]
