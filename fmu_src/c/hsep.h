@@ -7,7 +7,7 @@
  * Contract of all functions. Reentrant: threads may use different blocks at once, one block is used by one thread at a
  * time. Nothing allocates, locks, opens a file, writes a global or calls the system; libm is all that is needed.
  * Arguments are as said at each function: positions are finite and within +- 1000 m or +- 1e6 rad, pointers are not
- * NULL unless said so, and a block has been begun by hsep_*_init. Parameters are checked by hsep_*_size alone: it
+ * NULL unless said so, and a block has been begun by hsep_*_init. Only hsep_*_size checks parameters: it
  * returns 0 where one is out of its range, and no other function may be called with such parameters.
  *
  *   function                 | bounded cost                                          | what may fail
@@ -151,8 +151,9 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API int hsep_compensator_change(
     hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max);
 
-/* End a trip where the level of the reset rises; what was learned before stays. It trips where x_meas is farther from x_d than
- * following_error_max for three samples in a row: from the next window on the change fades, as with compensate off. */
+/* End a trip where the level of the reset rises; what was learned before stays. It trips where x_meas is farther from
+ * x_d than following_error_max for three samples in a row: from the next window on the change fades, as with compensate
+ * off. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */

@@ -110,7 +110,7 @@ static int replay(hsep_predictor *predictor, size_t Np, const double *log, size_
 {
     hsep_predictor_outputs outputs;
     for (size_t k = 0; k < n + Np; k++) {
-        const double x_d_ahead = log[2 * (k < n ? k : n - 1)]; /* behind the end the command stays */
+        const double x_d_ahead = log[2 * (k < n ? k : n - 1)]; /* after the end the command stays */
         const double x_meas = k < Np ? log[0] : log[2 * (k - Np) + 1];
         (void)hsep_predictor_sample(predictor, x_d_ahead, x_meas);
         hsep_predictor_read(predictor, &outputs);

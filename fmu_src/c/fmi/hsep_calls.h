@@ -51,7 +51,7 @@ HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, co
 /* Log an error and return HSEP_REFUSED. */
 HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...);
 
-/* With names, these categories alone are switched on, or these off; a name that is not ours changes nothing. Without
+/* With names, only these categories are switched on, or these off; a name that is not ours changes nothing. Without
  * names, on means everything and off the state after instantiation without logging: warnings and errors. */
 HSEP_API hsep_status
 hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[]);

@@ -128,7 +128,7 @@ HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
 /* Number of values, the time derivatives of inputs included. */
 HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance);
 
-/* Give each window so many samples, which Np becomes; before the initialization. Fails if there is no memory. */
+/* Give each window this many samples, which Np becomes; before the initialization. Fails if there is no memory. */
 HSEP_API hsep_status hsep_instance_resize(hsep_instance *instance, const char *call, size_t window, char message[]);
 
 /* As after the instantiation: start values, no experiment, no state. */

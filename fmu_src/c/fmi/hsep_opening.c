@@ -140,7 +140,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(opening_table, 12);
 
-/* Check a table of so many bytes, and fill the context with what it tells. reason: what is wrong with it. */
+/* Check a table of size bytes, and fill the context with what it tells. reason: what is wrong with it. */
 static hsep_status opening_fill(hsep_context *context, const opening_table *table, size_t size, char reason[])
 {
     uint64_t sum = 0;

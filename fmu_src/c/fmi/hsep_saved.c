@@ -65,7 +65,7 @@ static void saved_free(hsep_saved *saved)
     saved->release(saved);
 }
 
-/* A new saved state with room for a block of so many bytes; NULL, with a message, if there is no memory. */
+/* A new saved state with room for a block of this size, bytes; NULL, with a message, if there is no memory. */
 static hsep_saved *saved_new(hsep_instance *instance, const hsep_call *call, size_t size)
 {
     hsep_saved *saved = hsep_new(instance, sizeof *saved - sizeof saved->header + size);

@@ -159,7 +159,7 @@ static hsep_status fmi2_check_derivatives(
     return HSEP_OK;
 }
 
-/* The derivatives count for the next step alone. Like the values, none is taken if one is refused. */
+/* The derivatives count only for the next step. Like the values, none is taken if one is refused. */
 fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {

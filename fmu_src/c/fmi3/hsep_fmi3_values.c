@@ -26,7 +26,7 @@ FMI3_ACCESS(Int64, hsep_values_integer(number), (double)number)
 FMI3_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
 FMI3_GET(UInt64, (fmi3UInt64)number)
 
-/* Np alone is of this type: arrays take their new size at once, in Configuration Mode, or as soon as the instance is
+/* Only Np is of this type: arrays take their new size at once, in Configuration Mode, or as soon as the instance is
  * there, for importers that know no Configuration Mode. */
 fmi3Status fmi3SetUInt64(
     fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3UInt64 values[], size_t n_values)

@@ -17,7 +17,7 @@
 #include <stddef.h>
 
 #ifdef HSEP_FLOAT32
-#error "FMUs compute in double precision: HSEP_FLOAT32 is for the library alone"
+#error "FMUs compute in double precision: HSEP_FLOAT32 is only for the library"
 #endif
 
 #define HSEP_MESSAGE_SIZE 512 /* bytes of a message buffer, the final 0 included */

@@ -42,7 +42,7 @@ static void text_put(text_sink *sink, char c)
     sink->n++;
 }
 
-/* Put a whole number with at least so many digits. */
+/* Put a whole number with at least this many digits. */
 static void text_put_whole(text_sink *sink, uint64_t number, int least)
 {
     char digits[24];

@@ -12,7 +12,7 @@
 HSEP_API int hsep_text(char to[], size_t size, const char *format, ...);
 HSEP_API int hsep_text_list(char to[], size_t size, const char *format, va_list arguments);
 
-/* Digits behind the first one of the shortest decimal number that reads back as value, which is finite, and its power
+/* Digits after the first one of the shortest decimal number that reads back as value, which is finite, and its power
  * of ten; with HSEP_NO_STDIO 0, as numbers are written alike there. */
 HSEP_API int hsep_text_digits(double value, int *exponent);
 

@@ -78,7 +78,7 @@ static double drive_velocity(const hsep_feed_drive *self) { return hsep_feed_dri
 
 #else
 
-/* Work space for a step lies behind the stage: zeros between steps. */
+/* Work space for a step follows the stage: zeros between steps. */
 static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
 
 static hsep_stage_settings stage_settings(const double values[])

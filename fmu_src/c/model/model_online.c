@@ -35,7 +35,7 @@ typedef struct {
     online_block online; /* its arrays follow */
 } online_state;
 
-/* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
+/* The arrays after the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
 
 /* Write the outputs that both models have. */

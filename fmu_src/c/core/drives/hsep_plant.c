@@ -200,7 +200,7 @@ static double plant_disturbed(const hsep_stage *s, double r, double v_d)
     return of->friction_on == HSEP_FRICTION_COMMAND ? r - of->f * tanh(v_d / of->v_friction) : r;
 }
 
-/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it, under a command that goes on by
+/* One Runge-Kutta step of z, (size,), followed by three more vectors of work space, under a command that goes on by
  * rate, m/s. *v, m/s: a velocity shortly before; that at its beginning. */
 static void plant_stage_internal_step(
     const hsep_stage *s, double z[], double disturbed, double rate, double dt, double *v)

@@ -71,7 +71,7 @@ typedef struct {
     double start;         /* position of rest, m */
     hsep_clock clock;     /* of the instants at which the command is sampled, from the reset */
     double acting;        /* m from start, command that acts now */
-    double last_x_d, v_d; /* m from start, command of the last instant behind the dead time; m/s */
+    double last_x_d, v_d; /* m from start, command of the last instant after the dead time; m/s */
     double v;             /* m/s */
     uint64_t n_modes;
     uint64_t n_line, oldest; /* commands on their way through the dead time; place of the oldest */

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The checksum of so many bytes, 4 bits at a time. */
+/* The checksum of size bytes, 4 bits at a time. */
 static inline uint32_t hsep_crc(const void *bytes, size_t size)
 {
     static const uint32_t table[16] = {0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U,

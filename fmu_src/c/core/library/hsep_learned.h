@@ -37,7 +37,7 @@ typedef struct {
     size_t left;
 } hsep_learned_bytes;
 
-/* Read exactly so many bytes; 0 if there are less. */
+/* Read exactly size bytes; 0 if there are less. */
 HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size);
 
 /* Read the next setting; 0 if there is none, or its name does not end. */

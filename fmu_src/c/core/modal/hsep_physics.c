@@ -185,7 +185,7 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x
 }
 
 /* Add the responses of one mode of count models to n samples of the signals u, their states in registers: a function
- * of its own, as compilers believe restrict of parameters alone. */
+ * of its own, as compilers believe restrict only of parameters. */
 static void physics_respond_abreast(
     hsep_physics *const models[], size_t count, hsep_int mode, const hsep_real *restrict u, hsep_real *restrict x,
     size_t n)

@@ -56,7 +56,7 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x
 
 /* Responses x, m, of count models with the same parameters to the signals u, m, both (n, HSEP_PHYSICS_ABREAST), sample
  * after sample: the same numbers as one model after the other, whose every sample waits for the one before. u is
- * delayed by the dead time; behind count it is finite. The states are carried from call to call. */
+ * delayed by the dead time; after count it is finite. The states are carried from call to call. */
 HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, hsep_real u[], hsep_real x[], size_t n);
 
 #endif

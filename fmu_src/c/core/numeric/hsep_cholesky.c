@@ -188,7 +188,7 @@ HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep
         hsep_real *y = b + first;
         for (hsep_int r = 0; r < height; r++) {
             rows[r] = row;
-            x[r] = row + (height - r); /* behind the panel */
+            x[r] = row + (height - r); /* after the panel */
             row += n - first - r;
         }
         cholesky_forward_rows(rows, upper, y);
@@ -211,7 +211,7 @@ HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_int n, hse
 {
     const hsep_real *row = triangle + (hsep_int)(hsep_triangle(n) - hsep_triangle(n - count));
     hsep_int last = count;
-    for (; last >= 4; last -= 4) { /* four rows share what is behind them */
+    for (; last >= 4; last -= 4) { /* four rows share what follows them */
         const hsep_int beyond = n - last;
         const hsep_real *r3 = row - (beyond + 1), *r2 = r3 - (beyond + 2), *r1 = r2 - (beyond + 3);
         const hsep_real *r0 = r1 - (beyond + 4), *const x[4] = {r0 + 4, r1 + 3, r2 + 2, r3 + 1};

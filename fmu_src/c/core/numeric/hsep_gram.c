@@ -102,7 +102,7 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
     hsep_real *sums = hsep_at(self, self->sums);
     hsep_gram_settle(self);
     self->n_rows *= weight;
-    for (hsep_int i = 0; i < 2 * (hsep_int)hsep_triangle(self->n + 1); i++) { /* carries are behind the sums */
+    for (hsep_int i = 0; i < 2 * (hsep_int)hsep_triangle(self->n + 1); i++) { /* carries follow the sums */
         sums[i] *= weight;
     }
 }

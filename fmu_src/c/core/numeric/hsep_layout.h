@@ -2,7 +2,7 @@
  *
  * One function of a block walks its arrays with a cursor, the end of what is taken so far in words: the offsets and
  * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of
- * one size alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
+ * one size only, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  *
  * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, and hsep_NAME_init fills
  * it with nothing learned; hsep_NAME_lay_out does both for a block that begins with 0. All functions of a block are
@@ -19,7 +19,7 @@
 /* Assert the size of a struct whose members, this many, are words. */
 #define HSEP_ASSERT_WORDS(type, words) HSEP_ASSERT(words_of_##type, sizeof(type) == (words) * sizeof(hsep_real))
 
-/* Words that a struct takes, where the arrays behind it begin. */
+/* Words that a struct takes, where the arrays after it begin. */
 #define HSEP_WORDS(type) ((hsep_real)(sizeof(type) / sizeof(hsep_real)))
 
 /* Take count words at the cursor; return their offset. Counted as a number, so that no size can overflow: an offset of

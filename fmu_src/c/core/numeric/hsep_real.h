@@ -1,7 +1,7 @@
 /* Numbers of the library and whole numbers of the same size, so that a block has no padding.
  *
  * With HSEP_FLOAT32, defined for the library and for what includes hsep.h, numbers have 4 bytes, for processors that
- * compute in single precision alone; README.md says what that costs. FMUs have 8.
+ * compute only in single precision; README.md says what that costs. FMUs have 8.
  *
  * HSEP_EXACT: whole numbers below it are numbers without rounding. HSEP_TINY and HSEP_HUGE: a positive number beyond
  * the range of single precision, or there what stands for it. */

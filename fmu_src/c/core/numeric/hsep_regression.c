@@ -7,7 +7,7 @@
 
 /* The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
  * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
- * vectors of a tile's rows without knowing how long they are. Columns behind the target are 0 for ever.
+ * vectors of a tile's rows without knowing how long they are. Columns after the target are 0 for ever.
  * Each tile is followed by its carry: the rounding errors of its entries, to be added back with the next row. Without
  * it an entry drifts at random, by half a unit in its last place a row. */
 #define REGRESSION_TILE 4
@@ -163,7 +163,7 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
     const hsep_int n = self->n, n_tiles = self->n_tiles;
     const hsep_real *tile = hsep_at_const(self, self->tiles) + REGRESSION_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
-    /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
+    /* U w = z from the last row to the first; z is column n, and what follows it is 0. */
     for (hsep_int band = n_tiles; band-- > 0;) {
         const hsep_int first = REGRESSION_TILE * band,
                        height = n - first < REGRESSION_TILE ? n - first : REGRESSION_TILE;

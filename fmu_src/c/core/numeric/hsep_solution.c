@@ -38,7 +38,7 @@ HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int 
     (void)solution_lay_out(self, n_head, n_tail, room);
 }
 
-/* The rows of the factor behind the head. */
+/* The rows of the factor after the head. */
 static hsep_real *solution_tail(hsep_solution *self)
 {
     const hsep_real before = hsep_triangle(self->n_head + self->n_tail + 1) - hsep_triangle(self->n_tail + 1);
