@@ -153,7 +153,7 @@ HSEP_API int hsep_compensator_change(
 
 /* End a trip where the level of the reset rises; what was learned before stays. It trips where x_meas is farther from
  * x_d than following_error_max for three samples in a row: from the next window on the change fades, as with compensate
- * off. */
+ * off. With averaging nothing that is measured above it, or until the reset, is learned. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */

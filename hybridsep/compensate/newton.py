@@ -137,7 +137,7 @@ class PlanModel:
         return STATIC in self._solved
 
     def outgrows(self, factor: float) -> bool:
-        """Return whether the unmodified commands, and the physics model behind them, are faster than all before.
+        """Return whether the unmodified commands, and the physics model behind them, are faster than all of the run.
 
         They are, if they exceed the fastest motion so far by ``factor``. Both count, as commands may have corners that
         no drive follows, and a model may overshoot them.
@@ -145,7 +145,7 @@ class PlanModel:
         late, n = len(self._late), len(self.of_previous_plan.e_h)
         window = self._window(self._path[late:n])
         fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
-        return not fastest <= factor * self._model.learned.fastest
+        return not fastest <= factor * self._model.run.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the horizon, and what is late before it, under commands ``x_d``, ``(n,)``, m."""

@@ -2,7 +2,7 @@
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan, which fades
-to no change. Where its own plan runs away, it plans none for a time. A motion faster than all before is compensated
+to no change. Where its own plan runs away, it plans none for a time. A motion faster than all of its run is compensated
 with at most half of the largest change.
 """
 
@@ -222,9 +222,10 @@ RETRY = 0.5
 each further one of a run."""
 
 _FASTER, _UNPROVEN = 1.25, 0.5
-"""Speed of the preview, relative to the fastest motion so far, above which plans may change the command by this share
-of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that error:
-where a model that has not been compared with such a motion asks for more, it is wrong."""
+"""Speed of the preview, relative to the fastest motion of the run so far, above which plans may change the command by
+this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
+error: where a model that has not been compared with such a motion asks for more, it is wrong. A log does not tell what
+the drive does under the compensator's commands, so what was learned before the run does not count."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's

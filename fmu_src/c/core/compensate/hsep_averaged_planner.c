@@ -49,13 +49,14 @@ static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, con
     return fastest;
 }
 
-/* Whether the unmodified commands, and the physics model behind them, outgrow all before by HSEP_PLANNING_FASTER. */
+/* Whether the unmodified commands, and the physics model behind them, outgrow all of the run by HSEP_PLANNING_FASTER.
+ */
 static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
     const hsep_real of_command = averaged_planner_fastest(self, hsep_at(self, self->command));
     const hsep_real of_model = averaged_planner_fastest(self, hsep_at(self, self->x_pb));
-    return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
+    return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->fastest);
 }
 
 /* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
