@@ -30,7 +30,6 @@ from ..online.look_ahead import LookAhead, PublishedWindow, SepState
 from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
-from ..predict.window import Prediction
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis
@@ -65,6 +64,8 @@ class SepCompensator:
         If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``
         without averaging.
     """
+
+    _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_delta_before", "_x_d_before")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
@@ -222,14 +223,12 @@ class SepCompensator:
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
-        self._pending = PendingPlan(
-            chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.runs_away
-        )
+        now = command[:Np].copy()
+        self._pending = PendingPlan(chosen.coefficients, delta, now, chosen.state, chosen.runs_away)
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
-        x_d = self._pending.x_d
         return PublishedWindow(
-            x_d, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
+            now, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
         )
 
     @one_blas_thread
@@ -278,25 +277,12 @@ class SepCompensator:
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
-        pending = self._pending
-        meta = {
-            "settings": self.settings.as_table(),
-            "lead_in": self.lead_in,
-            "state_before": int(self._state_before),
-            "paused": self._planning.paused,
-            "pause": self._planning.pause,
-            "pending": pending and [int(pending.state), int(pending.runs_away), pending.prediction.n_warm_up],
-        }
-        arrays = {
-            "previous_plan": self._previous_plan,
-            "delta_before": self._delta_before,
-            "x_d_before": self._x_d_before,
-            **arrays_of(self.monitor),
-        }
-        if pending is not None:
-            arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
-            arrays |= {name: getattr(pending.prediction, name) for name in ("x_pb", "e_h", "x_h_std")}
+        meta = {"settings": self.settings.as_table(), "is_planned": self.is_planned}
+        arrays = arrays_of((self._saved(), self._pending or ()))
         return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
+
+    def _saved(self) -> tuple[Any, ...]:
+        return *(getattr(self, name) for name in self._SAVED), self._planning.paused, self._planning.pause
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> SepCompensator:
@@ -312,20 +298,11 @@ class SepCompensator:
             predictor, kept = (HybridPredictor.from_bytes(parts["predictor"], disturbances) for _ in range(2))
             compensator = cls(predictor, CompensatorSettings.from_table(meta["settings"]))
             compensator.predictor = kept  # the constructor has restarted the other one
-            compensator.lead_in, compensator._state_before = meta["lead_in"], SepState(meta["state_before"])
-            compensator._planning.paused, compensator._planning.pause = meta["paused"], meta["pause"]
-            compensator.monitor = restored(compensator.monitor, arrays)
-            compensator._previous_plan, compensator._delta_before = arrays["previous_plan"], arrays["delta_before"]
-            compensator._x_d_before = arrays["x_d_before"]
-            if meta["pending"]:
-                state, runs_away, n_warm_up = meta["pending"]
-                prediction = Prediction(arrays["x_pb"], arrays["e_h"], arrays["x_h_std"], n_warm_up)
-                compensator._pending = PendingPlan(
-                    arrays["coefficients"],
-                    arrays["delta"],
-                    arrays["x_d"],
-                    prediction,
-                    SepState(state),
-                    bool(runs_away),
-                )
+            nothing = np.zeros(compensator.predictor.Np)
+            pending = PendingPlan(compensator._previous_plan, nothing, nothing, SepState.OFF, False)
+            like = compensator._saved(), pending if meta["is_planned"] else ()
+            (*saved, compensator._planning.paused, compensator._planning.pause), found = restored(like, arrays)
+            for name, value in zip(cls._SAVED, saved, strict=True):
+                setattr(compensator, name, value)
+            compensator._pending = found or None
         return compensator

@@ -34,7 +34,6 @@ class PendingPlan:
     # (Np,), m: change of the command, and commanded position
     delta: Array
     x_d: Array
-    prediction: Prediction  # under the modified command
     state: SepState  # model of the plan
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
 
