@@ -41,6 +41,7 @@ class _Parameters(ctypes.Structure):
         ("settings", PredictorPart),
         ("averaging", AveragingPart),
         ("preview", ctypes.c_uint64),
+        ("horizon", ctypes.c_uint64),
         ("n_init", ctypes.c_double),
         ("planned", ctypes.c_int),
         ("n_modes", ctypes.c_uint64),
@@ -105,6 +106,7 @@ class CoreVariant:
         parameters = _Parameters(
             _filled(PredictorPart, fmi),
             _filled(AveragingPart, fmi),
+            settings.Np,
             settings.Np,
             float(settings.Np),
             0,

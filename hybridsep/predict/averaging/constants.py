@@ -38,10 +38,10 @@ class AveragingConstants:
     # larger was never seen; 2 is up to 2 % worse, a line 1.8 times. The bound on the command's expert grows with its
     # steps, as it is linear in the command: without, CNC axes that creep before a motion have 3 and 4 times the error
     bound: float = 1.2
-    growth: float = 30.0  # largest growth of that bound
     # growth of the commanded velocity, for each window that earlier runs weigh, that makes the static features begin
     # anew, as they were learned at a creep: without, the rounding of a command at rest sets their scale, and drives
-    # have to 1.4 times the error; where earlier runs do not count, a milling machine forgets them in mid-part
+    # have to 1.4 times the error; where earlier runs do not count, a milling machine forgets them in mid-part. The
+    # bound on the command's expert grows by no more
     velocity_jump: float = 1000.0
     # largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile
     warm_windows_max: float = 30.0

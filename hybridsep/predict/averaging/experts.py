@@ -207,7 +207,7 @@ class ExpertWindow:
         What follows the command alone is linear in it: it may be larger than anything so far by as much.
         """
         before = self.model.learned.largest_step
-        return min(self.scales.step / before, CONSTANTS.growth) if before > 0.0 else 1.0
+        return min(self.scales.step / before, CONSTANTS.velocity_jump) if before > 0.0 else 1.0
 
 
 @dataclass(frozen=True)

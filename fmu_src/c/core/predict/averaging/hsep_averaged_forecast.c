@@ -228,7 +228,7 @@ HSEP_API void hsep_averaged_forecast(
     const int outgrown = averaged_scale(self, x_d, x_pb, path, n_path);
     const hsep_real before = self->learned.largest_step;
     self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
-    self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_GROWTH) : 1.0;
+    self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_VELOCITY_JUMP) : 1.0;
     averaged_solve(self, outgrown);
     self->settled = 0;
     memset(hsep_at(self, self->stacked), 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
