@@ -277,18 +277,16 @@ class AveragedPlanning(Planning):
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, x_d, preview.delta_before)
             last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
-            is_last = is_better(last.cost, of_physics.cost)
             if most is SepState.HYBRID and not self.paused:
                 bounds = self.limits(preview, may_turn=True, change=change)
-                start = planner.point(previous_plan)
-                hybrid = planner.plan(start, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
+                hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
                     values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.basis.horizon)
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
                         return ChosenPlan(SepState.HYBRID, hybrid.coefficients, scales)
-            if is_last:
+            if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, previous_plan, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
 

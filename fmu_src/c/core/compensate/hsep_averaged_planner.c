@@ -105,6 +105,7 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     for (hsep_int k = 0; k < self->horizon; k++) {
         target[k] = task->x_d[k] - self->start - x_pb[self->horizon - 1 - k];
     }
+    averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n); /* as predicted last */
     hsep_planner_open(task->planner, task->x_d);
 }
 
@@ -227,12 +228,14 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
     return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
 }
 
-/* Take the plan whose cost is lowest. */
+/* Take the plan whose cost is lowest; the physics model's was predicted last. */
 static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    hsep_int plan = self->is_last ? self->rest : self->of_physics;
-    self->planned = !self->is_last;
-    if (self->follows && averaged_planner_better(self->cost, self->cost_of_physics)) {
+    const hsep_real of_physics = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
+    const int is_last = averaged_planner_better(self->cost_of_rest, of_physics);
+    hsep_int plan = is_last ? self->rest : self->of_physics;
+    self->planned = !is_last;
+    if (self->follows && averaged_planner_better(self->cost, of_physics)) {
         if (averaged_planner_runs_away(self, task)) {
             self->paused = self->pause;
             self->pause *= 2;
@@ -321,12 +324,15 @@ static hsep_real averaged_planner_left(
     const hsep_int window = self->late + self->Np, behind = self->horizon - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
+    if (self->judges) {
+        left += 2.0 * work->predict; /* of the physics model's plan */
+    }
     if (self->place == 0 && self->judges) {
-        left += 2.0 * work->predict + (hsep_real)(window - first + behind) * work->sample +
+        left += (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
     if (self->place == 0 && self->planned) {
-        left += 9.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
+        left += 15.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
                 (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
@@ -336,7 +342,7 @@ static hsep_real averaged_planner_left(
         for (hsep_int j = pinned; j < self->acting; j += HSEP_PHYSICS_ABREAST) {
             newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
-        left += 2.0 * work->predict + HSEP_AVERAGED_STEPS * newton;
+        left += HSEP_AVERAGED_STEPS * newton;
     }
     return left;
 }
@@ -377,7 +383,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, (self->follows ? 9.0 : 6.0) * work.number);
+            AVERAGED_PLANNER_YIELD(2, (self->follows ? 15.0 : 12.0) * work.number);
             averaged_planner_open(self, task);
             AVERAGED_PLANNER_YIELD(3, HSEP_WORK_NUMBER * work.pairs);
             hsep_planner_aim(planner, task->spline, hsep_at(self, self->target));
@@ -397,79 +403,65 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
 
-        /* Which of the two is better */
-        self->samples = 0;
-        if (self->judges) {
-            AVERAGED_PLANNER_YIELD(7, work.predict);
-            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(8, work.predict);
-            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
-            self->cost_of_physics = averaged_planner_cost(self, task, of_physics);
-            self->is_last = (hsep_int)averaged_planner_better(self->cost, self->cost_of_physics);
-            self->samples = 0;
-        }
-        if (self->follows) { /* predicted last, with the variances that all plans have */
-            AVERAGED_PLANNER_YIELD(9, work.predict);
-            averaged_planner_predict(self, task, rest, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(10, work.predict);
-            averaged_planner_predict(self, task, rest, all - self->samples, 0);
-            self->cost = averaged_planner_cost(self, task, rest);
-        }
-
         /* Newton steps from the remainder of the last plan, as long as they lower the cost */
+        self->cost_of_rest = self->cost;
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
-            averaged_planner_copy(self, c, rest);
             hsep_planner_follow_friction(planner);
         }
         self->gains = self->follows;
         for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
-            AVERAGED_PLANNER_YIELD(11, work.linearise);
+            AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = self->n_pinned; self->spline < self->acting;) {
-                AVERAGED_PLANNER_YIELD(12, hsep_linearised_work(linearised, task->model, self->spline * spacing));
+                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = self->n_pinned; self->spline < self->n;) {
                 AVERAGED_PLANNER_YIELD(
-                    13, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
+                    9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, task);
             }
-            AVERAGED_PLANNER_YIELD(14, work.factor);
+            AVERAGED_PLANNER_YIELD(10, work.factor);
             hsep_planner_complete(planner, self->n_pinned);
             if (!hsep_planner_factor(planner, 1)) {
                 break;
             }
-            AVERAGED_PLANNER_YIELD(15, work.solve);
+            AVERAGED_PLANNER_YIELD(11, work.solve);
             if (!averaged_planner_solve(self, task)) {
                 break;
             }
             while (self->solving) {
-                AVERAGED_PLANNER_YIELD(16, work.step);
+                AVERAGED_PLANNER_YIELD(12, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
                 self->samples = 0;
-                AVERAGED_PLANNER_YIELD(17, work.predict);
+                AVERAGED_PLANNER_YIELD(13, work.predict);
                 averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
-                AVERAGED_PLANNER_YIELD(18, work.predict);
+                AVERAGED_PLANNER_YIELD(14, work.predict);
                 averaged_planner_predict(self, task, c, all - self->samples, 0);
                 averaged_planner_judge(self, task);
             }
         }
 
-        /* The best of them */
+        /* The best of them and the physics model's plan */
         self->left = averaged_planner_left(self, task, &work);
+        self->samples = 0;
         if (self->judges) {
+            AVERAGED_PLANNER_YIELD(15, work.predict);
+            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
+            AVERAGED_PLANNER_YIELD(16, work.predict);
+            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
             averaged_planner_compare(self, task);
         }
 
         /* The window under the plan, and its variances */
         for (self->samples = 0; self->samples < self->late + self->Np;) {
             AVERAGED_PLANNER_YIELD(
-                19, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
+                17, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
             (void)averaged_planner_vary(self, task, &work, c);
         }
         break;

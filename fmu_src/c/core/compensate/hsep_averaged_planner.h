@@ -44,9 +44,8 @@ typedef struct {
     hsep_int planned;        /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int paused;         /* windows that the averaged model does not plan, now */
     hsep_int pause;          /* and after the next of its plans that runs away */
-    hsep_int is_last;        /* whether the remainder of the last plan is better than the physics model's plan */
     hsep_real cost;          /* m2, of the best plan so far, */
-    hsep_real cost_of_physics; /* and of the physics model's */
+    hsep_real cost_of_rest;  /* and of the remainder of the last plan */
     hsep_real start;           /* m, position of rest */
     hsep_real next;            /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;            /* and that this part and all after it take at most */
@@ -65,7 +64,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 36);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 35);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
