@@ -7,7 +7,7 @@ and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview (recedin
 samples only the splines that begin in the first window are applied, then the next plan follows from new measurements.
 
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
-Every spline ends within its plan, so a plan returns to ``x_d`` behind the horizon over which its error counts, and its
+Every spline ends within its plan, so a plan returns to ``x_d`` at its end, where its error counts least, and its
 remainder keeps the limits. The next plan starts from that remainder: there is always a feasible plan, and where no
 other can be computed the remainder is followed.
 """

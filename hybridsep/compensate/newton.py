@@ -1,6 +1,7 @@
 """Plan on the averaged model, by Newton steps that follow the slope of its disturbances.
 
-``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
+``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where the weights ``w`` of the errors
+fall to the end of a plan (``splines.py``), and where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. At most three Gauss-Newton steps begin
 at the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
 and goes to its minimum, or less far if only that lowers the cost; the next window goes on from there. The first samples
@@ -95,16 +96,16 @@ class DisturbanceSlopes(NamedTuple):
 
 
 class PlanModel:
-    """Averaged model with the weights of this instant, as a function of the commands of a horizon.
+    """Averaged model with the weights of this instant, as a function of the commands of a plan.
 
     Parameters
     ----------
     model : AveragedModel
-        Where the measurements end, which is the beginning of the horizon unless they are late.
+        Where the measurements end, which is the beginning of the plan unless they are late.
     state : (n_state,) array
         State of ``G_pb`` there.
     late : (n_late,) array, m
-        Commands between there and the horizon, relative to the start.
+        Commands between there and the plan, relative to the start.
     start : float, m
     x_d : (n,) array, m
         Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
@@ -126,7 +127,7 @@ class PlanModel:
         self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
 
     def _window(self, x_d: Array) -> ResidualWindow:
-        """Return the horizon under commands ``x_d``, and what is late before it."""
+        """Return the plan under commands ``x_d``, and what is late before it."""
         command = np.concatenate((self._late, x_d))
         x_pb, _ = self._discrete.forced_response(self._state, command)
         return ResidualWindow(command, x_pb, self._start, self._path)
@@ -148,11 +149,11 @@ class PlanModel:
         return not fastest <= factor * self._model.run.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
-        """Predict the horizon, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
+        """Predict the plan, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
         return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)
 
     def position(self, at: AveragedForecast) -> Array:
-        """Return ``x_h`` of :meth:`predict` over the horizon, ``(n,)``, m."""
+        """Return ``x_h`` of :meth:`predict` over the plan, ``(n,)``, m."""
         return (at.window.x_pb + at.e_h)[len(self._late) :]
 
     def slope(self, at: AveragedForecast, changes: Array, passed: Array, reach: float) -> Array:
@@ -297,7 +298,7 @@ class PlannedPoint:
 
     coefficients: Array  # (3 + n_free,), m
     prediction: AveragedForecast
-    x_h: Array  # (horizon,), m, relative to the start
+    x_h: Array  # (preview,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
     cost: float  # m²
 
@@ -310,8 +311,8 @@ class AveragedPlanner:
     basis : SplineBasis
     jerk_weight : float
     model : PlanModel
-        Of the horizon that the window begins.
-    x_d : (horizon,) array, m
+        Of the plan that the window begins.
+    x_d : (preview,) array, m
         Commanded positions, relative to the start.
     delta_before : (3,) array, m
         Last three values of δ.
@@ -355,16 +356,16 @@ class AveragedPlanner:
         bounds : Bounds
         n_pinned : int
             Coefficients that the plan does not change.
-        passed : (horizon, n_free) array
+        passed : (preview, n_free) array
             Free splines filtered by ``G_pb``.
         reach : float
             Of friction's slope, as of :meth:`PlanModel.slope`.
         """
-        splines, third = self._basis.values[: self._basis.horizon, N_DECIDED:], self._basis.third[:, N_DECIDED:]
+        splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         decided, at = np.split(start.coefficients, [N_DECIDED])
-        W = self._model.slope(start.prediction, splines, passed, reach)
+        W = self._basis.weight[:, None] * self._model.slope(start.prediction, splines, passed, reach)
         P = W.T @ W + self._jerk_weight * (third.T @ third)
-        target = self._x_d - start.x_h + W @ at
+        target = self._basis.weight * (self._x_d - start.x_h) + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
         cost = PlanCost.regular(P, v, n_pinned)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=TOLERANCE)
@@ -376,6 +377,6 @@ class AveragedPlanner:
     def _point(self, coefficients: Array, prediction: AveragedForecast) -> PlannedPoint:
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(prediction)
-        error = self._x_d - x_h
+        error = self._basis.weight * (self._x_d - x_h)
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
         return PlannedPoint(coefficients, prediction, x_h, third, cost)

@@ -126,13 +126,15 @@ class Planning(ABC):
     ) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none.
 
-        ``x_d``, ``(horizon,)``, m, counts from where ``free`` does.
+        ``x_d``, ``(preview,)``, m, counts from where ``free`` does.
         """
         previous_plan = preview.previous_plan
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
-        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight)
+        # the paper's plans, which C recomputes in one sample, count every sample alike
+        weight = self.basis.weight if self.ALWAYS else None
+        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, weight)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((decided, found.x))
 
@@ -159,11 +161,11 @@ class PaperPlanning(Planning):
             return ChosenPlan(SepState.OFF, preview.previous_plan, None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
-            operator = predictor.operator(self.basis.horizon)  # Eq. (3)
+            operator = predictor.operator(self.preview)  # Eq. (3)
         for state in candidates:
             hybrid = state is SepState.HYBRID
             g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
-            found = self.affine_plan(g, free, preview.command[: self.basis.horizon], preview, bounds)
+            found = self.affine_plan(g, free, preview.command, preview, bounds)
             if found is not None:
                 return ChosenPlan(state, found, None)
         return ChosenPlan(SepState.OFF, preview.previous_plan, None)
@@ -262,26 +264,26 @@ class AveragedPlanning(Planning):
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
         assert predictor.start is not None
         path = preview.command - predictor.start
-        model, x_d = self._model(predictor, path, preview), path[: self.basis.horizon]
+        model = self._model(predictor, path, preview)
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
-        g, free = predictor.physics_operator(self.basis.horizon)
+        g, free = predictor.physics_operator(self.preview)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        physics = self.affine_plan(g, free, x_d, preview, self.limits(preview, change=change), TOLERANCE)
+        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), TOLERANCE)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if predictor.k < predictor.n_init or not model.has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
-            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, x_d, preview.delta_before)
+            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
             if most is SepState.HYBRID and not self.paused:
                 bounds = self.limits(preview, may_turn=True, change=change)
                 hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
-                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.basis.horizon)
+                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.preview)
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
@@ -307,5 +309,5 @@ class AveragedPlanning(Planning):
         assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path[: self.basis.horizon] + self.basis.delta(preview.previous_plan)
+            x_d = path + self.basis.delta(preview.previous_plan)
             return PlanModel(averaged, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)

@@ -3,7 +3,7 @@
 ``δ(k) = Σ_j c_j B(k/spacing − j)`` on a uniform knot grid that continues from window to window. ``B`` is non-zero over
 four knot intervals, so three splines that began before a plan overlap it, with coefficients that are already decided.
 The last spline ends four samples before the plan does: after the plan the command is ``x_d`` itself, in position and
-in its first three differences. The tracking error counts over the horizon, which is the whole plan.
+in its first three differences.
 """
 
 from __future__ import annotations
@@ -26,9 +26,12 @@ N_DECIDED = 3
 _END = PLAN_END
 """Samples without change at the end of a plan, which the settings leave room for."""
 
-_RETURN = 0
-"""Share of a plan behind its horizon, percent. With 25 a servo that lags by 54 ms has half of the error, and the
-stage's Y axis, whose model cannot be inverted within the horizon, has 15 times of it, warm: so all of a plan counts."""
+_LEAST = 0.1
+"""Weight of the last error of a plan of the averaged model: from the middle of the plan on the weights fall to it. A
+plan returns to the command at its end, which takes long within the limits of a fast motion, and its end is never
+carried out: by then other plans have replaced it. Errors that count in full there leave four times the error to a servo
+that lags by 54 ms, in plans of 200 ms. With errors that do not count at all, plans on a model with zeros in the right
+half plane grow from window to window where the preview is short."""
 
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""
@@ -70,13 +73,15 @@ class SplineBasis:
     spacing : int
         Samples between knots.
     Np : int
-        Samples of the window that begins the plan; the horizon is at least as long.
+        Samples of the window that begins the plan: all of them count alike.
     """
 
     def __init__(self, preview: int, spacing: int, Np: int) -> None:
         width = 4 * spacing
         self.preview, self.spacing = preview, spacing
-        self.horizon = max(Np, preview - preview * _RETURN // 100)
+        begin = max(Np, preview // 2)
+        falling = np.arange(preview - begin, 0, -1) / (preview - begin + 1)
+        self.weight: Array = np.concatenate((np.ones(begin), np.maximum(_LEAST, falling)))
         self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
         # Tails of the splines at −3, −2, −1 spacings, then the free splines
@@ -88,22 +93,31 @@ class SplineBasis:
         self.third: Array = np.diff(extended, 3, axis=0)
 
     def delta(self, coefficients: Array) -> Array:
-        """Return the change of the command over the horizon, ``(horizon,)``, m."""
-        return np.asarray(self.values[: self.horizon] @ coefficients)
+        """Return the change of the command over the plan, ``(preview,)``, m."""
+        return np.asarray(self.values @ coefficients)
 
     def filtered(self, g: Array) -> Array:
-        """Return the free splines filtered by the impulse response ``g``, ``(horizon, n_free)``."""
+        """Return the free splines filtered by the impulse response ``g``, ``(preview, n_free)``."""
         # Time-invariance: one spline is filtered, the others are its shifts
-        return _shifts(np.asarray(lfilter(g, [1.0], self._spline[: self.horizon])), self.n_free, self.spacing)
+        return _shifts(np.asarray(lfilter(g, [1.0], self._spline)), self.n_free, self.spacing)
 
-    def cost(self, g: Array, free: Array, x_d: Array, decided: Array, before: Array, jerk_weight: float) -> PlanCost:
-        """Return ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
+    def cost(
+        self,
+        g: Array,
+        free: Array,
+        x_d: Array,
+        decided: Array,
+        before: Array,
+        jerk_weight: float,
+        weight: Array | None = None,
+    ) -> PlanCost:
+        """Return ``‖weight (x_d − G (x_d + δ) − free)‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
 
         Parameters
         ----------
-        g, free : (horizon,) arrays
+        g, free : (preview,) arrays
             First column of ``G``, and the free response, m; eq. (3).
-        x_d : (horizon,) array, m
+        x_d : (preview,) array, m
             Commanded positions.
         decided : (3,) array, m
             Decided coefficients.
@@ -111,12 +125,16 @@ class SplineBasis:
             Last three values of δ.
         jerk_weight : float
             Weight of the third differences.
+        weight : (preview,) array, optional
+            Of the errors; all count alike without it.
         """
         delta = self.values[:, :N_DECIDED] @ decided
         # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
-        target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta[: self.horizon]))
+        target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta))
         third_decided = np.diff(np.concatenate((before, delta)), 3)
         W, D = self.filtered(g), self.third[:, N_DECIDED:]
+        if weight is not None:
+            W, target = weight[:, None] * W, weight * target
         P = W.T @ W + jerk_weight * (D.T @ D)
         return PlanCost.regular(P, W.T @ target - jerk_weight * (D.T @ third_decided))
 

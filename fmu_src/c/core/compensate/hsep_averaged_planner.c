@@ -32,18 +32,18 @@ static void averaged_planner_command(
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    for (hsep_int k = 0; k < self->horizon; k++) {
-        const hsep_int j = self->horizon - 1 - k;
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_int j = self->preview - 1 - k;
         command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
         hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
 }
 
-/* Largest change from sample to sample of a signal over the horizon and the late samples, m. */
+/* Largest change from sample to sample of a signal over the plan and the late samples, m. */
 static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, const hsep_real x[])
 {
     hsep_real fastest = 0.0;
-    for (hsep_int j = 1; j < self->horizon + self->late; j++) {
+    for (hsep_int j = 1; j < self->preview + self->late; j++) {
         fastest = hsep_fmax(fastest, hsep_fabs(x[j - 1] - x[j]));
     }
     return fastest;
@@ -79,10 +79,11 @@ static void averaged_planner_predict(
 static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const hsep_real *weight = hsep_at(self, self->weight);
     hsep_real error = 0.0;
-    for (hsep_int k = 0; k < self->horizon; k++) {
-        const hsep_int j = self->horizon - 1 - k;
-        const hsep_real e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_int j = self->preview - 1 - k;
+        const hsep_real e = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
         error += e * e;
     }
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
@@ -91,19 +92,17 @@ static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_a
 /* Begin the linearisations of a window and the physics model's plan. */
 static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_real *x_pb = hsep_at(self, self->x_pb);
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_linearised_change change = {
-        .commands = hsep_splines_shape(splines),
-        .n = 4 * splines->spacing < self->horizon ? 4 * splines->spacing : self->horizon,
-        .passed = task->spline};
+        .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
     hsep_real *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
     if (self->follows) {
         hsep_linearised_begin((hsep_linearised *)hsep_at(self, self->linearised), task->model, &change);
     }
     averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED);
-    for (hsep_int k = 0; k < self->horizon; k++) {
-        target[k] = task->x_d[k] - self->start - x_pb[self->horizon - 1 - k];
+    for (hsep_int k = 0; k < self->preview; k++) {
+        target[k] = weight[k] * weight[k] * (task->x_d[k] - self->start - x_pb[self->preview - 1 - k]);
     }
     averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n); /* as predicted last */
     hsep_planner_open(task->planner, task->x_d);
@@ -113,13 +112,13 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
 static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    const hsep_real *e_h = hsep_at(self, self->e_h);
+    const hsep_real *e_h = hsep_at(self, self->e_h), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
-    for (hsep_int k = 0; k < self->horizon; k++) { /* x_d - x_h, to which W c is added */
-        const hsep_int j = self->horizon - 1 - k;
-        target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    for (hsep_int k = 0; k < self->preview; k++) { /* weighted x_d - x_h, to which W c is added */
+        const hsep_int j = self->preview - 1 - k;
+        target[k] = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
     }
 }
 
@@ -127,15 +126,16 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
 static hsep_real *averaged_planner_column_of(hsep_averaged_planner *self, hsep_int j, hsep_int spacing)
 {
     const hsep_int first = self->n_pinned, i = j - first;
-    return hsep_at(self, self->W) + (i * (self->horizon - spacing * first) - spacing * (i * (i - 1) / 2));
+    return hsep_at(self, self->W) + (i * (self->preview - spacing * first) - spacing * (i * (i - 1) / 2));
 }
 
-/* Changes of x_h by the next splines, as many as are computed side by side. */
+/* Weighted changes of x_h by the next splines, as many as are computed side by side. */
 static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, first = self->spline;
-    const hsep_int left = self->acting - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+    const hsep_int left = self->n - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
     const hsep_real *at = hsep_at(self, self->best) + HSEP_N_DECIDED;
+    const hsep_real *weight = hsep_at(self, self->weight);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
     for (hsep_int c = 0; c < count; c++) {
         columns[c] = averaged_planner_column_of(self, first + c, spacing);
@@ -143,7 +143,11 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     hsep_linearised_columns(
         (hsep_linearised *)hsep_at(self, self->linearised), task->model, first * spacing, spacing, count, columns);
     for (hsep_int j = first; j < first + count; j++) {
-        hsep_axpy(target + j * spacing, at[j], columns[j - first], self->horizon - j * spacing);
+        hsep_real *column = columns[j - first];
+        for (hsep_int k = j * spacing; k < self->preview; k++) {
+            column[k - j * spacing] *= weight[k];
+        }
+        hsep_axpy(target + j * spacing, at[j], column, self->preview - j * spacing);
     }
     self->spline += count;
 }
@@ -153,33 +157,30 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
 static void averaged_planner_products(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_int n = self->n, acting = self->acting, spacing = splines->spacing, first = self->n_pinned;
-    const hsep_int horizon = self->horizon, begin = self->spline;
+    const hsep_int n = self->n, spacing = splines->spacing, first = self->n_pinned;
+    const hsep_int preview = self->preview, begin = self->spline;
     const hsep_int end = begin + HSEP_AVERAGED_PRODUCTS < n ? begin + HSEP_AVERAGED_PRODUCTS : n;
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
     hsep_real *P = hsep_planner_quadratic(task->planner, begin);
     for (hsep_int i = begin; i < end; i++) {
         const hsep_real *left = averaged_planner_column_of(self, i, spacing);
         hsep_int j = i; /* column j begins (j - i) spacing later */
-        for (; j + 4 <= acting; j += 4, P += 4) {
+        for (; j + 4 <= n; j += 4, P += 4) {
             const hsep_real *rights[4]; /* from where the last of them begins */
             for (hsep_int c = 0; c < 4; c++) {
                 rights[c] = averaged_planner_column_of(self, j + c, spacing) + (3 - c) * spacing;
             }
-            hsep_dot_four(left + (j + 3 - i) * spacing, rights, horizon - (j + 3) * spacing, P);
+            hsep_dot_four(left + (j + 3 - i) * spacing, rights, preview - (j + 3) * spacing, P);
             for (hsep_int c = 0; c < 3; c++) {
                 const hsep_int before = (3 - c) * spacing;
                 P[c] += hsep_dot(left + (j + c - i) * spacing, rights[c] - before, before);
             }
         }
-        for (; j < acting; j++) {
-            const hsep_real *right = averaged_planner_column_of(self, j, spacing);
-            *P++ = hsep_dot(left + (j - i) * spacing, right, horizon - j * spacing);
-        }
         for (; j < n; j++) {
-            *P++ = 0.0;
+            const hsep_real *right = averaged_planner_column_of(self, j, spacing);
+            *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
         }
-        v[i - first] = i < acting ? hsep_dot(left, target + i * spacing, horizon - i * spacing) : 0.0;
+        v[i - first] = hsep_dot(left, target + i * spacing, preview - i * spacing);
     }
     self->spline = end;
 }
@@ -222,7 +223,7 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
 static int averaged_planner_runs_away(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real share = hsep_planner_splines(task->planner)->share[0];
-    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->horizon) * share;
+    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * share;
     const hsep_real longer = hsep_planner_at_bound(task->planner, hsep_at_const(self, self->best)) -
                              hsep_planner_at_bound(task->planner, hsep_at_const(self, self->of_physics));
     return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
@@ -249,7 +250,7 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
 
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
-    hsep_real number;    /* one of every sample of the horizon */
+    hsep_real number;    /* one of every sample of the plan */
     hsep_real commands;  /* commands of a plan, and their disturbances */
     hsep_real sample;    /* a sample of its prediction, with its variance, */
     hsep_real row;       /* and a row of features for variances */
@@ -264,8 +265,8 @@ typedef struct {
 static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
-    const hsep_real all = (hsep_real)(self->horizon + self->late), n = (hsep_real)(self->n - self->n_pinned);
-    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->horizon, .pairs = n * n};
+    const hsep_real all = (hsep_real)(self->preview + self->late), n = (hsep_real)(self->n - self->n_pinned);
+    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview, .pairs = n * n};
     hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
     work.sample = run;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
@@ -294,9 +295,9 @@ static hsep_real averaged_planner_of_products(
 {
     const hsep_real spacing = (hsep_real)hsep_planner_splines(task->planner)->spacing;
     hsep_real sum = 0.0;
-    for (hsep_int i = begin; i < end && i < self->acting; i++) {
-        const hsep_real middle = 0.5 * (hsep_real)(i + self->acting - 1);
-        sum += (hsep_real)(self->acting - i) * ((hsep_real)self->horizon - spacing * middle + 0.5 * HSEP_WORK_NUMBER);
+    for (hsep_int i = begin; i < end && i < self->n; i++) {
+        const hsep_real middle = 0.5 * (hsep_real)(i + self->n - 1);
+        sum += (hsep_real)(self->n - i) * ((hsep_real)self->preview - spacing * middle + 0.5 * HSEP_WORK_NUMBER);
     }
     return sum;
 }
@@ -306,7 +307,7 @@ static hsep_real averaged_planner_vary(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[])
 {
     const hsep_int window = self->late + self->Np, is_within = self->samples < window;
-    const hsep_int left = (is_within ? window : self->late + self->horizon) - self->samples;
+    const hsep_int left = (is_within ? window : self->late + self->preview) - self->samples;
     const hsep_int apart = is_within ? 1 : HSEP_NEWTON_APART, most = apart * HSEP_AVERAGED_VARIED;
     const hsep_int count = left < most ? left : most;
     if (c != NULL) {
@@ -321,7 +322,7 @@ static hsep_real averaged_planner_left(
 {
     const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, n = self->n, pinned = self->n_pinned;
-    const hsep_int window = self->late + self->Np, behind = self->horizon - self->Np, first = self->samples;
+    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
     if (self->judges) {
@@ -339,7 +340,7 @@ static hsep_real averaged_planner_left(
         hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
                            work->solve + (hsep_real)averaged_planner_tolerance.steps * parts +
                            2.0 * HSEP_AVERAGED_TRIES * work->predict;
-        for (hsep_int j = pinned; j < self->acting; j += HSEP_PHYSICS_ABREAST) {
+        for (hsep_int j = pinned; j < self->n; j += HSEP_PHYSICS_ABREAST) {
             newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
         left += HSEP_AVERAGED_STEPS * newton;
@@ -362,7 +363,7 @@ static hsep_real averaged_planner_left(
 static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const averaged_planner_work work = averaged_planner_work_of(self, task);
-    const hsep_int all = self->late + self->horizon, spacing = hsep_planner_splines(task->planner)->spacing;
+    const hsep_int all = self->late + self->preview, spacing = hsep_planner_splines(task->planner)->spacing;
     hsep_planner *planner = task->planner;
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -386,7 +387,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(2, (self->follows ? 15.0 : 12.0) * work.number);
             averaged_planner_open(self, task);
             AVERAGED_PLANNER_YIELD(3, HSEP_WORK_NUMBER * work.pairs);
-            hsep_planner_aim(planner, task->spline, hsep_at(self, self->target));
+            hsep_planner_aim(planner, hsep_at(self, self->gram), task->spline, hsep_at(self, self->target));
             hsep_planner_pin(planner);
             AVERAGED_PLANNER_YIELD(4, work.factor);
             self->planned = (hsep_int)hsep_planner_factor(planner, 1);
@@ -415,7 +416,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
-            for (self->spline = self->n_pinned; self->spline < self->acting;) {
+            for (self->spline = self->n_pinned; self->spline < self->n;) {
                 AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
                 averaged_planner_columns(self, task);
             }
@@ -492,10 +493,10 @@ HSEP_API void hsep_averaged_planner_begin(
     self->place = self->solving = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->horizon, task->late_command, late);
-    memcpy(hsep_at(self, self->x_pb) + self->horizon, task->late_x, late);
-    memcpy(hsep_at(self, self->e_h) + self->horizon + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
-    const hsep_int preview = hsep_planner_splines(task->planner)->preview;
+    memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, task->late_x, late);
+    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
+    const hsep_int preview = self->preview;
     for (hsep_int k = 0; k < preview; k++) {
         path[preview - 1 - k] = task->x_d[k] - self->start;
     }

@@ -28,35 +28,36 @@
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 typedef struct {
-    hsep_int horizon, p, Np; /* the error counts in the samples of the horizon; behind it a plan returns to x_d */
-    hsep_int late;           /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_int n, n_pinned;    /* splines of a plan, the first ones, which stay as they were, */
-    hsep_int acting;         /* and those that begin within the horizon */
-    hsep_int place;          /* yield behind which the plan goes on; 0: at its beginning */
-    hsep_int judges;         /* whether the averaged model judges plans, */
-    hsep_int follows;        /* and whether it may plan */
-    hsep_int steps;          /* Newton steps done, */
-    hsep_int gains;          /* whether the last one lowered the cost, */
-    hsep_int tries;          /* and lengths of it that were tried */
-    hsep_int samples;        /* samples that are predicted, */
-    hsep_int spline;         /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
-    hsep_int solving;        /* whether a bounded programme is being solved */
-    hsep_int planned;        /* model of the plan: 0 none, 1 physics, 2 averaged */
-    hsep_int paused;         /* windows that the averaged model does not plan, now */
-    hsep_int pause;          /* and after the next of its plans that runs away */
-    hsep_real cost;          /* m2, of the best plan so far, */
-    hsep_real cost_of_rest;  /* and of the remainder of the last plan */
-    hsep_real start;           /* m, position of rest */
-    hsep_real next;            /* multiply-adds of the next part, 0: the plan is made; */
-    hsep_real left;            /* and that this part and all after it take at most */
+    hsep_int preview, p, Np;
+    hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
+    hsep_int n, n_pinned;   /* splines of a plan, and the first ones, which stay as they were */
+    hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
+    hsep_int judges;        /* whether the averaged model judges plans, */
+    hsep_int follows;       /* and whether it may plan */
+    hsep_int steps;         /* Newton steps done, */
+    hsep_int gains;         /* whether the last one lowered the cost, */
+    hsep_int tries;         /* and lengths of it that were tried */
+    hsep_int samples;       /* samples that are predicted, */
+    hsep_int spline;        /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
+    hsep_int solving;       /* whether a bounded programme is being solved */
+    hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
+    hsep_int paused;        /* windows that the averaged model does not plan, now */
+    hsep_int pause;         /* and after the next of its plans that runs away */
+    hsep_real cost;         /* m2, of the best plan so far, */
+    hsep_real cost_of_rest; /* and of the remainder of the last plan */
+    hsep_real start;        /* m, position of rest */
+    hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
+    hsep_real left;         /* and that this part and all after it take at most */
     /* Offsets in words from the beginning of the struct */
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
-    hsep_int command;    /* (horizon + late,) m, commands predicted last, relative to the start, newest first */
-    hsep_int x_pb;       /* (horizon + late,) m, their prediction by the physics model, */
-    hsep_int e_h;        /* (horizon + late + p,) m, and what the averaged model adds; behind it the last residuals */
+    hsep_int command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
+    hsep_int x_pb;       /* (preview + late,) m, their prediction by the physics model, */
+    hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
+    hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int gram;       /* quadratic part of the physics model's plans (hsep_planner_gram) */
     hsep_int W;          /* changes of x_h by the splines that are not pinned: of spline j from sample j spacing on,
                           * behind each other */
     hsep_int linearised;
@@ -64,13 +65,13 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 35);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 36);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
     hsep_averaged *model;
     hsep_planner *planner;
-    const hsep_real *spline; /* (horizon,) m/m, a spline filtered by the physics model */
+    const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
     const hsep_real *x_d;    /* (preview,) m, commanded positions */
     /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
      * the last residuals measured, (p,) m, likewise */
@@ -82,10 +83,11 @@ typedef struct {
 HSEP_API hsep_real
 hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
-/* Fill the block for a drive at rest at start, m. */
+/* Fill the block for a drive at rest at start, m, with the planner that solves its plans and a spline filtered by the
+ * physics model, (preview,), m/m. Cost: as hsep_planner_gram. */
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_real start);
+    hsep_real start, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
  * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples
@@ -96,9 +98,9 @@ HSEP_API void hsep_averaged_planner_begin(
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost: of a plan at most, with n splines that are not pinned and all = horizon + late samples, m^2 / 2 multiply-adds
+ * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
  * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
- * of the physics model's programme; 3 Newton steps of n horizon p / 2 for each expert, n^2 horizon / 4, 2 predictions,
+ * of the physics model's programme; 3 Newton steps of n preview p / 2 for each expert, n^2 preview / 4, 2 predictions,
  * and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
  * (m + 60) for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);

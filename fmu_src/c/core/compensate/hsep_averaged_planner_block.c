@@ -1,6 +1,7 @@
 /* Memory of a planner on the residual model with averaging: its layout and beginning. */
 #include "hsep_averaged_planner.h"
 
+#include "hsep_cholesky.h"
 #include "hsep_math.h"
 
 #include <stddef.h>
@@ -11,20 +12,17 @@ static hsep_real averaged_planner_lay_out(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
-    const hsep_int horizon = hsep_planner_horizon(planner->preview, planner->Np);
-    const hsep_int within = (horizon + planner->spacing - 1) / planner->spacing, acting = n < within ? n : within;
     const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const hsep_int n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_real columns = (hsep_real)(acting - n_pinned);
-    const hsep_real longest = (hsep_real)(horizon - planner->spacing * n_pinned);
+    const hsep_real columns = (hsep_real)(n - n_pinned);
+    const hsep_real longest = (hsep_real)(planner->preview - planner->spacing * n_pinned);
     hsep_real end = HSEP_WORDS(hsep_averaged_planner);
-    self->horizon = horizon;
+    self->preview = planner->preview;
     self->late = hsep_late(parameters->settings);
     self->p = parameters->settings->p;
     self->Np = planner->Np;
     self->n = n;
-    self->acting = acting;
     self->n_pinned = n_pinned;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
@@ -33,6 +31,8 @@ static hsep_real averaged_planner_lay_out(
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (hsep_real)self->p);
     self->target = hsep_take(&end, (hsep_real)planner->preview);
+    self->weight = hsep_take(&end, (hsep_real)planner->preview);
+    self->gram = hsep_take(&end, hsep_triangle(n));
     self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
     self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
     self->physics = hsep_take_block(&end, filter);
@@ -48,7 +48,7 @@ hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hse
 
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_real start)
+    hsep_real start, hsep_planner *plans, const hsep_real spline[])
 {
     memset(self, 0, (size_t)hsep_averaged_planner_size(parameters, planner));
     (void)averaged_planner_lay_out(self, parameters, planner);
@@ -56,4 +56,11 @@ HSEP_API void hsep_averaged_planner_init(
     self->pause =
         (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
     hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
+    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
+    hsep_real *weight = hsep_at(self, self->weight);
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
+        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
+    }
+    hsep_planner_gram(plans, spline, weight, hsep_at(self, self->gram));
 }

@@ -11,15 +11,15 @@ static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_real horizon = (hsep_real)predictor->horizon;
+    const hsep_real preview = (hsep_real)predictor->preview;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
-    self->trial_x = hsep_take(&end, horizon + (hsep_real)predictor->settings.q);
-    self->trial_e = hsep_take(&end, horizon + (hsep_real)predictor->settings.p);
-    self->target = hsep_take(&end, horizon);
-    self->spline_pb = hsep_take(&end, horizon);
+    self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
+    self->trial_e = hsep_take(&end, preview + (hsep_real)predictor->settings.p);
+    self->target = hsep_take(&end, preview);
+    self->spline_pb = hsep_take(&end, preview);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
@@ -42,10 +42,6 @@ HSEP_API void hsep_compensator_block_init(
     (void)compensator_lay_out(self, parameters);
     hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
-    if (self->averaged) {
-        const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
-        hsep_averaged_planner_init(hsep_compensator_averaged(self), &model, &parameters->planner, start);
-    }
     self->compensate = self->compensate_next = (hsep_int)parameters->compensate;
     self->change_max_next = parameters->planner.limit[0];
     self->error_max = parameters->error_max;
@@ -54,14 +50,19 @@ HSEP_API void hsep_compensator_block_init(
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     hsep_real *spline = hsep_at(self, self->spline_pb);
     const hsep_int width = 4 * parameters->planner.spacing;
-    const hsep_int within = width < predictor->horizon ? width : predictor->horizon;
     hsep_physics_init(
         trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
         (hsep_hold)predictor->settings.input_hold);
     memcpy(
         spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
-        (size_t)within * sizeof(hsep_real));
-    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
+        (size_t)width * sizeof(hsep_real));
+    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
+    if (self->averaged) {
+        const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
+        hsep_averaged_planner_init(
+            hsep_compensator_averaged(self), &model, &parameters->planner, start, hsep_compensator_planner(self),
+            spline);
+    }
 }
 
 static hsep_averaged_task compensator_task(hsep_compensator *self)
@@ -83,46 +84,46 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
-    const hsep_int horizon = planner->horizon, Np = predictor->Np;
+    const hsep_int preview = predictor->preview, Np = predictor->Np;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *c = hsep_at_const(planner, planner->c);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
-    for (hsep_int k = 0; k < horizon; k++) {
+    for (hsep_int k = 0; k < preview; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
         const hsep_real command = x_d[k] - predictor->start + decided;
-        hsep_physics_forced_response(trial, &command, &x[horizon - 1 - k], 1);
-        target[k] = x_d[k] - predictor->start - x[horizon - 1 - k];
+        hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
+        target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
         const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 1);
-        memcpy(x + horizon, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
-        memcpy(e + horizon, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
-        hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
-        for (hsep_int k = 0; k < horizon; k++) {
-            target[k] -= e[horizon - 1 - k];
+        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
+        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
+        hsep_recursion_run(&recursion, x, e, preview, 0, preview);
+        for (hsep_int k = 0; k < preview; k++) {
+            target[k] -= e[preview - 1 - k];
         }
     }
 }
 
-/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (horizon,), in place of a
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a
  * trial. */
 static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    const hsep_int horizon = hsep_compensator_planner(self)->horizon;
+    const hsep_int preview = predictor->preview;
     const hsep_real *spline_pb = hsep_at(self, self->spline_pb);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    for (hsep_int k = 0; k < horizon; k++) {
-        x[horizon - 1 - k] = spline_pb[k];
+    for (hsep_int k = 0; k < preview; k++) {
+        x[preview - 1 - k] = spline_pb[k];
     }
-    memset(x + horizon, 0, (size_t)recursion.q * sizeof(hsep_real));
-    memset(e + horizon, 0, (size_t)recursion.p * sizeof(hsep_real));
-    hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
-    for (hsep_int k = 0; k < horizon; k++) {
-        x[k] = spline_pb[k] + e[horizon - 1 - k];
+    memset(x + preview, 0, (size_t)recursion.q * sizeof(hsep_real));
+    memset(e + preview, 0, (size_t)recursion.p * sizeof(hsep_real));
+    hsep_recursion_run(&recursion, x, e, preview, 0, preview);
+    for (hsep_int k = 0; k < preview; k++) {
+        x[k] = spline_pb[k] + e[preview - 1 - k];
     }
     return x;
 }
@@ -175,10 +176,10 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
-    if (self->averaged) { /* the window's part of the horizon, and what is late before it */
+    if (self->averaged) { /* the window's part of the preview, and what is late before it */
         const hsep_averaged_planner *averaged = hsep_compensator_averaged(self);
         memcpy(
-            hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->horizon - Np),
+            hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
             (size_t)predictor->n * sizeof(hsep_real));
     } else {
         const hsep_residual_window window = hsep_predictor_window(predictor);
@@ -218,7 +219,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     const hsep_real *spline =
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-    hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
+    hsep_planner_aim(hsep_compensator_planner(self), NULL, spline, hsep_at(self, self->target));
     const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self), 0)
                                         ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_exact)
                                         : HSEP_PLAN_FAILED;

@@ -9,7 +9,7 @@
  * (hsep_averaged_planner_run).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
- * costs on top n^2 / 2 + p^2 / 2 + (2 horizon + Np) (p + q) + m^3 / 6 + m horizon multiply-adds, the last two terms
+ * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
  * twice if the hybrid plan fails, and a copy of the dead time. While a plan is being solved, each of the 8 samples that
  * follow calls hsep_interior_advance six times; where fewer than 8 samples are pinned (Np < 16, or spacing > 8), more
  * often, or 2 HSEP_QP_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real
@@ -56,10 +56,10 @@ struct hsep_compensator {
     hsep_int was_reset;        /* last level of the reset */
     /* Offsets in words from the beginning of the struct */
     hsep_int x_dm;      /* (Np,) m, the window: modified commands */
-    hsep_int trial_x;   /* (horizon + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
-    hsep_int trial_e;   /* (horizon + p,) m, its residuals */
-    hsep_int target;    /* (horizon,) m */
-    hsep_int spline_pb; /* (horizon,) m/m, a spline filtered by the physics model */
+    hsep_int trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
+    hsep_int trial_e;   /* (preview + p,) m, its residuals */
+    hsep_int target;    /* (preview,) m */
+    hsep_int spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
     hsep_int trial;     /* the physics model of a trial */
     hsep_int planner, predictor;
     hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */

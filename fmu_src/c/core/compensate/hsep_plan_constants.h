@@ -6,9 +6,7 @@
 /* hybridsep/compensate/splines.py */
 #define HSEP_N_DECIDED 3
 #define HSEP_SPLINES_END 3
-#ifndef HSEP_SPLINES_RETURN
-#define HSEP_SPLINES_RETURN 0
-#endif
+#define HSEP_SPLINES_LEAST 0.1
 #define HSEP_SPLINES_RIDGE 1e-12
 
 /* hybridsep/compensate/qp.py */

@@ -9,12 +9,6 @@
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
-HSEP_API hsep_int hsep_planner_horizon(hsep_int preview, hsep_int Np)
-{
-    const hsep_int horizon = preview - preview * HSEP_SPLINES_RETURN / 100;
-    return horizon > Np ? horizon : Np;
-}
-
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
     const hsep_int half = parameters->Np / 2;
@@ -28,7 +22,6 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     const hsep_int n = hsep_splines_count(parameters->preview, parameters->spacing);
     hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
-    self->horizon = hsep_planner_horizon(parameters->preview, parameters->Np);
     self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
@@ -242,16 +235,44 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
     }
 }
 
-HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[])
+HSEP_API void hsep_planner_aim(
+    hsep_planner *self, const hsep_real gram[], const hsep_real filtered[], const hsep_real target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *v = hsep_planner_linear(self);
-    hsep_splines_filtered_gram(splines, filtered, self->horizon, hsep_at(self, self->P));
+    if (gram != NULL) {
+        memcpy(hsep_at(self, self->P), gram, (size_t)hsep_triangle(splines->n) * sizeof(hsep_real));
+    } else {
+        hsep_splines_filtered_gram(splines, filtered, splines->preview, hsep_at(self, self->P));
+    }
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
-        v[j] = begin < self->horizon ? hsep_dot(filtered, target + begin, self->horizon - begin) : 0.0;
+        v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
+    }
+    if (gram == NULL) {
+        hsep_planner_complete(self, 0);
+    } else {
+        hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), 0, NULL, v);
+    }
+}
+
+HSEP_API void hsep_planner_gram(
+    hsep_planner *self, const hsep_real filtered[], const hsep_real weights[], hsep_real gram[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int n = splines->n, spacing = splines->spacing, preview = splines->preview;
+    hsep_real *P = hsep_at(self, self->P);
+    for (hsep_int i = 0; i < n; i++) {
+        for (hsep_int j = i; j < n; j++) {
+            hsep_real sum = 0.0;
+            for (hsep_int k = j * spacing; k < preview; k++) {
+                sum += (weights[k] * filtered[k - i * spacing]) * (weights[k] * filtered[k - j * spacing]);
+            }
+            *P++ = sum;
+        }
     }
     hsep_planner_complete(self, 0);
+    memcpy(gram, hsep_at(self, self->P), (size_t)hsep_triangle(n) * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_planner_pin(hsep_planner *self)

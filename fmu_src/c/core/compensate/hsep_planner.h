@@ -28,7 +28,7 @@ typedef struct {
 } hsep_planner_parameters;
 
 typedef struct {
-    hsep_int Np, horizon;
+    hsep_int Np;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
     hsep_real jerk_weight;
@@ -45,7 +45,7 @@ typedef struct {
     hsep_int splines, interior;
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 21);
+HSEP_ASSERT_WORDS(hsep_planner, 20);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -70,9 +70,6 @@ HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
-/* Samples of a plan whose error counts: behind them it returns to x_d. */
-HSEP_API hsep_int hsep_planner_horizon(hsep_int preview, hsep_int Np);
-
 /* Splines that a bounded plan leaves as they are. */
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
@@ -87,9 +84,16 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self);
 
 /* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
- * (horizon,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (horizon,). Cost:
- * n horizon multiply-adds. */
-HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
+ * (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). gram: of
+ * hsep_planner_gram, to whose weights' squares the target is multiplied; NULL: every sample counts alike. Cost:
+ * n preview / 2 multiply-adds, twice of it without a gram. */
+HSEP_API void hsep_planner_aim(
+    hsep_planner *self, const hsep_real gram[], const hsep_real filtered[], const hsep_real target[]);
+
+/* The quadratic part of that cost with weights of the errors, (preview,), a triangle of n rows, before the first plan.
+ * Cost: n^2 preview / 4 multiply-adds. */
+HSEP_API void hsep_planner_gram(
+    hsep_planner *self, const hsep_real filtered[], const hsep_real weights[], hsep_real gram[]);
 
 /* Reduce that cost to the splines that are not pinned. */
 HSEP_API void hsep_planner_pin(hsep_planner *self);

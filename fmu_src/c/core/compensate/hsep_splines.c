@@ -240,7 +240,7 @@ HSEP_API void hsep_splines_add_jerk(
     const hsep_real *e = splines_differences(self, 3);
     const hsep_int n = self->n - first, length = splines_length(self, 3);
     const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
-    for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
+    for (hsep_int d = 0; triangle != NULL && d < n && d * self->spacing + 1 < length; d++) {
         hsep_real sum = 0.0;
         for (hsep_int k = d * self->spacing + 1; k < length; k++) {
             sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);

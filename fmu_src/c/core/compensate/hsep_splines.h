@@ -75,7 +75,7 @@ HSEP_API void hsep_splines_filtered_gram(
     const hsep_splines *self, const hsep_real filtered[], hsep_int count, hsep_real triangle[]);
 
 /* The triangle of n - first rows += weight D' D, and v, (n - first,), -= weight D' third, with the third differences D
- * of the splines first ... n - 1, m; third: (preview,) m. */
+ * of the splines first ... n - 1, m; third: (preview,) m. The triangle may be NULL. */
 HSEP_API void hsep_splines_add_jerk(
     const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
     hsep_real v[]);

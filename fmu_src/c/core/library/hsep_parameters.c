@@ -94,7 +94,6 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
         .settings = *settings,
         .averaging = parameters->averaging,
         .preview = settings->Np,
-        .horizon = settings->Np,
         /* The warm-up counts from the end of the first fill. */
         .n_init = (hsep_real)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
         .planned = 0,
@@ -108,7 +107,6 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
     hsep_compensator_parameters derived = {.predictor = hsep_predictor_derive(parameters)};
     derived.predictor.preview = settings->preview;
-    derived.predictor.horizon = hsep_planner_horizon(settings->preview, derived.predictor.settings.Np);
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
     derived.predictor.n_init =

@@ -12,8 +12,7 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .averaging = &parameters->averaging,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .n = parameters->horizon + hsep_late(&parameters->settings),
-        .ahead = parameters->preview + hsep_late(&parameters->settings),
+        .n = parameters->preview + hsep_late(&parameters->settings),
         .planned = parameters->planned};
 }
 

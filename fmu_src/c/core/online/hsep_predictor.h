@@ -37,8 +37,7 @@
 typedef struct {
     hsep_predictor_settings settings;
     hsep_averaging_settings averaging;
-    hsep_int preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    hsep_int horizon;       /* samples that are predicted, Np ... preview; Np alone */
+    hsep_int preview;       /* samples from r(k) to the drive, which are predicted, >= Np; Np alone */
     hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
     hsep_int n_modes;       /* >= 1 */

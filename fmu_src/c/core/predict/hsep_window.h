@@ -15,7 +15,6 @@ typedef struct {
     const hsep_mode *modes; /* (n_modes,) */
     hsep_int n_modes;
     hsep_int n;     /* samples of a prediction: of a window, or a compensator's horizon, and before it the late ones */
-    hsep_int ahead; /* samples from the last measured one to the last command that is known, >= n */
     int planned;    /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 

@@ -12,7 +12,7 @@ HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_pa
     self->size = parameters->averaging->recall;
     self->Np = parameters->settings->Np;
     self->n = parameters->n;
-    self->ahead = self->lag = parameters->ahead;
+    self->ahead = self->lag = parameters->n;
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
     self->commands = hsep_take(&end, (hsep_real)self->stride);
