@@ -46,7 +46,7 @@ def _predictor(case: Case) -> HybridPredictor:
 def _compensator(case: Case) -> SepCompensator:
     """Return a compensator with the limits of the trajectory: most plans are bounded, which costs most."""
     limits = load_machine("spring_mass_damper").trajectory_limits()
-    settings = CompensatorSettings(preview=2 * case.Np, spacing=2, change_max=1e-3, limits=limits)
+    settings = CompensatorSettings(preview=max(200, 2 * case.Np), spacing=2, change_max=1e-3, limits=limits)
     return SepCompensator(_predictor(case), settings)
 
 

@@ -2,7 +2,7 @@
 
 ``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where the weights ``w`` of the errors
 fall to the end of a plan (``splines.py``), and where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. At most three Gauss-Newton steps begin
+friction that follows the command changes its sign with the command's velocity. One to three Gauss-Newton steps begin
 at the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
 and goes to its minimum, or less far if only that lowers the cost; the next window goes on from there. The first samples
 of a plan follow the last plan, and the plan is made while they act; the steps of the solver are limited, so that the
@@ -278,7 +278,12 @@ plan; with a larger one there may be none within the bounds.
 
 _REACHES = (0.1, 0.01, 0.0)
 """Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
-that changes nearby. With two steps, or one reach for all, the stage's Y axis, warm, has ten times the error."""
+that changes nearby. One step alone has the second one."""
+
+_STEP = 8
+"""Samples that a plan has for each Newton step. Where windows are short, the next one goes on soon: with windows of 20
+samples one step leaves as much as three do. With windows of 50 the stage's Y axis, warm, has ten times the error of
+three steps with one."""
 
 _LENGTHS = (1.0, 0.3)
 """Lengths of a step that are tried, relative to the way to the minimum."""
@@ -336,7 +341,8 @@ class AveragedPlanner:
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array
     ) -> PlannedPoint:
         """Return the plan behind Newton steps, as long as they lower the cost; parameters as of :meth:`step`."""
-        for reach in _REACHES:
+        n = max(1, n_pinned * self._basis.spacing // _STEP)
+        for reach in _REACHES[1:2] if n == 1 else _REACHES[:n]:
             before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed, reach)
             if start is before:
                 break

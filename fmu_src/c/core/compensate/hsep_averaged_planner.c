@@ -115,7 +115,8 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
     const hsep_real *e_h = hsep_at(self, self->e_h), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
-    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[self->steps]);
+    const hsep_int reach = self->n_steps == 1 ? 1 : self->steps; /* one step alone has the second one */
+    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[reach]);
     for (hsep_int k = 0; k < self->preview; k++) { /* weighted x_d - x_h, to which W c is added */
         const hsep_int j = self->preview - 1 - k;
         target[k] = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
@@ -343,7 +344,7 @@ static hsep_real averaged_planner_left(
         for (hsep_int j = pinned; j < self->n; j += HSEP_PHYSICS_ABREAST) {
             newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
-        left += HSEP_AVERAGED_STEPS * newton;
+        left += (hsep_real)self->n_steps * newton;
     }
     return left;
 }
@@ -411,7 +412,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             hsep_planner_follow_friction(planner);
         }
         self->gains = self->follows;
-        for (self->steps = 0; self->gains && self->steps < HSEP_AVERAGED_STEPS; self->steps++) {
+        for (self->steps = 0; self->gains && self->steps < self->n_steps; self->steps++) {
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
