@@ -34,7 +34,8 @@ typedef struct {
     hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
-    hsep_int steps;         /* Newton steps done, */
+    hsep_int n_steps;       /* Newton steps of a plan at most, */
+    hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
     hsep_int tries;         /* and lengths of it that were tried */
     hsep_int samples;       /* samples that are predicted, */
@@ -65,7 +66,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 36);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 37);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

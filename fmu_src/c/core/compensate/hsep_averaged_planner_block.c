@@ -24,6 +24,8 @@ static hsep_real averaged_planner_lay_out(
     self->Np = planner->Np;
     self->n = n;
     self->n_pinned = n_pinned;
+    const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
+    self->n_steps = fit < 1 ? 1 : fit < HSEP_AVERAGED_STEPS ? fit : HSEP_AVERAGED_STEPS;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
