@@ -14,8 +14,8 @@ typedef struct {
     const hsep_averaging_settings *averaging;
     const hsep_mode *modes; /* (n_modes,) */
     hsep_int n_modes;
-    hsep_int n;     /* samples of a prediction: of a window, or a compensator's horizon, and before it the late ones */
-    int planned;    /* whether a compensator decides the commands */
+    hsep_int n;  /* samples of a prediction: of a window, or a compensator's plan, and before it the late ones */
+    int planned; /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 
 typedef struct {
