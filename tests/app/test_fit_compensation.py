@@ -139,7 +139,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
-@pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.0232}, 17), (0.0022, {}, 0.5)])
+@pytest.mark.parametrize(("change_max", "bound", "most"), [(0.001, {"change_max": 0.0323}, 17), (0.0022, {}, 0.5)])
 def test_cosim_says_which_limit_binds_and_what_it_costs(
     hybridsep: Run, tmp_path: Path, change_max: float, bound: dict[str, float], most: float
 ) -> None:
@@ -159,7 +159,7 @@ def test_cosim_says_which_limit_binds_and_what_it_costs(
         one, two = (found["limit_costs"]["effects"]["change_max"][factor] for factor in ("1.0", "2.0"))
         assert two["rms"] < 0.1 * one["rms"]
         assert two["largest"] < 0.5 * one["largest"]
-    words = "Limits bind the compensated command: change_max in 2.3 % of the samples."
+    words = "Limits bind the compensated command: change_max in 3.2 % of the samples."
     assert binding_words(bound) == (words if bound else "No limit binds the compensated command.")
 
 

@@ -22,6 +22,6 @@ def test_half_of_the_largest_change_until_the_motion_was_measured(new_stream: St
         stream.step(k * T_S, T_S)
         outputs = stream.outputs()
         changes.append(abs(outputs[x_dm] - outputs[x_d]))
-    # At 20 mm/s for the first time; later; and where 200 mm/s come in sight, whose plan goes on from the last one's
-    found = [max(changes[first:last]) / CHANGE_MAX for first, last in ((0, 120), (120, 340), (360, 480))]
+    # At 20 mm/s for the first time; later; and behind what is left of the plans from before 200 mm/s came in sight
+    found = [max(changes[first:last]) / CHANGE_MAX for first, last in ((0, 120), (120, 340), (380, 480))]
     assert found == pytest.approx([0.5, 1.0, 0.5], rel=1e-3)
