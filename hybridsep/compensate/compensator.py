@@ -12,8 +12,6 @@ remainder keeps the limits. The next plan starts from that remainder: there is a
 other can be computed the remainder is followed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -285,7 +283,7 @@ class SepCompensator:
         return *(getattr(self, name) for name in self._SAVED), self._planning.paused, self._planning.pause
 
     @classmethod
-    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> SepCompensator:
+    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "SepCompensator":
         """Return the compensator of :meth:`to_bytes`, given the ``disturbances`` of its predictor.
 
         Raises

@@ -5,8 +5,6 @@ compensator plans and learns on it in closed loop. That ``r`` would change with 
 so where a modified command turns elsewhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -53,15 +51,9 @@ def expected_errors(
 ) -> Iterator[Expected]:
     """Yield the tracking errors to be expected of one recording each.
 
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    settings : PredictorSettings
-    compensator : CompensatorSettings
-    recordings : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
-        ``x`` as it arrives, with the ``measurement_delay`` of the settings; NaN where it is missing. The errors of what
-        has not arrived at its end are left out.
+    ``model``: ``G_pb``; ``recordings``: sequence of pairs ``(x_d, x)`` of (n,), m: ``x`` as it arrives, with the
+    ``measurement_delay`` of the settings; NaN where it is missing. The errors of what has not arrived at its end are
+    left out.
     """
     planner = SepCompensator(HybridPredictor(model, settings), compensator)
     discrete, Np, late = model.discretise(settings.T_s, settings.input_hold), settings.Np, settings.n_late

@@ -18,8 +18,6 @@ A is ``arx_command``, linear and time-invariant: its features are increments and
 ``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -40,11 +38,8 @@ _OWN_REACH = 1e-3
 the friction's is the tangent."""
 
 
-_AT_STOP = 0.999999
-"""Share of its distance from which on a stop operator is at its stop: rounding may have moved it."""
-
-_APART = 4
-"""Samples behind the window that share the variance of the first one's features."""
+_AT_STOP = 0.999999  # share of its distance from which on a stop operator is at its stop: rounding may have moved it
+_APART = 4  # samples behind the window that share the variance of the first one's features
 
 
 class DisturbanceSlopes(NamedTuple):
@@ -60,7 +55,7 @@ class DisturbanceSlopes(NamedTuple):
     of_position: Array  # (n, n_disturbances − N_LASTING), 1/m: of all others with ``x``
     of_velocity: Array  # (n, n_own), s/m: of the user's own, the last ones, with the commanded velocity
 
-    def behind(self, n: int) -> DisturbanceSlopes:
+    def behind(self, n: int) -> "DisturbanceSlopes":
         """Return the slopes behind the first ``n`` samples."""
         at_stop = np.maximum(self.at_stop[n:] - n, 0)
         friction, stops, _, *others = self
@@ -69,15 +64,9 @@ class DisturbanceSlopes(NamedTuple):
     def change(self, weights: Array, changes: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
         """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
 
-        Parameters
-        ----------
-        weights : (n_disturbances,) array
-        changes : (n, m) array, m
-            Changes of the commands, each a column.
-        velocity : (n, m) array, m/s
-            Changes of the commanded velocity, each a column.
-        moved, moved_velocity : (n, m) array, m and m/s
-            Changes of the position, and of its velocity.
+        ``weights``: (n_disturbances,); ``changes``: (n, m), m: changes of the commands, each a column; ``velocity``:
+        (n, m), m/s: changes of the commanded velocity, each a column; ``moved``, ``moved_velocity``: (n, m), m and
+        m/s: changes of the position, and of its velocity.
         """
         stiffness = N_FRICTION + N_STOPS
         of_position = weights[stiffness] * self.stiffness + self.of_position @ weights[N_LASTING:]
@@ -98,20 +87,11 @@ class DisturbanceSlopes(NamedTuple):
 class PlanModel:
     """Averaged model with the weights of this instant, as a function of the commands of a plan.
 
-    Parameters
-    ----------
-    model : AveragedModel
-        Where the measurements end, which is the beginning of the plan unless they are late.
-    state : (n_state,) array
-        State of ``G_pb`` there.
-    late : (n_late,) array, m
-        Commands between there and the plan, relative to the start.
-    start : float, m
-    x_d : (n,) array, m
-        Commands from which the scales of the features and the variances of predictions follow, of the remainder of the
-        last plan, relative to the start.
-    path : (preview,) array, m
-        Unmodified commands, likewise.
+    ``model``: where the measurements end, which is the beginning of the plan unless they are late; ``state``:
+    (n_state,): state of ``G_pb`` there; ``late``: (n_late,), m: commands between there and the plan, relative to the
+    start; ``start``: m; ``x_d``: (n,), m: commands from which the scales of the features and the variances of
+    predictions follow, of the remainder of the last plan, relative to the start; ``path``: (preview,), m: unmodified
+    commands, likewise.
     """
 
     def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
@@ -159,16 +139,9 @@ class PlanModel:
     def slope(self, at: AveragedForecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
 
-        Parameters
-        ----------
-        at : AveragedForecast
-            Of :meth:`predict`, where the model is linearised.
-        changes : (n, m) array
-            Changes of the commands, each a column.
-        passed : (n, m) array
-            The changes filtered by ``G_pb``.
-        reach : float
-            Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale.
+        ``at``: of :meth:`predict`, where the model is linearised; ``changes``: (n, m): changes of the commands, each
+        a column; ``passed``: (n, m): the changes filtered by ``G_pb``; ``reach``: half of the change of velocity that
+        the friction's slope is taken over, relative to the velocity scale.
         """
         n_late, weights = len(self._late), at.shares.tolist()
         over_all = slopes_of(self._static, self._model.run.static, at.window, at.x, self.scales.velocity, reach)
@@ -226,11 +199,8 @@ def slopes_of(
 ) -> DisturbanceSlopes:
     """Return the slopes of the disturbances of a window; other parameters as those of :meth:`StaticFeatures.rows`.
 
-    Parameters
-    ----------
-    reach : float
-        Half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
-        0: the tangent.
+    ``reach``: half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
+    0: the tangent.
     """
     x_d, x_pb, start, _ = window
     v_d, spread = static.velocity(state, x_d), static.spread(velocity_scale)
@@ -285,8 +255,7 @@ _STEP = 8
 samples one step leaves as much as three do. With windows of 50 the stage's Y axis, warm, has ten times the error of
 three steps with one."""
 
-_LENGTHS = (1.0, 0.3)
-"""Lengths of a step that are tried, relative to the way to the minimum."""
+_LENGTHS = (1.0, 0.3)  # lengths of a step that are tried, relative to the way to the minimum
 
 _LEAST_GAIN = 1e-9
 """Relative gain below which a plan is no better than another: costs that rounding tells apart are equal."""
@@ -311,16 +280,8 @@ class PlannedPoint:
 class AveragedPlanner:
     """Plans of one window on the averaged model.
 
-    Parameters
-    ----------
-    basis : SplineBasis
-    jerk_weight : float
-    model : PlanModel
-        Of the plan that the window begins.
-    x_d : (preview,) array, m
-        Commanded positions, relative to the start.
-    delta_before : (3,) array, m
-        Last three values of δ.
+    ``model``: of the plan that the window begins; ``x_d``: (preview,), m: commanded positions, relative to the start;
+    ``delta_before``: (3,), m: last three values of δ.
     """
 
     def __init__(
@@ -353,19 +314,10 @@ class AveragedPlanner:
     ) -> PlannedPoint:
         """Return the plan behind a Newton step; the start itself, if none is better.
 
-        Parameters
-        ----------
-        start : PlannedPoint
-            Where the model is linearised.
-        previous_plan : (3 + n_free,) array, m
-            Coefficients of the remainder of the last plan, the decided ones first; they are feasible.
-        bounds : Bounds
-        n_pinned : int
-            Coefficients that the plan does not change.
-        passed : (preview, n_free) array
-            Free splines filtered by ``G_pb``.
-        reach : float
-            Of friction's slope, as of :meth:`PlanModel.slope`.
+        ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
+        of the last plan, the decided ones first; they are feasible; ``n_pinned``: coefficients that the plan does not
+        change; ``passed``: (preview, n_free): free splines filtered by ``G_pb``; ``reach``: of friction's slope, as
+        of :meth:`PlanModel.slope`.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         decided, at = np.split(start.coefficients, [N_DECIDED])

@@ -6,8 +6,6 @@ to no change. Where its own plan runs away, it plans none for a time. A motion f
 with at most half of the largest change.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -70,13 +68,7 @@ class PublishedPosition(NamedTuple):
 class Planning(ABC):
     """Plans with a residual model.
 
-    Parameters
-    ----------
-    basis : SplineBasis
-    bounds : DriveBounds
-    settings : CompensatorSettings
-        Of the window: ``preview`` and ``spacing`` are given.
-    Np : int
+    ``settings``: of the window: ``preview`` and ``spacing`` are given.
     """
 
     PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one
@@ -115,10 +107,7 @@ class Planning(ABC):
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return what is published of a prediction, the plan being of a model ``state``.
 
-        Raises
-        ------
-        SignalError
-            If it diverges.
+        Raises SignalError if it diverges.
         """
 
     def affine_plan(
@@ -198,10 +187,7 @@ def has_stable_poles(w_e: Array) -> bool:
     magnitude. Without the test, plans on the stage's Y axis, cold and free to turn, end at 2.8 times the error of the
     physics model's plans instead of 0.8 times.
 
-    Parameters
-    ----------
-    w_e : (p,) array
-        Weights of the past residuals.
+    ``w_e``: (p,): weights of the past residuals.
     """
     a = -np.asarray(w_e, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -239,14 +225,8 @@ def runs_away(delta: Array, of_physics: Array, error: float, change_max: float |
     A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
     fall into a second state with an error many times larger, and stays in it when compensation ends.
 
-    Parameters
-    ----------
-    delta, of_physics : (Np,) arrays, m
-        Changes of the command by the plan, and by the physics model's.
-    error : float, m
-        RMS error that the plan leaves, by its own model.
-    change_max : float, m, optional
-        Largest change of the command.
+    ``delta``, ``of_physics``: (Np,), m: changes of the command by the plan, and by the physics model's; ``error``: m:
+    RMS error that the plan leaves, by its own model; ``change_max``: m: largest change of the command.
     """
     if change_max is None:
         return False

@@ -11,8 +11,6 @@ Comp. 4 (2012)). The number of steps hardly grows with the number of active boun
 spread over samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,8 +22,7 @@ from ..base.settings import Limits
 from ..base.signals import Array
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-_FIRST_SLACK = 0.3
-"""Smallest initial slack, in the bounds' unit: 0.01 takes half as many steps again."""
+_FIRST_SLACK = 0.3  # smallest initial slack, in the bounds' unit: 0.01 takes half as many steps again
 
 _FIRST_MU = 10.0
 """Initial complementarity μ, as a share of the cost per bound: with 1 the longest plans take 4 to 8 steps more."""
@@ -33,8 +30,7 @@ _FIRST_MU = 10.0
 _REGULARISATION = 1e-14
 """Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""
 
-_TAU = 0.995
-"""Fraction τ of the step to the nearest bound that is taken."""
+_TAU = 0.995  # fraction τ of the step to the nearest bound that is taken
 
 
 class Tolerance(NamedTuple):
@@ -48,8 +44,7 @@ class Tolerance(NamedTuple):
     steps: int  # largest number of steps
 
 
-_STEPS = 24
-"""Largest number of steps of any tolerance."""
+_STEPS = 24  # largest number of steps of any tolerance
 
 EXACT = Tolerance(1e-15, 1e-9, 1e-11, _STEPS)
 """A plan is the start of the next one, and the minimum is much better conditioned than an intermediate iterate:
@@ -67,31 +62,13 @@ class Minimum(NamedTuple):
 
 
 def minimise(
-    P: Array,
-    v: Array,
-    rows: Array,
-    low: Array,
-    high: Array,
-    start: Array,
-    cost: float,
-    tolerance: Tolerance = EXACT,
+    P: Array, v: Array, rows: Array, low: Array, high: Array, start: Array, cost: float, tolerance: Tolerance = EXACT
 ) -> Minimum:
     """Return the minimiser of ``½ xᵀPx − vᵀx`` subject to ``low ≤ rows @ x ≤ high``.
 
-    Parameters
-    ----------
-    P : (n, n) array
-        Symmetric, positive definite.
-    v : (n,) array
-    rows : (m, n) array
-        In units in which a bound is about 1.
-    low, high : (m,) arrays
-        ``low < high``.
-    start : (n,) array
-        Initial iterate.
-    cost : float
-        Scale of the cost, > 0, for the tolerance.
-    tolerance : Tolerance
+    ``P``: (n, n): symmetric, positive definite; ``v``: (n,); ``rows``: (m, n): in units in which a bound is about 1;
+    ``low``, ``high``: (m,): ``low < high``; ``start``: (n,): initial iterate; ``cost``: scale of the cost, > 0, for
+    the tolerance.
     """
     # As B x ≥ b, with slacks s = B x − b > 0 and multipliers z > 0, s z → 0
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
@@ -170,8 +147,7 @@ needs an interior."""
 _EXCEEDED = 1.0 + 1e-6
 """Difference of the commanded position, in limits, that exceeds one: what is less may be rounding."""
 
-_MOVES = 1e-12
-"""Smallest step of the commanded position that counts as motion, m per sample: above its rounding."""
+_MOVES = 1e-12  # smallest step of the commanded position that counts as motion, m per sample: above its rounding
 
 
 @dataclass(frozen=True)
@@ -199,18 +175,9 @@ class Bounds:
 class DriveBounds:
     """Limits on velocity, acceleration and jerk of ``x_dm``, taken as differences, and on ``|δ|``.
 
-    Parameters
-    ----------
-    basis : SplineBasis
-    T_s : float
-        Sampling interval, s.
-    limits : Limits or None
-        The drive's velocity, acceleration and jerk.
-    change_max : float or None
-        Bound on ``|δ|``, m.
-    no_reversal : bool
-        Whether the velocity of ``x_dm``, if it is limited, keeps the sign of the velocity of ``x_d`` where ``x_d``
-        moves.
+    ``T_s``: sampling interval, s; ``limits``: Limits or None: the drive's velocity, acceleration and jerk;
+    ``change_max``: bound on ``|δ|``, m; ``no_reversal``: whether the velocity of ``x_dm``, if it is limited, keeps
+    the sign of the velocity of ``x_d`` where ``x_d`` moves.
     """
 
     def __init__(
@@ -246,19 +213,12 @@ class DriveBounds:
     ) -> Bounds:
         """Return the bounds on the free coefficients of a plan.
 
-        Parameters
-        ----------
-        x_d : (preview,) array, m
-            Commanded positions. Within the length of a spline of where they exceed a limit, it is widened by what they
-            take of it.
-        x_d_before, delta_before : (3,) arrays, m
-            Last three commanded positions before the plan, and last three changes of them.
-        previous_plan : (3 + n_free,) array, m
-            Coefficients of the remainder of the last plan, the decided ones first.
-        may_turn : bool
-            Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
-        change : float
-            Share of ``change_max`` that bounds ``|δ|``.
+        ``x_d``: (preview,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
+        widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: last three commanded positions
+        before the plan, and last three changes of them; ``previous_plan``: (3 + n_free,), m: coefficients of the
+        remainder of the last plan, the decided ones first; ``may_turn``: whether the command may turn where
+        ``no_reversal`` forbids it: the plan's model follows the friction; ``change``: share of ``change_max`` that
+        bounds ``|δ|``.
         """
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
         command = np.concatenate((x_d_before, x_d))
@@ -305,23 +265,9 @@ def solve(
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
     ``previous_plan``: a real-time implementation solves for the others while the pinned ones act.
 
-    Parameters
-    ----------
-    cost : PlanCost
-    bounds : Bounds
-    previous_plan : (n,) array, m
-        Feasible coefficients.
-    n_pinned : int
-        Coefficients that a bounded plan does not change, < n.
-    always : bool
-        Whether no plan changes them.
-    tolerance : Tolerance
-        Of the interior-point solver, where the bounds are active.
-
-    Returns
-    -------
-    Minimum or None
-        ``(n,)``, m; None if there is no finite minimiser.
+    ``previous_plan``: (n,), m: feasible coefficients; ``n_pinned``: coefficients that a bounded plan does not change,
+    < n; ``always``: whether no plan changes them; ``tolerance``: of the interior-point solver, where the bounds are
+    active. Returns Minimum or None: ``(n,)``, m; None if there is no finite minimiser.
     """
     n_kept = n_pinned if always else 0
     c = _unbounded(cost, previous_plan, n_kept)
@@ -350,12 +296,7 @@ def _cost_scale(cost: PlanCost, c: Array, previous_plan: Array, n_pinned: int) -
 
 
 def _bounded(
-    cost: PlanCost,
-    bounds: Bounds,
-    previous_plan: Array,
-    n_pinned: int,
-    scale: float,
-    tolerance: Tolerance,
+    cost: PlanCost, bounds: Bounds, previous_plan: Array, n_pinned: int, scale: float, tolerance: Tolerance
 ) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
 

@@ -6,8 +6,6 @@ The last spline ends four samples before the plan does: after the plan the comma
 in its first three differences.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +18,8 @@ from scipy.signal import lfilter
 from ..base.settings import PLAN_END
 from ..base.signals import Array
 
-N_DECIDED = 3
-"""Cubic splines that began before a plan and overlap it."""
-
-_END = PLAN_END
-"""Samples without change at the end of a plan, which the settings leave room for."""
+N_DECIDED = 3  # cubic splines that began before a plan and overlap it
+_END = PLAN_END  # samples without change at the end of a plan, which the settings leave room for
 
 _LEAST = 0.1
 """Weight of the last error of a plan of the averaged model: from the middle of the plan on the weights fall to it. A
@@ -45,19 +40,15 @@ class PlanCost:
     v: Array  # (n,), m
 
     @classmethod
-    def regular(cls, P: Array, v: Array, n_pinned: int = 0) -> PlanCost:
+    def regular(cls, P: Array, v: Array, n_pinned: int = 0) -> "PlanCost":
         """Return the cost with ``P``, which is changed, made positive definite; the first ones will not change.
 
-        Parameters
-        ----------
-        P : (n, n) array
-        v : (n,) array, m
-        n_pinned : int
+        ``P``: (n, n); ``v``: (n,), m.
         """
         P[np.diag_indices_from(P)] += _RIDGE * np.max(np.diag(P)[n_pinned:])
         return cls(P, v)
 
-    def without(self, pinned: Array) -> PlanCost:
+    def without(self, pinned: Array) -> "PlanCost":
         """Return the cost of the other coefficients, where the first ones are ``pinned``, m."""
         n = len(pinned)
         return PlanCost(self.P[n:, n:], self.v[n:] - self.P[n:, :n] @ pinned)
@@ -66,14 +57,8 @@ class PlanCost:
 class SplineBasis:
     """B-spline basis of one plan.
 
-    Parameters
-    ----------
-    preview : int
-        Samples of the plan.
-    spacing : int
-        Samples between knots.
-    Np : int
-        Samples of the window that begins the plan: all of them count alike.
+    ``preview``: samples of the plan; ``spacing``: samples between knots; ``Np``: samples of the window that begins
+    the plan: all of them count alike.
     """
 
     def __init__(self, preview: int, spacing: int, Np: int) -> None:
@@ -113,20 +98,10 @@ class SplineBasis:
     ) -> PlanCost:
         """Return ``‖weight (x_d − G (x_d + δ) − free)‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
 
-        Parameters
-        ----------
-        g, free : (preview,) arrays
-            First column of ``G``, and the free response, m; eq. (3).
-        x_d : (preview,) array, m
-            Commanded positions.
-        decided : (3,) array, m
-            Decided coefficients.
-        before : (3,) array, m
-            Last three values of δ.
-        jerk_weight : float
-            Weight of the third differences.
-        weight : (preview,) array, optional
-            Of the errors; all count alike without it.
+        ``g``, ``free``: (preview,): first column of ``G``, and the free response, m; eq. (3); ``x_d``: (preview,), m:
+        commanded positions; ``decided``: (3,), m: decided coefficients; ``before``: (3,), m: last three values of δ;
+        ``jerk_weight``: weight of the third differences; ``weight``: (preview,): of the errors; all count alike
+        without it.
         """
         delta = self.values[:, :N_DECIDED] @ decided
         # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
@@ -144,18 +119,9 @@ def direct_samples(g: ArrayLike, free: ArrayLike, x_d: ArrayLike, before: ArrayL
 
     The minimiser of ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` by least squares on the full matrices.
 
-    Parameters
-    ----------
-    g, free, x_d : (n,) array_like
-        First column of ``G``, free response and commanded positions, as in eq. (3).
-    before : (3,) array_like, m
-        The last three values of δ.
-    jerk_weight : float
-        Weight of the third differences, > 0.
-
-    Returns
-    -------
-    delta : (n,) array, m
+    ``g``, ``free``, ``x_d``: (n,): first column of ``G``, free response and commanded positions, as in eq. (3);
+    ``before``: (3,), m: the last three values of δ; ``jerk_weight``: weight of the third differences, > 0. Returns
+    ``delta``: (n,), m.
     """
     column, command = np.asarray(g, dtype=np.float64), np.asarray(x_d, dtype=np.float64)
     n = len(command)

@@ -18,11 +18,7 @@ from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 
 @pytest.mark.slow
 @examples(12)
-@given(
-    st.integers(0, 2**31),
-    st.sampled_from([1e-6, 1e-4, 1e-2]),
-    st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]),
-)
+@given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
 def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, limits: Limits) -> None:
     """Whatever is measured, from window to window, and within the limits."""
     rng = np.random.default_rng(seed)
