@@ -197,11 +197,11 @@ def fitted(columns: tuple[Array, Array]) -> Fit:
     return fit(x_d, x, T_s=T_S, unit="rad", Np=NP)
 
 
-def limited(machine: Machine, joint: Joint) -> Machine:
-    """Return a joint's machine with the drive's limits, of which a log shows a part."""
+def limited(machine: Machine, joint: Joint, preview: int) -> Machine:
+    """Return a joint's machine with the drive's limits, of which a log shows a part, and the look-ahead of all."""
     found = machine.table["drive_limits"]
     known = {"velocity": 2 * joint.velocity, "acceleration": 5 * joint.acceleration, "jerk": 300 * joint.acceleration}
-    return machine.changed("", {"drive_limits": {**found, **known}})
+    return machine.changed("", {"drive_limits": {**found, **known}}).changed("compensator", {"preview": preview})
 
 
 def errors(name: str) -> dict[str, Array]:
@@ -213,9 +213,11 @@ def errors(name: str) -> dict[str, Array]:
     with ProcessPoolExecutor(2) as pool:
         fits = list(pool.map(fitted, joints))
 
+    preview = max(one.machine.compensator_settings.preview or 0 for one in fits)  # joints that move together
+
     def controllers(compensate: str, *, warm: bool = False) -> list[Controller]:
         return [
-            Controller(limited(one.machine, joint), compensate, one.predictor() if warm else None)
+            Controller(limited(one.machine, joint, preview), compensate, one.predictor() if warm else None)
             for one, joint in zip(fits, arm.joints, strict=True)
         ]
 

@@ -164,7 +164,7 @@ def _two_axes(
     if delays[0] != delays[1]:
         raise ParameterError(
             f"both axes must have one T_s and one preview, got {' and '.join(delays)}; fit them to logs of one "
-            "rate with one Np, or set compensator.preview in both files"
+            "rate with one --look-ahead, or set compensator.preview in both files"
         )
     inputs = {"path": path, **{f"machine file {axis}": machine_path(axis) for axis in axes}}
     check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), inputs, force=force)

@@ -157,7 +157,8 @@ class ModalModel:
         """Return the samples ahead that a compensator needs to plan, :data:`_LOOK_AHEAD_MAX` at most.
 
         A change of the command must act within its plan: three times the time in which the response to a step, dead
-        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode, and 200 samples.
+        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that adds 5 % somewhere, and 200
+        samples.
 
         Parameters
         ----------
@@ -168,7 +169,12 @@ class ModalModel:
         step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))
         reached = np.abs(step) >= 0.95 * abs(self.dc_gain)
         rise = int(np.argmax(reached)) if reached.any() else len(step)
-        period = 1.0 / min(mode.f_n for mode in self.modes) / T_s
+        peaks = [
+            (abs(mode.alpha) / mode.omega**2 + abs(mode.beta) / mode.omega) * max(1.0, 0.5 / mode.zeta)
+            for mode in self.modes
+        ]
+        least = min(0.05 * abs(self.dc_gain), max(peaks))
+        period = 1.0 / min(mode.f_n for mode, peak in zip(self.modes, peaks, strict=True) if peak >= least) / T_s
         return min(_LOOK_AHEAD_MAX, max(200, 3 * rise, math.ceil(1.5 * period)))
 
     def state_space(self) -> tuple[Array, Array, Array]:

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from hybridsep.base.signals import Array
 from hybridsep.model.discrete import BLOCK_MAX
-from hybridsep.model.physics import ModalModel
+from hybridsep.model.physics import ModalModel, Mode
 
 
 def by_exponential(model: ModalModel, x_d: Array, hold: str) -> Array:
@@ -83,3 +83,14 @@ def test_impulse_response_is_the_first_column(hold: str) -> None:
         np.testing.assert_allclose(G[j:, j], g[: n - j], rtol=0, atol=1e-16)
         np.testing.assert_array_equal(G[:j, j], 0.0)
     assert np.flatnonzero(g)[0] == (3 if hold == "foh" else 4)
+
+
+def test_a_look_ahead_counts_the_modes_that_matter() -> None:
+    """Periods of the lowest mode, the time to 95 % with dead time, a floor; a mode of a thousandth counts for nothing."""
+    fast, slow = Mode(25.0, 0.5, (2 * np.pi * 25.0) ** 2, 0.0), Mode(2.0, 0.05, 0.1 * (2 * np.pi * 2.0) ** 2, 0.0)
+    trace = Mode(1.33, 1.0, 0.001 * (2 * np.pi * 1.33) ** 2, 0.0)
+    assert ModalModel((fast,)).look_ahead(TS) == 200
+    assert ModalModel((fast, trace)).look_ahead(TS) == 200
+    assert ModalModel((fast, slow)).look_ahead(TS) == 750
+    late = ModalModel((fast,), dead_time=100).look_ahead(TS)
+    assert 3 * (100 + 10) < late < 3 * (100 + 30)
