@@ -86,7 +86,7 @@ def test_impulse_response_is_the_first_column(hold: str) -> None:
 
 
 def test_a_look_ahead_counts_the_modes_that_matter() -> None:
-    """Periods of the lowest mode, the time to 95 % with dead time, a floor; a mode of a thousandth counts for nothing."""
+    """Periods of the lowest mode, time to 95 % with dead time, a floor; a mode of a thousandth counts for nothing."""
     fast, slow = Mode(25.0, 0.5, (2 * np.pi * 25.0) ** 2, 0.0), Mode(2.0, 0.05, 0.1 * (2 * np.pi * 2.0) ** 2, 0.0)
     trace = Mode(1.33, 1.0, 0.001 * (2 * np.pi * 1.33) ** 2, 0.0)
     assert ModalModel((fast,)).look_ahead(TS) == 200
