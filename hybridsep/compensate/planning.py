@@ -83,6 +83,7 @@ class Planning(ABC):
         self.preview, self.spacing = settings.preview, settings.spacing
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
+        self.weight: Array | None = None  # (preview,): of the errors of a plan; without it all count alike
 
     def restart(self, T_s: float) -> None:
         """Begin another run, with a sampling interval in s: nothing is paused."""
@@ -121,9 +122,7 @@ class Planning(ABC):
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
-        # the paper's plans, which C recomputes in one sample, count every sample alike
-        weight = self.basis.weight if self.ALWAYS else None
-        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, weight)
+        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, self.weight)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((decided, found.x))
 
@@ -239,6 +238,10 @@ class AveragedPlanning(Planning):
 
     PINNED: ClassVar[int] = _PINNED_AVERAGED
     ALWAYS: ClassVar[bool] = True
+
+    def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
+        super().__init__(basis, bounds, settings, Np)
+        self.weight = basis.weight
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""

@@ -497,17 +497,16 @@ HSEP_API void hsep_averaged_planner_begin(
     memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
     memcpy(hsep_at(self, self->x_pb) + self->preview, task->late_x, late);
     memcpy(hsep_at(self, self->e_h) + self->preview + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
-    const hsep_int preview = self->preview;
-    for (hsep_int k = 0; k < preview; k++) {
-        path[preview - 1 - k] = task->x_d[k] - self->start;
+    for (hsep_int k = 0; k < self->preview; k++) {
+        path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     task->planner->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, preview, hsep_at(self, self->e_h),
-        self->samples);
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
+        hsep_at(self, self->e_h), self->samples);
     self->planned = best > 0;
     self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;

@@ -243,7 +243,7 @@ HSEP_API void hsep_planner_aim(
     if (gram != NULL) {
         memcpy(hsep_at(self, self->P), gram, (size_t)hsep_triangle(splines->n) * sizeof(hsep_real));
     } else {
-        hsep_splines_filtered_gram(splines, filtered, splines->preview, hsep_at(self, self->P));
+        hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
     }
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;

@@ -216,8 +216,7 @@ static hsep_real *splines_entry(hsep_real triangle[], hsep_int n, hsep_int i, hs
     return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
 }
 
-HSEP_API void hsep_splines_filtered_gram(
-    const hsep_splines *self, const hsep_real filtered[], hsep_int count, hsep_real triangle[])
+HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
 {
     const hsep_int n = self->n, spacing = self->spacing;
     for (hsep_int d = 0; d < n; d++) {
@@ -225,7 +224,7 @@ HSEP_API void hsep_splines_filtered_gram(
         hsep_real sum = 0.0;
         hsep_int u = 0;
         for (hsep_int j = n; j-- > d;) {
-            for (; u + j * spacing < count; u++) {
+            for (; u + j * spacing < self->preview; u++) {
                 sum += filtered[u + d * spacing] * filtered[u];
             }
             *splines_entry(triangle, n, j - d, j) = sum;

@@ -69,10 +69,9 @@ HSEP_API void hsep_splines_gram(
 /* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
 HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
 
-/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (count,), each
- * shifted by one spacing more. Each diagonal is a running sum: n count / 2 multiply-adds. */
-HSEP_API void hsep_splines_filtered_gram(
-    const hsep_splines *self, const hsep_real filtered[], hsep_int count, hsep_real triangle[]);
+/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
+ * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
+HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
 /* The triangle of n - first rows += weight D' D, and v, (n - first,), -= weight D' third, with the third differences D
  * of the splines first ... n - 1, m; third: (preview,) m. The triangle may be NULL. */

@@ -11,8 +11,7 @@ HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_pa
     hsep_real end = HSEP_WORDS(hsep_recall);
     self->size = parameters->averaging->recall;
     self->Np = parameters->settings->Np;
-    self->n = parameters->n;
-    self->ahead = self->lag = parameters->n;
+    self->n = self->lag = parameters->n;
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
     self->commands = hsep_take(&end, (hsep_real)self->stride);
@@ -38,7 +37,7 @@ static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last)
         }
         first += count;
     }
-    for (hsep_int i = begin > self->ahead ? begin : self->ahead + 1; i < last && i < self->size; i++) {
+    for (hsep_int i = begin > self->n ? begin : self->n + 1; i < last && i < self->size; i++) {
         self->lag = distances[i - 1] < distances[self->lag - 1] ? i : self->lag; /* the shortest one of equals */
     }
 }
@@ -58,7 +57,7 @@ HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command)
         if (part == 0) {
             const hsep_real change = hsep_at(self, self->changes)[self->newest];
             self->compared = self->newest;
-            self->lag = self->ahead;
+            self->lag = self->n;
             self->moved = self->fading * self->moved + (change * change + HSEP_RECALL_ALIKE);
         }
         recall_compare(self, 1 + part * size / self->stride, 1 + (part + 1) * size / self->stride);
@@ -80,7 +79,7 @@ HSEP_API hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last,
     const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
     const hsep_int n = self->n, lag = self->lag;
     memset(recalled, 0, (size_t)n * sizeof(hsep_real));
-    if (self->size <= self->ahead) {
+    if (self->size <= self->n) {
         return 0.0;
     }
     for (hsep_int k = 0; k < n; k++) {

@@ -15,8 +15,8 @@
 typedef struct {
     hsep_int size;       /* samples; 0: none */
     hsep_int stride;     /* samples that a change is over, and from one comparison to the next */
-    hsep_int Np, n;      /* samples of a window, and of a prediction */
-    hsep_int ahead;      /* samples from the last residual to the last command, >= n */
+    hsep_int Np;         /* samples of a window */
+    hsep_int n;          /* samples of a prediction: from the last residual to the last command */
     hsep_real fading;    /* of a sum from one comparison to the next */
     hsep_real moved;     /* m2, sum of the squares of the changes */
     hsep_int heard;      /* commands of this window that came */
@@ -32,7 +32,7 @@ typedef struct {
     hsep_int distances; /* (size,) m2, of the lags 1 ... size */
 } hsep_recall;
 
-HSEP_ASSERT_WORDS(hsep_recall, 17);
+HSEP_ASSERT_WORDS(hsep_recall, 16);
 
 /* Set what follows from the parameters, the rest of the block being 0, at rest; return the bytes of the block. */
 HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters);
