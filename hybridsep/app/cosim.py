@@ -250,19 +250,11 @@ def _check_pair(
     from ..cosim.adapters import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
     from ..fmi.compile import check_available
-    from ..fmi.spec import fmu_names
 
-    models = fmu_names(axis).values()
-    if plant is None and "FeedDrive" not in models:
-        raise ParameterError(
-            f"machine {axis.name} has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant "
-            "FMU with --plant"
-        )
-    if predictor is None and model not in models:
-        raise ParameterError(
-            f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "
-            "compensator FMU with --predictor"
-        )
+    if plant is None:
+        axis.check_section("plant", ", or name a plant FMU with --plant")
+    if predictor is None and model == "SepCompensator":
+        axis.check_section("drive_limits", ", or name a compensator FMU with --predictor")
     if predictor is not None and weights is not None:
         raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
     there = (("--predictor", predictor, ("predictor", "compensator")), ("--plant", plant, ("plant",)))

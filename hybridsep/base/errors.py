@@ -1,16 +1,4 @@
-"""Exception hierarchy of the library.
-
-::
-
-    HybridSepError
-    ├── ParameterError   a parameter out of its range, or several that are inconsistent
-    ├── SignalError      samples that cannot be used: NaN, wrong shape, wrong length
-    ├── LogError         a recorded log that cannot be read: columns, time axis, format
-    ├── MachineError     a machine file that cannot be read or is inconsistent
-    ├── ModelError       a linear model that is unstable, improper or of an unsupported kind
-    ├── IdentificationError  a recording or a frequency response that cannot determine a model
-    ├── StateError       a saved state that is foreign, truncated or of another version
-    └── FmuError         an FMU that cannot be built, or a call that FMI does not allow now
+"""Exception hierarchy of the library: each class below :class:`HybridSepError` says what it is for.
 
 Each message names the thing, what was expected, what came and, where there is one, the way out.
 """

@@ -1,5 +1,6 @@
 """Figures of merit of sampled signals, and how results show theirs: in one line, in a table, in a plot."""
 
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .signals import Array
 
 if TYPE_CHECKING:
-    from .shown_figure import ShownFigure
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -148,9 +149,14 @@ def html_table(title: str, figures: Mapping[str, Any]) -> str:
     return f"<table><caption>{escape(title)}</caption>{rows}</table>"
 
 
-def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> "ShownFigure":
-    """Return a figure of lines over ``x``."""
-    from .shown_figure import ShownFigure
+def line_plot(x: Array, lines: Mapping[str, Array], x_label: str, y_label: str) -> "Figure":
+    """Return a figure of lines over ``x``, which a notebook shows without pyplot or a magic command."""
+    from matplotlib.figure import Figure
+
+    class ShownFigure(Figure):
+        def _repr_png_(self) -> bytes:
+            self.savefig(file := io.BytesIO(), format="png")
+            return file.getvalue()
 
     figure = ShownFigure(figsize=(8.0, 3.5), layout="constrained")
     axes = figure.subplots()

@@ -11,7 +11,7 @@ the least damping, is below 1e30 m, and the smallest divisor, a limit as a diffe
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, asdict, dataclass, fields, replace
+from dataclasses import MISSING, Field, dataclass, fields, replace
 from functools import cache
 from typing import Any, ClassVar, TypeVar
 
@@ -31,6 +31,7 @@ class Settings:
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ()  # fields that may be None
+    LABEL: ClassVar[str] = ""  # name of a field in messages; its parameter's if it is empty
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ()
     """Fields that are no entries of these settings' own section of a machine file."""
@@ -47,7 +48,7 @@ class Settings:
             if value is None and name in self.OPTIONAL:
                 continue
             try:
-                object.__setattr__(self, name, parameter.checked(value, self._label(name)))
+                object.__setattr__(self, name, parameter.checked(value, self.LABEL.format(name) or None))
             except ParameterError as error:
                 problems.append(str(error))
         problems = problems or self._misfits()
@@ -93,13 +94,9 @@ class Settings:
         found = {parameter.name: (parameter, getattr(self, name)) for name, parameter in self.parameters().items()}
         return {name: parameter.to_fmi(value) for name, (parameter, value) in found.items() if value is not None}
 
-    def as_table(self) -> dict[str, Any]:
-        """Return plain scalars and tables by the names of the fields, for a saved state."""
-        return asdict(self)
-
     @classmethod
     def from_table(cls: type[_SettingsType], table: Mapping[str, Any]) -> _SettingsType:
-        """Return the settings of :meth:`as_table`; ParameterError if an entry is missing, unknown or out of range."""
+        """Return the settings of plain values, as of ``asdict``; ParameterError if one is missing or out of range."""
         names = [field.name for field in fields(cls)]
         if not isinstance(table, Mapping) or sorted(table) != sorted(names):
             raise ParameterError(f"settings must be {', '.join(names)}, got {brief(table)}")
@@ -108,11 +105,6 @@ class Settings:
     def _misfits(self) -> list[str]:
         """Return a message for each joint constraint that is violated."""
         return []
-
-    @classmethod
-    def _label(cls, name: str) -> str | None:
-        """Return the name of a field in messages; None for its parameter's name."""
-        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,6 +227,8 @@ class PredictorSettings(Settings):
 class Limits(Settings):
     """Kinematic limits; ``v_max``, ``a_max`` and ``j_max`` in FMUs."""
 
+    LABEL = "the {} limit"
+
     velocity: float = real(
         *(0.1, 1e-9, 1e4, "m/s", "largest velocity of the modified command"),
         name="v_max",
@@ -247,10 +241,6 @@ class Limits(Settings):
     jerk: float = real(
         *(5000.0, 1e-6, 1e12, "m/s3", "largest jerk of the modified command"), name="j_max", unless_given=MISSING
     )
-
-    @classmethod
-    def _label(cls, name: str) -> str:
-        return f"the {name} limit"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -383,7 +373,7 @@ class CompensatorSettings(Settings):
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> "CompensatorSettings":
-        """Return the settings of :meth:`as_table`."""
+        """Return the settings of plain values."""
         settings = super().from_table(table)
         return settings if settings.limits is None else replace(settings, limits=Limits.from_table(table["limits"]))
 

@@ -12,8 +12,8 @@ remainder keeps the limits. The next plan starts from that remainder: there is a
 other can be computed the remainder is followed.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -144,14 +144,6 @@ class SepCompensator:
             self.monitor.error_max = changed.following_error_max
             self._planning.adopt(self._bounds(changed), changed)
 
-    def retune(self, values: Mapping[str, Any]) -> None:
-        """Take over an FMU's tunable parameters and the level of its ``reset``, by the names of its variables."""
-        self.monitor.take_reset(bool(values["reset"]))
-        tunable = [self.settings.parameters()[name] for name in _TUNABLE]
-        given = {one.name: one.from_fmi(values[one.name]) for one in tunable}
-        if any(getattr(self.settings, name) != value for name, value in given.items()):
-            self.change(**given)
-
     @property
     def T_s(self) -> float:
         """Sampling interval, s."""
@@ -268,14 +260,9 @@ class SepCompensator:
             self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
 
-    @property
-    def is_planned(self) -> bool:
-        """Whether a planned window is pending measurement."""
-        return self._pending is not None
-
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
-        meta = {"settings": self.settings.as_table(), "is_planned": self.is_planned}
+        meta = {"settings": asdict(self.settings), "is_planned": self._pending is not None}
         arrays = arrays_of((self._saved(), self._pending or ()))
         return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
 

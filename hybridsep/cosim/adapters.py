@@ -144,11 +144,11 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     """FMU whose instance lives as long as the context.
 
     ``path``: the archive; ``role``: name of the instance, as its log messages show it; ``values``: parameters to set
-    before the initialization; ``start_time``: start of the experiment, s.
+    before the initialization.
     """
 
-    def __init__(self, path: str | Path, role: str, values: Mapping[str, Any], start_time: float) -> None:
-        self._path, self._role, self._values, self._start_time = path, role, values, start_time
+    def __init__(self, path: str | Path, role: str, values: Mapping[str, Any]) -> None:
+        self._path, self._role, self._values = path, role, values
         self.name: str = Path(path).name
 
     def __enter__(self) -> "_OpenedFmu":
@@ -161,7 +161,7 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
         self.fmu.close()
 
     def _initialise(self, inputs: Mapping[str, float]) -> None:
-        self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
+        self.fmu.initialise({**self._values, **inputs})
 
     def _interval(self) -> float:
         """Return the sampling interval reported by the FMU, s, checked."""
@@ -171,13 +171,13 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
 class FmuController(_OpenedFmu):
     """A predictor or compensator FMU; FmuError if the archive is no FMU, or neither of the two."""
 
-    def __init__(self, path: str | Path, values: Mapping[str, Any], start_time: float) -> None:
+    def __init__(self, path: str | Path, values: Mapping[str, Any]) -> None:
         from .fmu import read_description  # fmpy is loaded where an FMU is
 
         outputs = [variable.name for variable in read_description(path).modelVariables]
         self.kind: ControllerType = COMPENSATOR if COMPENSATOR.outputs[0] in outputs else PREDICTOR
         check_controller(path, self.kind)
-        super().__init__(path, self.kind.name, values, start_time)
+        super().__init__(path, self.kind.name, values)
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
@@ -199,7 +199,7 @@ class FmuController(_OpenedFmu):
 
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
-        self._step((x_d_ahead, x_meas), self._start_time + k * self.T_s, self.T_s)
+        self._step((x_d_ahead, x_meas), k * self.T_s, self.T_s)
 
 
 class FmuDrive(_OpenedFmu):
@@ -207,9 +207,9 @@ class FmuDrive(_OpenedFmu):
 
     T_s: float | None = None
 
-    def __init__(self, path: str | Path, values: Mapping[str, Any], start_time: float) -> None:
+    def __init__(self, path: str | Path, values: Mapping[str, Any]) -> None:
         check_plant(path)
-        super().__init__(path, "plant", values, start_time)
+        super().__init__(path, "plant", values)
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
@@ -226,7 +226,7 @@ class FmuDrive(_OpenedFmu):
 
     def step(self, k: int, x_d: float, h: float) -> None:
         """Advance from sample ``k`` by ``h`` seconds with the command ``x_d``, m, held."""
-        self._step((x_d,), self._start_time + k * h, h)
+        self._step((x_d,), k * h, h)
 
 
 def check_controller(path: str | Path, kind: ControllerType) -> None:

@@ -44,7 +44,6 @@ def cosimulate(
     plant_values: Mapping[str, Any] | None = None,
     encoder: Encoder | None = None,
     t_init: float | None = None,
-    start_time: float = 0.0,
     sensor: Sensor | None = None,
     disturb: _Disturb | None = None,
     progress: Progress | None = None,
@@ -66,8 +65,6 @@ def cosimulate(
         Position sensor of a plant of the library; without noise if left out.
     t_init : float, optional
         Warm-up of a controller of the library, s; its own if left out, 0 for a warm start.
-    start_time : float
-        Start of the experiment, s.
     sensor, disturb, progress : callable, optional
         As :data:`Sensor`, :data:`_Disturb` (of an FMU with its ``FmuInstance``) and :data:`Progress` say.
 
@@ -86,7 +83,7 @@ def cosimulate(
     ahead: FmuController | LibraryController | OwnController
     if isinstance(controller, (str, Path)):
         _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
-        ahead = FmuController(controller, controller_values or {}, start_time)
+        ahead = FmuController(controller, controller_values or {})
     else:
         _refuse(controller_values, "controller_values are for an FMU; make the controller with these parameters")
         if isinstance(controller, HybridPredictor | SepCompensator):
@@ -97,7 +94,7 @@ def cosimulate(
     drive: FmuDrive | LibraryDrive
     if isinstance(plant, (str, Path)):
         _refuse(encoder, "encoder is for a plant of the library; an FMU's noise and seed are among its plant_values")
-        drive = FmuDrive(plant, plant_values or {}, start_time)
+        drive = FmuDrive(plant, plant_values or {})
     else:
         _refuse(plant_values, "plant_values are for an FMU; make the plant with these parameters")
         drive = LibraryDrive(plant, encoder or Encoder())
@@ -139,8 +136,7 @@ def cosimulate(
         n_rejected = ahead.n_rejected()
     found = dict(zip((*kind.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True))
     found.setdefault("x_dm", found["x_d"])
-    t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
-    found |= {"t": t, "state": state[delay:]}
+    found |= {"t": np.asarray(np.arange(delay, n) * T_s, dtype=np.float64), "state": state[delay:]}
     return Run(kind, **found, T_s=T_s, Np=ahead.Np, n_rejected=n_rejected, measurement_delay=ahead.late, unit=unit)
 
 

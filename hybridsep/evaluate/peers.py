@@ -18,7 +18,7 @@ from scipy.signal import lfilter, lfiltic
 
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from .state_space import identified, inputs_of
+from .state_space import folded, identified, inputs_of
 
 _LATE_MAX, _TIME_CONSTANTS = 21, (0.05, 1e4)
 """Most samples that a command is tried to be late by; least and largest time constant that are tried, samples."""
@@ -57,7 +57,6 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
 
 
 _BRIDGED = 0.5  # share of a row's lags that may be interpolated, as they were not measured
-_BLOCK = 4096  # rows that are factorised at once
 
 
 class MinimumNorm:
@@ -69,8 +68,7 @@ class MinimumNorm:
 
     def add(self, rows: Array) -> None:
         """Add rows of regressors, the target in the last column, ``(m, n_columns + 1)``."""
-        for i in range(0, len(rows), _BLOCK):
-            self._R = np.asarray(np.linalg.qr(np.concatenate((self._R, rows[i : i + _BLOCK])), mode="r"))
+        self._R = folded(self._R, rows)
         self._n_rows += len(rows)
 
     def solution(self) -> Array:

@@ -56,6 +56,13 @@ def inputs_of(x_d: Array) -> Array:
     return np.column_stack((np.diff(x_d, prepend=x_d[0]), np.ones(len(x_d))))
 
 
+def folded(R: Array, rows: Array) -> Array:
+    """Return the triangular factor of all rows so far, ``R`` and then ``rows``."""
+    for i in range(0, len(rows), _BLOCK):
+        R = np.asarray(np.linalg.qr(np.concatenate((R, rows[i : i + _BLOCK])), mode="r"))
+    return R
+
+
 def identified(records: Sequence[tuple[Array, Array]], Np: int) -> StateSpace | None:
     """Return the model with the least error over windows of ``Np`` samples of records ``(u, y)``; None without any."""
     width, R = _LAGS + 1, np.zeros((0, 2 * _LAGS + 3))
@@ -64,9 +71,7 @@ def identified(records: Sequence[tuple[Array, Array]], Np: int) -> StateSpace | 
             continue
         windows = [sliding_window_view(one, width)[:, ::-1] for one in (y, u[:, 0])]
         rows = np.hstack([*windows, np.ones((len(y) - _LAGS, 1))])
-        rows = rows[~np.isnan(rows).any(axis=1)]
-        for i in range(0, len(rows), _BLOCK):
-            R = np.asarray(np.linalg.qr(np.concatenate((R, rows[i : i + _BLOCK])), mode="r"))
+        R = folded(R, rows[~np.isnan(rows).any(axis=1)])
     if len(R) < R.shape[1]:
         return None
     n_rows = sum(int((~np.isnan(y)).sum()) for _, y in records)

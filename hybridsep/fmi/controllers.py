@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import FmuError, ParameterError
+from ..base.errors import ParameterError
 from ..base.files import atomic_open_text, data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
@@ -62,10 +62,10 @@ def component_files(model: str) -> dict[str, bytes]:
 def axis_files(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> dict[str, bytes]:
     """Return the files of an axis' folder, with what an earlier run has learned: name → content.
 
-    FmuError if a compensator is asked for a machine without limits of its drive.
+    MachineError if a compensator is asked for a machine without limits of its drive.
     """
     if model == "SepCompensator":
-        _check_limits(machine, "--predictor writes the component that predicts alone")
+        machine.check_section("drive_limits", ", or write a predictor's (--predictor)")
     table = table_of(machine, model, machine.name, warm=trained is not None)
     files: dict[str, bytes] = {}
     if trained is not None:
@@ -75,23 +75,14 @@ def axis_files(machine: Machine, model: str, trained: "HybridPredictor | None" =
     return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
 
 
-def _check_limits(machine: Machine, instead: str) -> None:
-    """Raise FmuError if a machine has no limits of its drive, which a compensator needs; ``instead`` needs none."""
-    if machine.drive_limits is None:
-        raise FmuError(
-            "the compensator needs what the drive allows: [drive_limits] in the machine file of "
-            f"{machine.name}; {instead}"
-        )
-
-
 _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
 
 
 def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> str:
-    """Return the header's text, with what was learned; FmuError if a compensator has no limits of its drive."""
+    """Return the header's text, with what was learned; MachineError if a compensator has no limits of its drive."""
     compensates = model == "SepCompensator"
     if compensates:
-        _check_limits(machine, "--predictor writes the header of a predictor")
+        machine.check_section("drive_limits", ", or write a predictor's (--predictor)")
     numbers = machine.fmi_compensator_parameters() if compensates else machine.fmi_parameters()
     settings = [
         f"    parameters->{part}.{name} = {numbers[name] + 0!r};"  # truth values are numbers there

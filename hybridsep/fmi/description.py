@@ -11,9 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from ..base.version import __version__
+from ..base.version import VERSION_DATE, __version__
 from .c_header import layout_of
-from .spec import AUTHOR, COPYRIGHT, FmuSpec, generation_time
+from .spec import AUTHOR, COPYRIGHT, FmuSpec
 from .variables import INTERPOLATED, FmuTable, Variable
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -64,7 +64,7 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
         "author": AUTHOR,
         "copyright": COPYRIGHT,
         "generationTool": generation_tool,
-        "generationDateAndTime": generation_time(),
+        "generationDateAndTime": f"{VERSION_DATE}T00:00:00Z",
     }
     simulation.set("modelIdentifier", name)
     if not fmi3:

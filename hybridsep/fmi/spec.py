@@ -2,11 +2,9 @@
 
 import hashlib
 import json
-import os
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -15,7 +13,6 @@ from ..base.errors import FmuError
 from ..base.files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS
 from ..base.signals import Array, as_samples
-from ..base.version import VERSION_DATE
 from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
@@ -169,17 +166,6 @@ def _title(machine: Machine, model: str) -> str:
         return title
     settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
     return f"{title}; the paper's settings are {settings}"
-
-
-def generation_time() -> str:
-    """Return ``generationDateAndTime``: of this version, or ``$SOURCE_DATE_EPOCH``; FmuError if that is no number."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if not epoch:
-        return f"{VERSION_DATE}T00:00:00Z"
-    try:
-        return datetime.fromtimestamp(int(epoch), timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
-    except (ValueError, OverflowError, OSError):
-        raise FmuError(f"SOURCE_DATE_EPOCH must be a number of seconds since 1970, got {epoch!r}; unset it") from None
 
 
 def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:

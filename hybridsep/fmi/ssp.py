@@ -146,13 +146,12 @@ def _add_units(parent: ET.Element, variables: Iterable[Variable]) -> None:
 
 
 def check_system(machine: Machine, *, compensate: str | None, ssp: str = SSP_VERSIONS[0]) -> None:
-    """Check the version of SSP, and that a machine has a plant and, to compensate, drive limits; FmuError if not."""
+    """Raise FmuError for an unknown version of SSP, MachineError without a plant or, to compensate, drive limits."""
     if ssp not in SSP_VERSIONS:
         raise FmuError(f"the version of SSP must be one of {', '.join(SSP_VERSIONS)}, got {ssp!r}")
-    if machine.plant is None:
-        raise FmuError(f"machine {machine.name} has no [plant] section, which a system needs for its drive")
-    if compensate is not None and machine.drive_limits is None:
-        raise FmuError(f"machine {machine.name} has no [drive_limits], which a compensator must keep; add them")
+    machine.check_section("plant")
+    if compensate is not None:
+        machine.check_section("drive_limits")
 
 
 def build_system(
@@ -173,7 +172,7 @@ def build_system(
     {"off", "physics", "hybrid"}: best model with which a SepCompensator modifies the command; if left out a
     HybridPredictor only predicts; ``targets``, ``weights``: as in :func:`hybridsep.fmi.archive.build_fmu`, for the
     look-ahead; ``ssp``: {"1", "2"}: version of SSP: 1.0 with FMI 2.0 FMUs, 2.0 with FMI 3.0 FMUs; ``progress``:
-    called with a message and the fraction done. FmuError if the machine has no plant or no drive limits, a library
+    called with a message and the fraction done. MachineError without a plant or drive limits; FmuError if a library
     cannot be had, or there is no such version of SSP; SignalError if ``command`` is not finite or empty; StateError
     if ``weights`` is no saved predictor, or one of another machine or other settings.
     """

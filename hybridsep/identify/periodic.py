@@ -14,6 +14,7 @@ from scipy.signal import lombscargle
 
 from ..base.signals import Array
 from ..model.physics import ModalModel
+from .output_error import without
 
 PREDICTED = 0.35
 """Share of the variance in one half that the other predicts, both ways, from which a period is believed: at most 0.18
@@ -53,13 +54,13 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     if highest <= lowest:
         return 0.0
     known = _baseline(s, v, a)
-    rest = e - known @ np.linalg.lstsq(known, e, rcond=None)[0]
+    rest = without(known, e)
     n_lines = int(min(_LINES_MAX, _OVERSAMPLED * travel * (highest - lowest) + 2))
     lines = lowest + np.arange(n_lines) / (_OVERSAMPLED * travel)
     power = lombscargle(s, rest, 2.0 * np.pi * lines)
     peak, width = float(lines[np.argmax(power)]), 1.0 / (_OVERSAMPLED * travel)
     best = minimize_scalar(
-        lambda line: float(np.sum(_without(np.column_stack((known, _waves(s, line))), e) ** 2)),
+        lambda line: float(np.sum(without(np.column_stack((known, _waves(s, line))), e) ** 2)),
         bounds=(max(lowest, peak - 3.0 * width), peak + 3.0 * width),
         method="bounded",
         options={"xatol": 1e-4 * width},
@@ -85,7 +86,7 @@ def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
         both = np.column_stack((known, waves))[fitted]
         weights = np.linalg.lstsq(both, e[fitted], rcond=None)[0][-2:]
         target, told = (part[~fitted] for part in (e, waves @ weights))
-        target, told = _without(known[~fitted], target), _without(known[~fitted], told)
+        target, told = without(known[~fitted], target), without(known[~fitted], told)
         power = float(target @ target)
         shares.append(1.0 - float(np.sum((target - told) ** 2)) / power if power > 0.0 else 0.0)
     return min(shares)
@@ -94,10 +95,6 @@ def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
 def _waves(s: Array, line: float) -> Array:
     angle = 2.0 * np.pi * line * s
     return np.column_stack((np.sin(angle), np.cos(angle)))
-
-
-def _without(known: Array, signal: Array) -> Array:
-    return np.asarray(signal - known @ np.linalg.lstsq(known, signal, rcond=None)[0])
 
 
 def _rounded(value: float, within: float) -> float:

@@ -53,6 +53,14 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..predict.predictor import HybridPredictor
 
 
+_NEEDED = {
+    "plant": "which hybridsep fit writes from a log of the axis",
+    "limits": "of its trajectory; add them",
+    "drive_limits": "which a compensator must keep; add them",
+}
+"""Sections that a machine may lack, and what they are for."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Machine(Section):
     """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad.
@@ -170,6 +178,11 @@ class Machine(Section):
             values = {section: {**self.table.get(section, {}), **values}}
         return machine_from_table({**self.table, **values})
 
+    def check_section(self, name: Literal["plant", "limits", "drive_limits"], instead: str = "") -> None:
+        """Raise MachineError if the file lacks a section, with what it is for, and a way without it, ``instead``."""
+        if getattr(self, name) is None:
+            raise MachineError(f"machine {self.name} has no [{name}], {_NEEDED[name]}{instead}")
+
     def new_predictor(self, settings: PredictorSettings | None = None) -> "HybridPredictor":
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
         from ..predict.predictor import HybridPredictor
@@ -193,10 +206,8 @@ class Machine(Section):
         MachineError
             If the file has no ``[plant]``, as for a recorded axis.
         """
-        if self.plant is None:
-            raise MachineError(
-                f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
-            )
+        self.check_section("plant")
+        assert self.plant is not None
         values = {**self.plant.values("kind", "noise_std", "seed", "mode"), **changes}
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by _check_plant
@@ -211,8 +222,7 @@ class Machine(Section):
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the compensator FMU's parameters; MachineError if they allow no planning."""
-        if self.drive_limits is None:
-            raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
+        self.check_section("drive_limits")
         predictor = self.compensator_predictor
         try:
             predictor.check_planning()
@@ -245,8 +255,8 @@ class Machine(Section):
 
     def trajectory_limits(self) -> Limits:
         """Return the limits of the reference trajectory; MachineError if the file has no ``[limits]``."""
-        if self.limits is None:
-            raise MachineError(f"machine {self.name} has no [limits] section")
+        self.check_section("limits")
+        assert self.limits is not None
         return Limits(**self.limits.values())
 
     def command_limits(self) -> tuple[Limits | None, float | None]:

@@ -14,7 +14,7 @@ what is measured over the fill. ``t_init`` counts from the end of the fill.
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -39,8 +39,6 @@ class SepState(IntEnum):
 @dataclass(frozen=True)
 class PublishedWindow:
     """Commands of a window and the position predicted under them."""
-
-    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
 
     # (Np,), m: commanded position, and the modified command sent to the drive; the same without a planner
     x_d: Array
@@ -84,10 +82,6 @@ class WindowPlanner(Protocol):
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
 
-    @property
-    def is_planned(self) -> bool:
-        """Whether a planned window is pending measurement."""
-
 
 class Planner(WindowPlanner, Protocol):
     """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
@@ -128,11 +122,6 @@ class _Unmodified:
         if not self._at_rest:
             self.predictor.update(x)
         self._at_rest = False
-
-    @property
-    def is_planned(self) -> bool:
-        """Whether the current window is predicted, or the lead-in, and pending measurement."""
-        return self.predictor.n_pending == (0 if self._at_rest else self.preview)
 
 
 _KIND = "look-ahead"
@@ -330,14 +319,13 @@ class LookAhead:
             self.planner.update(self._measured)
             self._begin_window()
 
-    def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
-        """Raise SignalError if a window has diverged or an input of sample ``k``, by default the next, is invalid."""
+    def check(self, x_d_ahead: float, x_meas: float) -> None:
+        """Raise SignalError if a window has diverged, or an input of the next sample is invalid."""
         if self.diverged:
             raise SignalError(self.diverged)
-        sample = self.k if k is None else k
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
             if not (name == "x_meas" and math.isnan(x_meas) and self.may_miss):
-                check_position(name, value, f" at sample {sample}", self.unit)
+                check_position(name, value, f" at sample {self.k}", self.unit)
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""

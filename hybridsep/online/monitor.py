@@ -18,7 +18,6 @@ class Monitor:
     n_missing: int = 0  # measurements that were missing one after another
     n_over: int = 0  # samples above ``error_max`` one after another, three from when it tripped on
     n_taken: int = 0  # samples taken in since the window began
-    was_reset: bool = False  # last level of the reset
 
     @property
     def is_lost(self) -> bool:
@@ -47,9 +46,3 @@ class Monitor:
     def reset(self) -> None:
         """End a trip; what was learned before it is kept."""
         self.n_over = 0
-
-    def take_reset(self, level: bool) -> None:
-        """End a trip where the level of a reset rises."""
-        if level and not self.was_reset:
-            self.reset()
-        self.was_reset = level

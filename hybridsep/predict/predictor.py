@@ -6,7 +6,7 @@ recursion from the last ``p`` measured residuals, affine in the command.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -333,7 +333,7 @@ class HybridPredictor:
     def to_bytes(self) -> bytes:
         """Return parameters and state, a pending window included, as a versioned blob."""
         meta = {
-            "settings": self.settings.as_table(),
+            "settings": asdict(self.settings),
             "dead_time": self.model.dead_time,
             "n_disturbances": len(self.disturbances),
             "planned": self.planned,

@@ -95,8 +95,8 @@ class Uncertainty:
             bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
         components = np.empty((n, _N_COMPONENTS))
         components[:, 0] = 1.0
-        _set_differences(components[:, 1], x_pb)
-        components[:, 1] = np.minimum(np.abs(components[:, 1]), PREDICTION_MAX) ** 2
+        changes = np.diff(x_pb) if n > 1 else np.zeros(1)  # the first one as the second
+        components[:, 1] = np.minimum(np.abs(np.concatenate((changes[:1], changes)))[:n], PREDICTION_MAX) ** 2
         components[:, 2] = variance
         gain = 1.0 / (1.0 + _FELT_FOR * Np)
         components[:, 1:] = lfilter([gain], [1.0, gain - 1.0], components[:, 1:], axis=0)
@@ -154,12 +154,6 @@ def first_variance(settings: PredictorSettings) -> float:
     if settings.noise_std > 0.0:
         return max(settings.lam, settings.noise_std**2)
     return min(_UNKNOWN_NOISE * settings.lam, PREDICTION_MAX)
-
-
-def _set_differences(changes: Array, signal: Array) -> None:
-    """Set the changes of a signal from sample to sample, ``(n,)``, the first one as the second."""
-    np.subtract(signal[1:], signal[:-1], out=changes[1:])
-    changes[0] = changes[1] if len(signal) > 1 else 0.0
 
 
 def _mean_square(signal: Array) -> float:

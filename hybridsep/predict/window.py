@@ -95,11 +95,6 @@ class WindowOperator:
         """``(n, n)`` array, lower-triangular Toeplitz."""
         return np.asarray(toeplitz(self.g_h, np.zeros(len(self.g_h))))
 
-    @property
-    def G_pb(self) -> Array:
-        """``(n, n)`` array, lower-triangular Toeplitz."""
-        return np.asarray(toeplitz(self.g_pb, np.zeros(len(self.g_pb))))
-
     def __call__(self, x_d: ArrayLike) -> Array:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
         command = as_samples(x_d, "x_d", len(self.g_h))

@@ -185,7 +185,7 @@ def test_cosim_of_two_axes_along_a_path(hybridsep: Run, tmp_path: Path) -> None:
         (("als25010_x", "--path", "part.ngc"), "two machines and a path belong together, got 1:"),
         (("als25010_x", "als25010_y"), "got 2 and none"),
         (("als25010_x", "als25010_y", "--path", "part.ngc", "-m", "emps", "--compensate", "off"), "are for one axis"),
-        (("als25010_x", "emps", "--path", "part.ngc"), "machine emps has no plant"),
+        (("als25010_x", "emps", "--path", "part.ngc"), "machine emps has no [plant]"),
         (("als25010_x", "als25010_y", "--path", "part.ngc", "--figure", "part.ngc"), "--figure must end in .png"),
     ],
 )

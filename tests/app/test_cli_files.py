@@ -168,7 +168,7 @@ REFUSED = [
     ("build FeedDrivePy --flavour python --out {log}", "is a file, not a folder"),
     ("build HybridPredictor --weights {log}", "a saved state of kind 'predictor' was expected"),
     ("build FeedDrive --unit furlong", UNITS),
-    ("cosim -m emps", "emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant"),
+    ("cosim -m emps", "emps has no [plant], which hybridsep fit writes from a log of the axis, or name a plant"),
     ("cosim --trajectory zigzag", "zigzag"),
     ("cosim --unit furlong", UNITS),
     ("cosim --out run.xlsx", "--out must end in .csv or .npz, got 'run.xlsx'"),

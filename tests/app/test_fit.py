@@ -76,7 +76,7 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(built: dict[str, Path
         expected.append(trained.predict(x_d[i : i + NP]).x_h)
         trained.update(x[i : i + NP])
     (path,) = (path for path in built.values() if path.suffix == ".fmu")
-    controller = FmuController(path, {}, 0.0)
+    controller = FmuController(path, {})
     x_h = []
     with controller:
         controller.initialise(float(x_d[0]))

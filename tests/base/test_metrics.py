@@ -1,6 +1,7 @@
 """Figures of merit against closed forms."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,6 +76,7 @@ def test_peak_derivatives_of_a_cubic() -> None:
 
 def test_a_notebook_shows_a_figure_and_units_are_the_axis_own() -> None:
     figure = line_plot(np.arange(3.0), {"error": np.zeros(3)}, "t [s]", "error [µm]")
-    assert figure._repr_png_().startswith(b"\x89PNG")  # what IPython asks a value for
+    shown: Any = figure
+    assert shown._repr_png_().startswith(b"\x89PNG")  # what IPython asks a value for
     named = in_unit({"rms_h_um": 1.0, "peak_velocity_m_s": 2.0, "n": 3}, "rad")
     assert named == {"rms_h_urad": 1.0, "peak_velocity_rad_s": 2.0, "n": 3}

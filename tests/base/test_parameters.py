@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -188,8 +189,8 @@ def test_settings_and_an_fmus_values_are_the_same() -> None:
     assert (values["input_hold"], values["compensate"], values["v_max"]) == (1, 1, 0.2)
     assert PredictorSettings.from_fmi(values) == predictor
     assert CompensatorSettings.from_fmi(values) == compensator
-    assert PredictorSettings.from_table(predictor.as_table()) == predictor
-    assert CompensatorSettings.from_table(compensator.as_table()) == compensator
+    assert PredictorSettings.from_table(asdict(predictor)) == predictor
+    assert CompensatorSettings.from_table(asdict(compensator)) == compensator
     with pytest.raises(
         ParameterError, match=r"^v_max must be 1e-09 … 10000 m/s, got 0; compensate must be 0 … 2, got 3$"
     ):
@@ -197,7 +198,7 @@ def test_settings_and_an_fmus_values_are_the_same() -> None:
 
 
 def test_a_table_of_settings_has_all_of_them_and_nothing_else() -> None:
-    table = PredictorSettings(averaging=False).as_table()
+    table = asdict(PredictorSettings(averaging=False))
     for wrong in ({**table, "more": 1}, {name: value for name, value in table.items() if name != "q"}):
         with pytest.raises(ParameterError, match=f"settings must be {', '.join(table)}, got"):
             PredictorSettings.from_table(wrong)

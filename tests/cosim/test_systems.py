@@ -201,7 +201,7 @@ def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--machine", "emps"), "machine emps has no [plant] section, which a system needs for its drive"),
+        (("--machine", "emps"), "machine emps has no [plant], which hybridsep fit writes"),
         (("--out", "axis.zip"), "--out must end in .ssp"),
         (("--compensate", "best"), "--compensate must be one of off, physics, hybrid, got 'best'"),
         (("--ssp", "3"), "the version of SSP must be one of 1, 2, got '3'"),

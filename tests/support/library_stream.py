@@ -11,6 +11,8 @@ from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, k
 from hybridsep import HybridSepError
 from hybridsep.base.clock import SampleClock
 from hybridsep.base.errors import SignalError
+from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.signals import check_position
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.plants.plant import Encoder
@@ -80,7 +82,7 @@ class LookAheadStream(LibraryStream):
         with refusing():
             self._look_ahead = library_look_ahead(self._values, self._weights)
             self._clock = SampleClock.begin(start, self._values["T_s"])
-        self._latched = (self._values["x_d_ahead"],) * 2
+        self._latched, self._was_reset = (self._values["x_d_ahead"],) * 2, False
 
     def step(self, t: float, h: float) -> None:
         """Latch the inputs at each instant within the step, and execute them where the next one is reached."""
@@ -90,7 +92,9 @@ class LookAheadStream(LibraryStream):
                 raise SignalError(self._look_ahead.diverged)
             step, pending = self._clock.stepped(t, h), self._clock.latched
             if step.n_latched:
-                self._look_ahead.check(*inputs, self._clock.k + pending)
+                for name, value in zip(("x_d_ahead", "x_meas"), inputs, strict=True):
+                    if name == "x_d_ahead" or not (np.isnan(value) and self._look_ahead.may_miss):
+                        check_position(name, value, f" at sample {self._clock.k + pending}")
             self._tune()
             for _ in range(step.n_samples):
                 self._look_ahead.sample(*(self._latched if pending else inputs))
@@ -100,9 +104,13 @@ class LookAheadStream(LibraryStream):
         self._clock = step.after
 
     def _tune(self) -> None:
-        compensator = self._look_ahead.planner
+        compensator, reset = self._look_ahead.planner, bool(self._values.get("reset", False))
         if isinstance(compensator, SepCompensator):
-            compensator.retune(self._values)
+            if reset and not self._was_reset:
+                compensator.monitor.reset()
+            tunable = ("compensate", "change_max", "following_error_max")
+            compensator.change(**{name: PARAMETERS[name].from_fmi(self._values[name]) for name in tunable})
+        self._was_reset = reset
 
     def outputs(self) -> list[float]:
         return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]
@@ -114,15 +122,15 @@ class LookAheadStream(LibraryStream):
         return shown
 
     def save(self) -> bytes:
-        meta = {"clock": self._clock.state(), "latched": self._latched, "values": self._values}
+        meta = {"clock": self._clock.state(), "latched": (*self._latched, self._was_reset), "values": self._values}
         return pack(f"stream {self.model}", meta, {}, {"core": self._look_ahead.to_bytes()})
 
     def restore(self, blob: bytes) -> None:
         with refusing():
             meta, _, parts = unpack(f"stream {self.model}", blob)
             self._look_ahead = restored_look_ahead(self._kind, parts["core"])
-        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"])
-        self._values = meta["values"]
+        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"][:2])
+        self._values, self._was_reset = meta["values"], meta["latched"][2]
 
 
 class PlantStream(LibraryStream):

@@ -108,7 +108,7 @@ def live(
             if served is not None:
                 sinks.append(served)
                 _say(f"page: {served.address}")
-            run = run_live(origin, FmuController(predictor, {}, 0.0), sinks, watch=watch)
+            run = run_live(origin, FmuController(predictor, {}), sinks, watch=watch)
             _print_run(run.status, shown, as_json=as_json)
             if served is not None and served.n_dropped:
                 _say(f"note: the page was too slow for {served.n_dropped} samples")

@@ -60,7 +60,7 @@ def case(request: pytest.FixtureRequest, fmus: BuiltFmus) -> Case:
 
 def live(fmu: Path, samples: list[Sample | None], **values: object) -> tuple[Kept, LiveRun]:
     kept = Kept()
-    found = run_live(Listed(samples), FmuController(fmu, values, 0.0), [kept])
+    found = run_live(Listed(samples), FmuController(fmu, values), [kept])
     assert found.n_rows == len(kept.rows)
     return kept, found
 
@@ -116,7 +116,7 @@ def test_a_log_at_its_speed(fmus: BuiltFmus, case: Case, tmp_path: Path) -> None
     log = read_log(write_rows(tmp_path / "log.csv", run.x_d, np.array(arrived)))
     kept = Kept()
     done = run_live(
-        RecordedSource(log, speed=8.0), FmuController(fmus("HybridPredictor"), {"measurement_delay": late}, 0.0), [kept]
+        RecordedSource(log, speed=8.0), FmuController(fmus("HybridPredictor"), {"measurement_delay": late}), [kept]
     )
     assert equal(kept.rows, run, late)
     assert np.allclose([row.t for row in kept.rows], np.arange(2500 - late) * 1e-3)
@@ -142,7 +142,7 @@ def test_what_is_refused(fmus: BuiltFmus) -> None:
     fmu = fmus("HybridPredictor")
     kept = Kept()
     with pytest.raises(FmuError, match=r"sample 0 is refused: .*x_meas must be finite"):
-        run_live(Listed([Sample(0.0, math.nan)] * 200), FmuController(fmu, {"averaging": False}, 0.0), [kept])
+        run_live(Listed([Sample(0.0, math.nan)] * 200), FmuController(fmu, {"averaging": False}), [kept])
     assert len(kept.ends) == 1
     assert "sample 0 is refused" in kept.ends[0]
     with pytest.raises(SignalError, match="sample 1: either all commands are ahead"):
