@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -14,7 +12,6 @@ import typer
 from docs.messages import ERRORS, FINDINGS, Explanation
 from hybridsep import load_machine
 from hybridsep.app.cli import EXAMPLES, app
-from hybridsep.base import errors
 from hybridsep.base.files import DEFAULT_MACHINE
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import CompensatorSettings
@@ -229,7 +226,7 @@ def messages() -> str:
     ]
     for name, one in FINDINGS.items():
         parts += [f"### {name}", *_explained(one)]
-    parts += ["## Exceptions", f"```text\n{_hierarchy()}\n```"]
+    parts += ["## Exceptions"]
     for name, one in ERRORS.items():
         parts += [f"### {name}", *_explained(one)]
     return _page(parts)
@@ -237,12 +234,6 @@ def messages() -> str:
 
 def _explained(one: Explanation) -> tuple[str, str]:
     return f"**Cause.** {one.cause}", f"**Remedy.** {one.remedy}"
-
-
-def _hierarchy() -> str:
-    text = inspect.getdoc(errors) or ""
-    lines = [line[4:] for line in text.splitlines() if re.match(r"    \S", line)]
-    return "\n".join(lines)
 
 
 def _option(one: Any) -> str:
