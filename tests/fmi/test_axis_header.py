@@ -76,4 +76,8 @@ def test_a_compensators_header_has_its_limits_and_compiles_as_cpp(hybridsep: Run
         check = [*compiler(), "-x", language, "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *folders, "-"]
         subprocess.run(check, input=source, text=True, check=True)
     status, _, err = hybridsep("header", "emps", "--out", str(tmp_path / "emps.h"))
-    assert (status, "--predictor writes the header of a predictor" in " ".join(err.split())) == (2, True)
+    assert (
+        status,
+        "emps has no [drive_limits], which a compensator must keep; add them, or write a predictor's"
+        in " ".join(err.split()),
+    ) == (2, True)
