@@ -454,7 +454,7 @@ static int axis_open(axis_data *self, const char *folder)
         return 0;
     }
     hsep_instance_reset(instance);
-    if (hsep_instance_initialise(instance, "loadrt " HSEP_COMPONENT, axis_message) != HSEP_OK) {
+    if (hsep_instance_initialise(instance, "loadrt " HSEP_COMPONENT, axis_message) == HSEP_REFUSED) {
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", name, axis_message);
         return 0;
     }

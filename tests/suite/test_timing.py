@@ -145,6 +145,19 @@ def test_each_kind_of_warning_is_given_once(new_stream: StreamMaker) -> None:
         assert "is 0.02 samples of T_s = 0.001 s before a sampling instant" in warnings[1]
 
 
+@on_all((*LOOK_AHEADS,), needs="warnings")
+@pytest.mark.parametrize("delay", [-1, 0, 1])
+def test_a_measurement_that_is_to_come_early_is_said_once(new_stream: StreamMaker, delay: int) -> None:
+    """No importer says in which order it steps, and the figures look right: only who set it knows."""
+    stream = new_stream()
+    stream.initialise({"averaging": True, "measurement_delay": delay})
+    for k in range(3):
+        stream.step(k * T_S, T_S)
+    warnings = stream.warnings()
+    assert len(warnings) == (delay < 0)
+    assert all("measurement_delay = -1 holds x_meas for a sample" in warning for warning in warnings)
+
+
 @on_all((*LOOK_AHEADS, TRAJECTORY))
 def test_a_restored_state_has_the_grid_that_it_was_saved_with(new_stream: StreamMaker) -> None:
     stream = new_stream()

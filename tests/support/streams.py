@@ -64,6 +64,7 @@ class CoreStream:
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
         self._take(values)
         self._refusing(self._core.initialise, start)
+        self._keep_warning()
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
         self._take(values)
@@ -78,8 +79,7 @@ class CoreStream:
 
     def step(self, t: float, h: float) -> None:
         self._refusing(self._core.step, t, h)
-        if self._core.warning:
-            self._warnings.append(self._core.warning)
+        self._keep_warning()
 
     def outputs(self) -> list[float]:
         return [self._core[name] for name in self._outputs]
@@ -102,6 +102,10 @@ class CoreStream:
 
     def close(self) -> None:
         pass
+
+    def _keep_warning(self) -> None:
+        if self._core.warning:
+            self._warnings.append(self._core.warning)
 
     def _take(self, values: Mapping[str, Value]) -> None:
         for name, value in values.items():

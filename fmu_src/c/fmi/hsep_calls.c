@@ -183,8 +183,12 @@ HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
     if (instance == NULL) {
         return HSEP_REFUSED;
     }
-    if (hsep_instance_initialise(instance, call->name, message) != HSEP_OK) {
+    const hsep_status status = hsep_instance_initialise(instance, call->name, message);
+    if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
+    }
+    if (status == HSEP_WARNED) {
+        hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
     }
     hsep_log(
         instance, HSEP_LOG_ALL, "initialized at %g s with a state of %lu bytes", instance->experiment.start_time,

@@ -76,14 +76,14 @@ HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const cha
         return hsep_message_add(message, "%s: no memory for a state of %lu bytes", call, (unsigned long)size);
     }
     instance->state_size = size;
-    if (hsep_model_initialise(
-            &instance->context, instance->state, size, instance->values, instance->experiment.start_time, message) !=
-        HSEP_OK) {
+    const hsep_status status = hsep_model_initialise(
+        &instance->context, instance->state, size, instance->values, instance->experiment.start_time, message);
+    if (status == HSEP_REFUSED) {
         hsep_instance_drop_state(instance);
         return HSEP_REFUSED;
     }
     instance->experiment.phase = HSEP_STEPPING;
-    return HSEP_OK;
+    return status;
 }
 
 HSEP_API void hsep_instance_free(hsep_instance *instance)

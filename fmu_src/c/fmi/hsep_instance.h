@@ -135,7 +135,7 @@ HSEP_API hsep_status hsep_instance_resize(hsep_instance *instance, const char *c
 HSEP_API void hsep_instance_reset(hsep_instance *instance);
 
 /* Take all memory of the simulation and fill it. If the parameters do not fit, they may be corrected and it called
- * again. */
+ * again. HSEP_WARNED: it is done, and the message is a warning. */
 HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[]);
 
 /* Give all memory back, the instance's too; NULL is fine. */

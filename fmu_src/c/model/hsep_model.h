@@ -77,6 +77,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 /* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs of t_start go to
  * values.
  * ReferenceTrajectory reads its resource, as in hsep_model_size and hsep_model_start_values; no step touches a file.
+ * HSEP_WARNED: the message says what only the importer knows to be right.
  * Fails if a start value is not finite, the weights are damaged or were learned with other settings, each of which is
  * named, or a resource cannot be read or has changed so that size does not fit. */
 HSEP_API hsep_status hsep_model_initialise(

@@ -314,6 +314,13 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     online_write(&self->online, values);
+    if (predictor->early) {
+        (void)hsep_message_add(
+            message,
+            "measurement_delay = -1 holds x_meas for a sample: set it under a sequential (Gauss-Seidel) master that "
+            "carries one connection of the loop within a step; under any other leave 0, as -1 makes errors larger");
+        return HSEP_WARNED;
+    }
     return HSEP_OK;
 }
 
