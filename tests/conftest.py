@@ -26,7 +26,6 @@ from pathlib import Path
 
 import pytest
 from built_once import SHARED_BUILDS, BuiltFmus, built_once
-from c_coverage import count_in, table
 from command_line import Run
 from properties import LEFT_OUT, take_profile
 from quick_fits import without_larger_structures, without_other_settings
@@ -34,22 +33,9 @@ from quick_fits import without_larger_structures, without_other_settings
 sys.dont_write_bytecode = False  # of this process too
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--c-coverage", type=Path, metavar="FOLDER", help="count what is reached of the C sources")
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    if folder := config.getoption("--c-coverage"):
-        terminalreporter.section("coverage of the C sources")
-        terminalreporter.write_line(table(folder))
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Give all processes of the session a folder for what they build; xdist's workers inherit it."""
     take_profile(all_of_them=_asked_for(config, "nightly"))
-    folder = config.getoption("--c-coverage")
-    if folder and "PYTEST_XDIST_WORKER" not in os.environ:
-        count_in(folder)
     if SHARED_BUILDS not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="hsep_builds_")
         os.environ[SHARED_BUILDS] = folder.name

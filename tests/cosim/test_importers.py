@@ -1,40 +1,45 @@
-"""Closed system of native FMUs in other projects' importers; all but two of them run at night."""
+"""Closed systems of native FMUs in other projects' importers, from one file; all but two of them run at night."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import importers_closed_system as closed_system
+import importers
 import numpy as np
 import pytest
 from built_once import BuiltFmus
-from importers_closed_system import IMPORTERS, MOVED, SYSTEMS, UNCARRIED, Array, ClosedSystem, exists_here
-from places import SUPPORT
+from importers import IMPORTERS, OWN, exists_here, observed
+from places import ROOT, SUPPORT
 
-from hybridsep import build_fmu, cosimulate, load_machine, staircase
+from hybridsep import cosimulate, load_machine, staircase
+from hybridsep.cosim.run import Run
+from hybridsep.fmi.ssp import build_system
 
-TOLERANCE = 1e-12  # m; libcosim's step sizes are rounded differences of times
-SHIFT = 0.1  # m
-N_MOVED = 800  # samples of the shorter run at another place
+GUIDE = (ROOT / "docs" / "evidence" / "importers.md").read_text(encoding="utf-8")
+UNCARRIED = ("fmpy SSP", "fmucontainer -sequential")
+"""Importers that carry nothing to the drive before the first step, and change the first measurement."""
 
-
-@pytest.fixture(scope="module")
-def folder(fmus: BuiltFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the FMUs of the closed systems, of both versions of FMI."""
-    folder = tmp_path_factory.mktemp("importers")
-    for system in SYSTEMS.values():
-        for suffix in ("", "Fmi3"):
-            for name in system.components.values():
-                shutil.copy(fmus(f"{name}{suffix}"), folder)
-    return folder
+COMMANDS = {"": staircase(), "moved": staircase()[:800] + 0.1}  # m
+DELAYS = {"predictor": 100, "compensator": 200}
 
 
 @pytest.fixture(scope="module")
-def expected(folder: Path) -> dict[str, Array]:
-    """What is observed without an importer, by system."""
-    return {key: closed_system.run("fmpy", system, folder) for key, system in SYSTEMS.items()}
+def runs(fmus: BuiltFmus) -> dict[tuple[str, str], Run]:
+    """What ``cosimulate`` comes to with each system and command."""
+    return {
+        (system, place): cosimulate(fmus(model), fmus("FeedDrive"), command)
+        for system, (model, *_) in OWN.items()
+        for place, command in COMMANDS.items()
+    }
+
+
+def written(folder: Path, system: str, place: str = "") -> Path:
+    """Write a system as one file."""
+    folder.mkdir()
+    compensate, machine = "hybrid" if system == "compensator" else None, load_machine("spring_mass_damper")
+    path = folder / "staircase.ssp"
+    return build_system(machine, path, COMMANDS[place], compensate=compensate, targets=("host",))
 
 
 def python(folder: Path, *arguments: object) -> str:
@@ -46,89 +51,42 @@ def python(folder: Path, *arguments: object) -> str:
     return done.stdout
 
 
-def figures(system: ClosedSystem, rows: Array) -> list[str]:
-    """Return the FMU's own figures, since ``t_init``, and RMS errors over the whole trajectory, µm, 4 digits."""
-    of = system.columns(rows)
-    reported = [float(of[name][-1]) for name in system.figures]
-    overall = [float(np.sqrt(np.mean((of[a] - of[b]) ** 2))) for a, b in system.errors]
-    return [f"{1e6 * figure:#.4g}" for figure in (*reported, *overall)]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("key", SYSTEMS)
-def test_the_loop_without_an_importer_is_cosimulate(folder: Path, expected: dict[str, Array], key: str) -> None:
-    system = SYSTEMS[key]
-    run = cosimulate(folder / f"{system.model}.fmu", folder / "FeedDrive.fmu", staircase())
-    of = system.columns(expected[key])
-    for name in (*system.positions, "x", "x_meas"):
-        np.testing.assert_array_equal(of[name], getattr(run, name), err_msg=name)
-    summary = run.summary()
-    names = ("rms_pb_um", "rms_h_um") if key == "predictor" else ("tracking_rms_um",)
-    assert figures(system, expected[key])[2:] == [f"{summary[name]:#.4g}" for name in names]
-
-
-@pytest.mark.slow
+@pytest.mark.parametrize("system", OWN)
 @pytest.mark.parametrize(
     "importer",
-    [
-        pytest.param(name, marks=[] if name in ("fmpy SSP", "libcosim") else [pytest.mark.nightly])
-        for name in IMPORTERS
-        if name != "fmpy"
-    ],
+    [pytest.param(name, marks=[pytest.mark.nightly] * (name not in ("fmpy SSP", "libcosim"))) for name in IMPORTERS],
 )
 def test_importers_come_to_the_same_figures(
-    folder: Path, expected: dict[str, Array], tmp_path: Path, importer: str
+    runs: dict[tuple[str, str], Run], tmp_path: Path, importer: str, system: str
 ) -> None:
-    """Of FMI 3.0 too, where they read it; and where a start goes round in Initialization Mode, anywhere on the axis."""
+    """Where a start goes round in Initialization Mode, anywhere on the axis; the guide has 4 digits of the figures."""
     if not exists_here(importer):
         pytest.skip(f"{importer} has no library for this machine")
-    moved, machine = tmp_path / "moved", load_machine("spring_mass_damper")
-    moved.mkdir()
-    for name in ("HybridPredictor", "SepCompensator", "FeedDrive"):
-        shutil.copy(folder / f"{name}.fmu", moved)
-    command = staircase(machine.T_s)[:N_MOVED] + SHIFT
-    np.save(moved / "command.npy", command)
-    build_fmu(machine, "ReferenceTrajectory", moved, targets=("host",), samples=command)
-    python(tmp_path, closed_system.__file__, importer, folder, moved, tmp_path)
-    found = {path.stem: np.load(path) for path in tmp_path.glob("*.npy")}
-    assert set(SYSTEMS) <= set(found)
-    for name, rows in found.items():
-        key = name.partition(" ")[0]
-        system, known = SYSTEMS[key], expected[key]
-        if name.endswith(MOVED):
-            rows, known = rows[: N_MOVED - 2].copy(), known[: N_MOVED - 2]  # up to where one command ends
-            rows[:, : system.n_positions] -= SHIFT
-            assert np.ptp(rows[:, 0]) > 1e-3
-            np.testing.assert_allclose(rows, known, rtol=0, atol=1e-11)
+    # The first measurement, from which a compensator with averaging judges the sensor, is another there.
+    judged, delay = importer in UNCARRIED and system == "compensator", DELAYS[system]
+    for place, command in COMMANDS.items():
+        if place and importer in UNCARRIED:
             continue
-        # The first measurement, from which a compensator with averaging judges the sensor, is another.
-        judged = importer in UNCARRIED and key == "compensator"
-        print(importer, name, *figures(system, rows), f"µm; at most {abs(rows - known).max():.1e} m apart from fmpy")
-        if not judged:  # else nanometres may change the last digit
-            assert figures(system, rows) == figures(system, known)
-        np.testing.assert_allclose(rows, known, rtol=0, atol=1e-7 if judged else TOLERANCE, err_msg=name)
+        archive, out = written(tmp_path / f"at {place}", system, place), tmp_path / "rows.npy"
+        python(tmp_path, importers.__file__, importer, system, archive, len(command) - 1 + delay, out)
+        run, rows = runs[system, place], np.load(out)[delay - 1 :].T
+        found = dict(zip((name for _, name in observed(system)), rows, strict=True))
+        for name in (name for name in found if not name.startswith("rms")):
+            expected, tolerance = getattr(run, name), 1e-7 if judged else 1e-12 if not place else 1e-11
+            np.testing.assert_allclose(found[name], expected, rtol=0, atol=tolerance, err_msg=name)
+        if not place and not judged:  # else nanometres may change the last digit
+            summary = run.summary()
+            overall = ("rms_pb_um", "rms_h_um") if system == "predictor" else ("tracking_rms_um",)
+            figures = [*(1e6 * found[name][-1] for name in found if name.startswith("rms")), *map(summary.get, overall)]
+            row = " | ".join(f"{figure:#.4g}" for figure in figures)
+            assert GUIDE.count(f"| {row} |") >= len(IMPORTERS), row
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", ["predictor", pytest.param("compensator", marks=pytest.mark.nightly)])
 @pytest.mark.skipif(not exists_here("ecos"), reason="ecos has no library for this machine")
-def test_the_script_of_the_guide(folder: Path, expected: dict[str, Array], key: str) -> None:
-    (script,) = closed_system.blocks("python")
-    if key == "compensator":  # what the guide says to change
-        for old, new in (("6100", "6200"), ("predictor", "compensator"), ("rms_pb", "rms_e")):
-            assert old in script
-            script = script.replace(old, new)
-    place = closed_system.system_structure(SYSTEMS[key], folder).parent
-    printed = python(place, "-c", f"import importers_closed_system as c; c.load_tbb()\n{script}")
-    assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(SYSTEMS[key], expected[key])[:2]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("key", SYSTEMS)
-def test_the_figures_of_the_guide(expected: dict[str, Array], key: str) -> None:
-    guide, row = closed_system.GUIDE.read_text("utf-8"), " | ".join(figures(SYSTEMS[key], expected[key]))
-    others = key == "compensator"  # simulate_ssp, by its last digit
-    assert guide.count(f"| {row} |") >= len(IMPORTERS) - others
-    if key == "predictor":  # its drive follows x_d itself
-        of = SYSTEMS[key].columns(expected[key])
-        assert f"(without compensation: {1e6 * np.sqrt(np.mean((of['x_d'] - of['x']) ** 2)):.1f})" in guide
+def test_the_script_of_the_guide(tmp_path: Path) -> None:
+    script = GUIDE.partition("```python\n")[2].partition("```")[0]
+    place = written(tmp_path / "system", "predictor").parent
+    printed = python(place, "-c", f"import importers; importers.load_tbb()\n{script}")
+    assert f"| {' | '.join(f'{1e6 * float(number):#.4g}' for number in printed.split())} |" in GUIDE

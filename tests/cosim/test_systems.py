@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from command_line import Run
-from importers_closed_system import exists_here
+from importers import exists_here
 
 from hybridsep import FmuInstance, load_machine, staircase
 from hybridsep.fmi.archive import build_fmu

@@ -10,21 +10,17 @@ import numpy as np
 import pytest
 from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
-from library_stream import LookAheadStream, PlantStream
 from stream import OUTPUTS
 
 from hybridsep.base.signals import Array
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.reference import REFERENCE_FOLDER
-from hybridsep.fmi.spec import FmuSpec, fmu_names
-from hybridsep.machines.machine import load_machine, machine_names
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.trajectory import staircase
 
 MACHINE = load_machine("spring_mass_damper")
 RUN = [*NATIVE, *(name for name in (*FMI3, *PYTHON) if "_" not in name)]
 RUN.remove("SepCompensator_als25010_x")
-LIBRARY = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
-LIBRARY = [pair for pair in LIBRARY if pair[1] not in ("ReferenceTrajectory", "SepCompensator_als25010_x")]
 
 
 def content(path: Path) -> dict[str, bytes]:
@@ -71,30 +67,6 @@ def test_fmpy_repeats_the_run_to_the_stated_tolerance(fmus: BuiltFmus, tmp_path:
     links = re.findall(r'href="([^"]+)"', page)
     assert len(links) >= 3
     assert all((documentation / link).is_file() for link in links)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("machine", "name"), each_kind(LIBRARY))
-def test_the_library_gives_the_reference_result(fmus: BuiltFmus, machine: str, name: str) -> None:
-    """The files hold what the FMU gave when it was built."""
-    loaded = load_machine(machine)
-    files, table = content(fmus(name)), FmuSpec.of(loaded, name.partition("_")[0]).table
-    stream = (PlantStream if "FeedDrive" in name else LookAheadStream)(name)
-    stream.initialise({v.name: v.start for v in table.variables if v.start is not None})
-    expected, given = (table_in(files[f"{REFERENCE_FOLDER}/{name}_{end}.csv"]) for end in ("ref", "in"))
-    found, inputs = [], csv_names(files[f"{REFERENCE_FOLDER}/{name}_in.csv"])[1:]
-    for t, *row in given.tolist():
-        found.append(stream.outputs())
-        for one, value in zip(inputs, row, strict=True):
-            stream.set(one, value)
-        stream.step(t, loaded.T_s)
-    tolerance = 1e-9 if name.startswith("Sep") else 1e-11
-    np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=tolerance)
-    assert len(OUTPUTS[name.partition("_")[0]]) == expected.shape[1] - 1
-
-
-def csv_names(content: bytes) -> list[str]:
-    return content.decode().splitlines()[0].replace('"', "").split(",")
 
 
 def table_in(content: bytes) -> Array:

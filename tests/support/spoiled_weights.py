@@ -35,7 +35,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
     damaged = {
         "nothing": b"",
         "no checksum": content[:-1],
-        "a byte that was changed": content[:200] + bytes([content[200] ^ 1]) + content[201:],
+        "a number that was changed": content[:-16] + bytes([content[-16] ^ 1]) + content[-15:],
         "a checksum alone": sealed(b""),
         "a head that is cut": sealed(body[:20]),
         "another version": sealed(b"HSEPWG00" + body[8:]),
