@@ -120,7 +120,7 @@ def print_replays(replays: Sequence[Replay], predictor: str) -> None:
     print(f"diverged: {sum(r.diverged for r in replays)}")
     print("worst:")
     for r in sorted(replays, key=lambda r: -r.ratio)[:N_WORST]:
-        print(f"  {r.ratio:.4g} × physics {UM * r.rms_pb:.3g} µm, {r.hold_ratio:.3g} × hold: drive {r.index}, {r.text}")
+        print(f"  {r.ratio:.4g} × physics {UM * r.rms_pb:.3g} µm, {r.hold_ratio:.3g} × hold: drive {r.index}")
 
 
 def print_faults(replays: Sequence[FaultyReplay]) -> None:

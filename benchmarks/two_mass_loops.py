@@ -40,7 +40,7 @@ class Result:
 
     condition: str
     run: str
-    text: str
+    index: int
     # (RMS, largest) of the tracking error, m: infinite where the compensator refused to go on
     none: tuple[float, float]
     physics: tuple[float, float]
@@ -55,7 +55,7 @@ class Result:
 
     def __str__(self) -> str:
         figures = (f"{UM * rms:.4g}, {UM * peak:.4g}" for rms, peak in (self.none, self.physics, self.compensated))
-        return f"{self.condition}, {self.run}: {' / '.join(figures)} µm: {self.text}"
+        return f"{self.condition}, {self.run}: {' / '.join(figures)} µm: drive {self.index}"
 
 
 def results(index: int, seed: int, only: str = "") -> list[Result]:
@@ -87,8 +87,7 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
             excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), limits, strict=True)]
             excess.append(largest(sent - x_d[: len(sent)]) / compensator.change_max - 1)
             physics = errors(loop.x) if run == "physics" else physics
-            text = f"drive {index}, {recipe.description}"
-            found.append(Result(name, run, text, errors(x), physics, errors(loop.x), max(excess)))
+            found.append(Result(name, run, index, errors(x), physics, errors(loop.x), max(excess)))
     return found
 
 

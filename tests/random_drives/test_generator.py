@@ -1,70 +1,63 @@
-"""Random drives: fixed by seed and index, exact where they are linear, at rest where they should be."""
+"""Random drives of both generators: fixed by seed and index, replayed by the C core as by the library, compensated."""
 
 from dataclasses import replace
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 import pytest
-from random_drives.disturbances import Disturbances
-from random_drives.generator import RandomDrive, Recipe, random_drives
+from random_drives import generator as modal
+from random_drives.replay import core_replay, library_replay
 from random_drives.simulation import simulate
-from scipy.signal import cont2discrete, dlsim
+from two_mass import generator as two_mass
+from two_mass.loop import closed_loop, settings_of
 
-from hybridsep.base.signals import Array
-
-SEED = 1
-N = 40
-
-SHORTEST = (3, 18, 57)  # drives of about 6 s, which take the least time
-
-EXPECTED_KINDS = ["cycles", "cycles", "spiral"]
-EXPECTED_RMS = [51.24528299, 580.85925701, 30.61436502]  # their servo errors, µm, against the measured position
+from hybridsep.base.metrics import rms
 
 
-@pytest.fixture(scope="module")
-def drives() -> list[RandomDrive]:
-    return random_drives(SHORTEST, SEED)
+@pytest.mark.parametrize(
+    ("generator", "indices", "kinds", "measured", "true"),
+    [
+        (
+            modal,
+            (3, 34, 40, 56),
+            "cycles spiral sweep dwells",
+            [51.24528299, 642.00063646, 479.38998008, 43.84311487],
+            [10.2021513, -3.4929624, -1.9737894, -8.1829601],
+        ),
+        (
+            two_mass,
+            (0, 1, 2, 6, 16),
+            "segments moves circle sine circle",
+            [749.80903542, 21.72408038, 921.53684028, 154.67625327, 648.97826137],
+            [-14.2119590, 0.3565578, -4.2993214, 3.2676946, 10.8354767],
+        ),
+    ],
+)
+def test_the_drives_stay_what_they_are(
+    generator: ModuleType, indices: tuple[int, ...], kinds: str, measured: list[float], true: list[float]
+) -> None:
+    """Figures are given for the drives of a seed, so a change must not pass unseen: these have each nonlinearity.
+
+    That they are exact where they are linear, and their steps short enough, was measured when they were made.
+    """
+    drives = generator.random_drives(indices, 1)
+    assert " ".join(drive.kind for drive in drives) == kinds
+    assert [1e6 * rms(drive.x_meas - drive.x_d) for drive in drives] == pytest.approx(measured, rel=1e-6)  # µm
+    assert [1e6 * np.mean(drive.x - drive.x_d) for drive in drives] == pytest.approx(true, rel=1e-6)
 
 
-@pytest.fixture(scope="module")
-def recipes() -> list[Recipe]:
-    return [Recipe.draw(index, SEED) for index in range(N)]
-
-
-def simulated(recipes: list[Recipe], commands: list[Array], **changes: Any) -> list[Array]:
-    disturbances = [replace(recipe.disturbances, **changes) for recipe in recipes]
-    return simulate([recipe.true.model for recipe in recipes], disturbances, commands)
-
-
-def test_the_drives_stay_what_they_are(drives: list[RandomDrive]) -> None:
-    """Figures are given for the drives of a seed, so a change of the generator must not pass unseen."""
-    assert [drive.kind for drive in drives] == EXPECTED_KINDS
-    found = [1e6 * float(np.sqrt(np.mean((drive.x_meas - drive.x_d) ** 2))) for drive in drives]
-    assert found == pytest.approx(EXPECTED_RMS, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_a_linear_drive_is_its_modal_model(recipes: list[Recipe]) -> None:
-    some = recipes[:12]
-    commands = [recipe.x_d[:1500] for recipe in some]
-    x = simulate([recipe.true.model for recipe in some], [Disturbances()] * len(some), commands)
-    for recipe, x_d, position in zip(some, commands, x, strict=True):
-        response = np.zeros_like(x_d)
-        for mode in recipe.true.model.modes:
-            A = np.array([[0.0, 1.0], [-(mode.omega**2), -2 * mode.zeta * mode.omega]])
-            output = np.array([[mode.alpha, mode.beta]])
-            system = cont2discrete((A, np.array([[0.0], [1.0]]), output, np.zeros((1, 1))), 1e-3, "zoh")
-            response += dlsim(system, x_d - x_d[0])[1].ravel()
-        assert np.ptp(response) > 1e-5
-        assert np.abs(position - x_d[0] - response).max() < 1e-9
+def test_the_c_core_replays_as_the_library() -> None:
+    recipe = modal.Recipe.draw(0, 1)
+    short = replace(recipe, x_d=recipe.x_d[:1800], noise=recipe.noise[:1800])
+    drive = short.drive(*simulate([short.true.model], [short.disturbances], [short.x_d]))
+    given = "default", drive.model, drive.settings, drive.x_d, drive.x_meas
+    np.testing.assert_allclose(core_replay(*given), library_replay(*given), rtol=0, atol=1e-12)
 
 
 @pytest.mark.slow
-def test_sub_steps_are_short_enough(recipes: list[Recipe]) -> None:
-    some = recipes
-    commands = [recipe.x_d[400:800] for recipe in some]
-    models, disturbances = [recipe.true.model for recipe in some], [recipe.disturbances for recipe in some]
-    coarse, fine = (simulate(models, disturbances, commands, sub_steps) for sub_steps in (8, 24))
-    linear = simulate(models, [Disturbances()] * len(some), commands)
-    for x, y, z in zip(coarse, fine, linear, strict=True):
-        assert np.sqrt(np.mean((x - y) ** 2)) <= 0.03 * np.sqrt(np.mean((y - z) ** 2)) + 1e-11
+def test_the_hybrid_follows_better_than_physics() -> None:
+    drawn = two_mass.Recipe.draw(1, two_mass.SEED)  # at 250 Hz
+    recipe = replace(drawn, x_d=drawn.x_d[:400], noise=drawn.noise[:400])
+    x_d = settings_of(recipe)[2]
+    physics, hybrid = (closed_loop(recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid"))
+    assert rms(x_d - hybrid.x) < 0.7 * rms(x_d - physics.x)

@@ -37,33 +37,6 @@ class Disturbances:
     command_play: float = 0.0
     play_start: float = 0.0  # place within the backlash at the start, −1 to 1
 
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Names of the nonlinearities that there are."""
-        present = {
-            "friction": self.coulomb,
-            "backlash": self.play + self.command_play,
-            "cubic": self.cubic,
-            "cogging": self.cogging,
-            "drift": self.drift,
-        }
-        return tuple(kind for kind, size in present.items() if size)
-
-    @property
-    def text(self) -> str:
-        """Description with sizes in µm."""
-        sizes = {
-            "friction": self.coulomb,
-            "backlash": self.play,
-            "backlash of the command": self.command_play,
-            "cubic": self.cubic,
-            "cogging": self.cogging,
-            "drift": self.drift,
-        }
-        parts = [f"{name} {1e6 * size:.3g} µm" for name, size in sizes.items() if size]
-        place = "offset of the command" if self.at_command else "force"
-        return f"{', '.join(parts)} ({place})" if parts else "linear"
-
 
 def random_disturbances(draws: Draws, stroke: float, in_antiphase: bool) -> Disturbances:
     """Return a random mixture; one in ten drives is linear.

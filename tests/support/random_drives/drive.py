@@ -61,4 +61,3 @@ class Drive:
     x_meas: Array
     model: ModalModel  # ``G_pb``, which is wrong
     settings: PredictorSettings  # sampling interval and window of the predictor
-    text: str  # description

@@ -8,7 +8,7 @@ import numpy as np
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
-from random_drives.commands import T_S, random_command
+from random_drives.commands import random_command
 from random_drives.disturbances import Disturbances, random_disturbances
 from random_drives.drive import Draws, Drive
 from random_drives.simulation import simulate
@@ -37,7 +37,6 @@ class ModalDrive:
     """Linear part of a drive: modes, the first with most of the static gain."""
 
     modes: tuple[ModalMode, ...]
-    text: str = ""  # how the model errs, of a physics model
 
     @property
     def model(self) -> ModalModel:
@@ -88,10 +87,8 @@ def nominal_drive(true: ModalDrive, draws: Draws) -> ModalDrive:
         return value * (1 + draws.uniform(-MODEL_ERROR, MODEL_ERROR))
 
     modes = [ModalMode(off(mode.f_n), off(mode.zeta), off(mode.g), off(mode.b)) for mode in true.modes]
-    text = "20 % off"
     if len(modes) > 1 and draws.chance(0.2):
         modes.remove(min(modes[1:], key=lambda mode: abs(mode.g)))
-        text += ", a mode missing"
     nominal, kind = ModalDrive(tuple(modes)), draws.uniform(0.0, 1.0)
     if kind < 0.6:
         nominal = nominal.with_gain(true.gain)
@@ -100,7 +97,7 @@ def nominal_drive(true: ModalDrive, draws: Draws) -> ModalDrive:
     else:
         error = nominal.gain / true.gain - 1  # of modes in antiphase it can be more
         nominal = nominal.with_gain(true.gain * (1 + min(max(error, -MODEL_ERROR), MODEL_ERROR)))
-    return replace(nominal, text=f"{text}, static gain {100 * (nominal.gain / true.gain - 1):+.1f} %")
+    return nominal
 
 
 SEED = 1  # seed of the 1 000 drives that figures are given for
@@ -113,9 +110,7 @@ class RandomDrive(Drive):
 
     true_model: ModalModel  # the drive's linear part; ``model`` is up to 20 % wrong
     disturbances: Disturbances
-    # m: of the encoder: white noise, and resolution (0: none)
-    noise_std: float
-    quantum: float
+    noise_std: float  # m: of the encoder
 
 
 @dataclass(frozen=True)
@@ -150,13 +145,6 @@ class Recipe:
         x_meas = x + self.noise
         if self.quantum:
             x_meas = self.quantum * np.rint(x_meas / self.quantum)
-        parts = (
-            f"{self.kind} of {1e3 * np.ptp(self.x_d):.3g} mm in {len(self.x_d) * T_S:.1f} s",
-            "modes " + " ".join(f"{m.f_n:.3g} Hz/{m.zeta:.2g}/{m.g:+.2g}" for m in self.true.modes),
-            f"model {self.nominal.text}",
-            self.disturbances.text,
-            f"noise {1e6 * self.noise_std:.2g} µm" + (f", resolution {1e6 * self.quantum:.2g} µm" * bool(self.quantum)),
-        )
         return RandomDrive(
             index=self.index,
             x_d=self.x_d,
@@ -168,8 +156,6 @@ class Recipe:
             kind=self.kind,
             disturbances=self.disturbances,
             noise_std=self.noise_std,
-            quantum=self.quantum,
-            text="; ".join(parts),
         )
 
 
@@ -192,10 +178,5 @@ def drives_at(indices: Sequence[int], x: Sequence[Array], seed: int = SEED) -> l
 
 
 def random_drives(indices: Sequence[int], seed: int = SEED) -> list[RandomDrive]:
-    """Return several drives, each as :func:`random_drive` returns it."""
+    """Return several drives, each the same for ever for the same seed."""
     return drives_at(indices, true_positions(indices, seed), seed)
-
-
-def random_drive(index: int, seed: int = SEED) -> RandomDrive:
-    """Return the drive of an index, the same for ever for the same seed."""
-    return random_drives([index], seed)[0]

@@ -41,9 +41,7 @@ class Replay:
     """Result of one drive."""
 
     index: int
-    # kind of the trajectory; description of the drive
-    kind: str
-    text: str
+    kind: str  # of the trajectory
     # RMS errors against the measured position over the whole run, m; ``rms_h`` is infinite where the replay ended with
     # an error
     rms_pb: float
@@ -86,7 +84,7 @@ def replay(drive: Drive, predictor: str, run: Replayed = library_replay, *, peer
         rms_h = largest = math.inf
     rms_pb, rms_hold = rms(drive.x_meas - x_pb), rms(drive.x_meas - x_hold)
     rms_arx = tuple(math.inf if one.diverged else rms(drive.x_meas - one.predictions[0]) for one in arx)
-    return Replay(drive.index, drive.kind, drive.text, rms_pb, rms_hold, rms_h, largest, rms_arx)
+    return Replay(drive.index, drive.kind, rms_pb, rms_hold, rms_h, largest, rms_arx)
 
 
 def physics_alone(drive: Drive) -> Array:

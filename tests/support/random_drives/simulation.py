@@ -16,6 +16,7 @@ from random_drives.commands import T_S
 from random_drives.disturbances import Disturbances
 
 SUB_STEPS = 8  # internal steps in a sampling interval
+H = T_S / SUB_STEPS  # s
 
 MODES_MAX = 4
 CUBIC_MAX = 2.0
@@ -26,13 +27,12 @@ def simulate(
     models: Sequence[ModalModel],
     disturbances: Sequence[Disturbances],
     commands: Sequence[Array],
-    sub_steps: int = SUB_STEPS,
 ) -> list[Array]:
     """Return the true positions of drives at rest at their first command.
 
     ``models``, ``disturbances``: sequences of m ModalModel and Disturbances: linear parts, of at most 4 modes, and
-    nonlinearities; ``commands``: sequence of m (n_i,), m: held over each millisecond; ``sub_steps``: internal steps
-    in a millisecond. Returns ``x``: list of m (n_i,), m.
+    nonlinearities; ``commands``: sequence of m (n_i,), m: held over each millisecond. Returns ``x``: list of m
+    (n_i,), m.
     """
     n = max(len(command) for command in commands)
     u = np.zeros((n, len(commands)))
@@ -43,7 +43,7 @@ def simulate(
     values = {name: np.array([getattr(one, name) for one in disturbances]) for name in names}
     start = values["play_start"] / 2
     u = _after_play(u, values["command_play"], start) + _drift(n, values)
-    x = _after_play(_motion(models, values, u, sub_steps), values["play"], start)
+    x = _after_play(_motion(models, values, u), values["play"], start)
     return [command[0] + x[: len(command), i] for i, command in enumerate(commands)]
 
 
@@ -67,10 +67,10 @@ def _after_play(x: Array, width: Array, start: Array) -> Array:
     return np.asarray(behind - start * width)
 
 
-def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, sub_steps: int) -> Array:
+def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array) -> Array:
     """Return the positions before ``u(k)`` acts, ``(n, m)``, m."""
     n, m = u.shape
-    tables = [_tables(model, T_S / sub_steps) for model in models]
+    tables = [_tables(model, H) for model in models]
     A = np.stack([table[0] for table in tables], axis=-1)  # (2, 2, 4, m)
     B = np.stack([table[1] for table in tables], axis=-1)
     command = np.stack([table[2] for table in tables], axis=-1)
@@ -80,13 +80,13 @@ def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, su
     c_1, c_2 = np.ascontiguousarray(C[:, 0]), np.ascontiguousarray(C[:, 1])
     z_1, z_2 = np.zeros((2, MODES_MAX, m)), np.zeros((2, MODES_MAX, m))
     inputs = np.zeros((2, 1, m))
-    offsets = _Offsets(values, sub_steps)
+    offsets = _Offsets(values)
     x, x_last = np.zeros(m), np.zeros(m)
     out = np.empty((n, m))
     for k in range(n):
         out[k] = x
         inputs[0, 0] = u[k]
-        for _ in range(sub_steps):
+        for _ in range(SUB_STEPS):
             inputs[1, 0] = offsets.step(x, x - x_last)
             x_last = x
             z_1, z_2 = A[0, 0] * z_1 + A[0, 1] * z_2 + B[0] * inputs, A[1, 0] * z_1 + A[1, 1] * z_2 + B[1] * inputs
@@ -126,12 +126,11 @@ class _Offsets:
     held from the position before would act as negative damping.
     """
 
-    def __init__(self, values: dict[str, Array], sub_steps: int) -> None:
-        h = T_S / sub_steps
+    def __init__(self, values: dict[str, Array]) -> None:
         self.v = values
         self.stiffness = values["coulomb"] / values["presliding"]
         self.excess = values["static"] - 1
-        self.per_stribeck = 1 / (h * values["v_stribeck"])
+        self.per_stribeck = 1 / (H * values["v_stribeck"])
         self.per_range, self.per_pitch = 1 / values["range"], 1 / values["pitch"]
         self.bristle = values["bristle"] * values["presliding"]
         rest = np.zeros_like(self.bristle)

@@ -134,36 +134,6 @@ class Axis:
     dead_time: int = 0  # samples until a command arrives
     interpolates: bool = False  # whether the drive runs in a straight line from one command to the next, a sample late
 
-    def linear(self) -> "Axis":
-        """Return the drive without its nonlinearities."""
-        free = Friction()
-        return replace(self, motor=free, bearing=free, play=0.0, cogging=0.0, lead=0.0, force_max=1e9)
-
-    @property
-    def text(self) -> str:
-        """Description."""
-        loop = self.loop
-        f_locked = np.sqrt(loop.stiffness / loop.load) / (2 * np.pi)
-        parts = [
-            f"P/{'PI' if loop.t_i else 'P'} {loop.k_v:.3g}, {loop.k_p:.3g} 1/s, feedforward {loop.feedforward:.2g}",
-            f"load {loop.load:.2g} on {f_locked:.3g} Hz",
-            f"encoder at the {'load' if loop.at_load else 'motor'}",
-        ]
-        if self.changed != loop:
-            parts.append(f"load + {self.changed.added:.2g} from {self.change_at * self.T_s:.2g} s")
-        for name, friction in (("motor", self.motor), ("load", self.bearing)):
-            if friction.coulomb:
-                parts.append(
-                    f"friction of the {name} {friction.coulomb:.2g} m/s², {1e6 * friction.presliding:.2g} µm presliding"
-                )
-        for name, size in (("backlash", self.play), ("lead error", self.lead)):
-            if size:
-                parts.append(f"{name} {1e6 * size:.3g} µm")
-        if self.cogging:
-            parts.append(f"cogging {self.cogging:.2g} m/s²")
-        parts.append(f"dead time {self.dead_time}" + ", interpolated" * self.interpolates)
-        return ", ".join(parts)
-
 
 RATES = (250, 500, 1000, 2000, 4000, 8000)  # sampling rates, Hz
 LEAST_DAMPING = 0.03  # least damping ratio of a loop: slower gains are taken until it is reached
@@ -173,7 +143,6 @@ LEAST_DAMPING = 0.03  # least damping ratio of a loop: slower gains are taken un
 class Encoder:
     """Position sensor: a resolution, m, and white noise of a standard deviation, m."""
 
-    bits: int
     quantum: float
     noise_std: float
 
@@ -197,7 +166,7 @@ def random_machine(draws: Draws) -> Machine:
     bits = 12 if draws.chance(0.5) else draws.whole(13, 20)
     quantum = turn / 2**bits
     noise_std = max(2e-8, quantum * draws.log_uniform(0.05, 1.0))
-    return Machine(belt, turn, fastest, 1.0 / draws.choice(RATES), Encoder(bits, quantum, noise_std))
+    return Machine(belt, turn, fastest, 1.0 / draws.choice(RATES), Encoder(quantum, noise_std))
 
 
 def random_axis(draws: Draws, machine: Machine, x_d: Array) -> Axis:

@@ -33,7 +33,6 @@ class Recipe:
     encoder: Encoder
     model: ModalModel  # ``G_pb``
     settings: PredictorSettings
-    text: str  # how the model errs
 
     @classmethod
     def draw(cls, index: int, seed: int) -> "Recipe":
@@ -42,31 +41,18 @@ class Recipe:
         machine = random_machine(draws)
         kind, x_d = random_command(draws, machine.fastest, machine.T_s, draws.uniform(*DURATION))
         axis = random_axis(draws, machine, x_d)
-        model, text = nominal_model(draws, axis.loop, axis.dead_time)
+        model = nominal_model(draws, axis.loop, axis.dead_time)
         Np = 2 * round(draws.log_uniform(*LOOK_AHEAD) / machine.T_s / 2)
         Np = min(max(Np, NP_RANGE[0]), NP_RANGE[1])
         settings = PredictorSettings(Np=Np, p=min(50, Np), T_s=machine.T_s)
         noise = machine.encoder.noise_std * draws.normal(len(x_d))
-        return cls(index, kind, x_d, noise, axis, machine.encoder, model, settings, text)
-
-    @property
-    def description(self) -> str:
-        """Description of the drive and its model."""
-        encoder = self.encoder
-        parts = (
-            f"{self.kind} of {1e3 * np.ptp(self.x_d):.3g} mm in {len(self.x_d) * self.axis.T_s:.1f} s",
-            f"{1 / self.axis.T_s:.0f} Hz, Np = {self.settings.Np}",
-            self.axis.text,
-            f"model {self.text}",
-            f"{encoder.bits} bits of {1e6 * encoder.quantum:.2g} µm, noise {1e6 * encoder.noise_std:.2g} µm",
-        )
-        return "; ".join(parts)
+        return cls(index, kind, x_d, noise, axis, machine.encoder, model, settings)
 
     def drive(self, x: Array) -> Drive:
         """Return the drive with its true positions, ``(n,)``, m."""
         quantum = self.encoder.quantum
         x_meas = quantum * np.rint((x + self.noise) / quantum)
-        return Drive(self.index, self.kind, self.x_d, x, x_meas, self.model, self.settings, self.description)
+        return Drive(self.index, self.kind, self.x_d, x, x_meas, self.model, self.settings)
 
 
 def true_positions(indices: Sequence[int], seed: int = SEED) -> list[Array]:

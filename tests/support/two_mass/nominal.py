@@ -13,23 +13,23 @@ MODEL_ERROR = 0.4  # largest relative error of a parameter
 CANCELLING = 3.0  # sum of the magnitudes of the modes' static gains from which on they cannot be wrong one by one
 
 
-def nominal_model(draws: Draws, loop: LinearLoop, dead_time: int) -> tuple[ModalModel, str]:
-    """Return a physics model of a loop behind a dead time, samples, and how it errs."""
+def nominal_model(draws: Draws, loop: LinearLoop, dead_time: int) -> ModalModel:
+    """Return a physics model of a loop behind a dead time, samples."""
     kind = draws.uniform(0.0, 1.0)
     true = loop.model
     if kind < 0.25:
         omega = loop.k_v * _off(draws)
         # 1/(τs + 1) = (ω² + ω s)/(s + ω)²
-        modes, text = [Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], "lag"
+        modes = [Mode(omega / (2 * math.pi), 1.0, omega**2, omega)]
     elif kind < 0.6 and sum(abs(mode.alpha) / mode.omega**2 for mode in true.modes) < CANCELLING:
-        modes, text = [_wrong(draws, mode) for mode in true.modes], "modes 40 % off"
+        modes = [_wrong(draws, mode) for mode in true.modes]
     else:
         names = ("stiffness", "damping", "viscous", "k_v", "k_p", "t_i", "load")
         wrong = replace(loop, **{name: getattr(loop, name) * _off(draws) for name in names})
         wrong = replace(wrong, load=min(wrong.load, 0.9))
         while wrong.least_damping < 0.01:  # a model must be stable
             wrong = replace(wrong, damping=1.5 * wrong.damping, k_p=0.9 * wrong.k_p, k_v=0.9 * wrong.k_v)
-        modes, text = list(wrong.model.modes), "loop 40 % off"
+        modes = list(wrong.model.modes)
     known = draws.uniform(0.0, 1.0)
     gain = sum(mode.alpha / mode.omega**2 for mode in modes)
     asked = 1.0 if known < 0.6 else 1.0 + draws.uniform(-0.02, 0.02)
@@ -39,8 +39,7 @@ def nominal_model(draws: Draws, loop: LinearLoop, dead_time: int) -> tuple[Modal
     late = dead_time
     if draws.chance(0.45):
         late = abs(dead_time + draws.choice((-3, -2, -1, 1, 2, 3)))
-    text += f", static gain {100 * (asked - 1):+.1f} %, dead time {late - dead_time:+d}"
-    return ModalModel(modes, late), text
+    return ModalModel(modes, late)
 
 
 def _off(draws: Draws) -> float:

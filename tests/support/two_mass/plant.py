@@ -60,11 +60,11 @@ def _library() -> ctypes.CDLL:
 
 
 class TwoMassDrive:
-    """A drive at rest at ``start``, m, at first; ``step``: longest internal step, s."""
+    """A drive at rest at ``start``, m, at first."""
 
-    def __init__(self, axis: Axis, start: float = 0.0, step: float = INTERNAL_STEP) -> None:
+    def __init__(self, axis: Axis, start: float = 0.0) -> None:
         self._library, self._start = _library(), start
-        n = max(4, math.ceil(axis.T_s / step - 1e-9))
+        n = max(4, math.ceil(axis.T_s / INTERNAL_STEP - 1e-9))
         h = axis.T_s / n
         self._drive = drive = _Drive()
         for i, loop in enumerate((axis.loop, axis.changed)):
@@ -83,10 +83,6 @@ class TwoMassDrive:
     def x(self) -> float:
         """True position where the encoder is, m."""
         return self._start + float(self._library.two_mass_position(ctypes.byref(self._drive)))
-
-    def states(self) -> Array:
-        """Return positions and velocities of motor and load relative to the start, integral, force, ``(6,)``."""
-        return np.array(self._drive.x)
 
     def step(self, x_d: float) -> None:
         """Advance by a sampling interval with the command ``x_d``, m."""
