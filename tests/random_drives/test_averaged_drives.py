@@ -24,7 +24,7 @@ class Replays:
     deviations: list[Array] = field(default_factory=list)
 
     def run(self, predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
-        """Replay with the C core, as which the library predicts (``test_generator.py``), and keep what intervals need."""
+        """Replay with the C core, the library's equal (``test_generator.py``), and keep what intervals need."""
         x_h, x_h_std = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h", "x_h_std"))
         if len(self.errors) < N_INTERVALS:
             self.errors.append(x_meas - x_h)

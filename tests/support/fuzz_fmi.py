@@ -35,6 +35,18 @@ RANGES = {
     "seed": (0, 9),
 }
 """What a parameter is set to mostly."""
+CASES: list[dict[str, float]] = [
+    {"averaging": 0, "input_hold": 1, "t_init": 0.0},
+    {"averaging": 0, "Np": 1, "p": 1, "q": 0, "spacing": 1},
+    {"averaging": 0, "p": 50, "q": 49, "lambda": 1e-20},
+    {"averaging": 0, "Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "dead_time": 13, "t_init": 0.0},
+    {"averaging": 0, "spacing": 50, "preview": 303, "compensate": 1},
+    {"Np": 7, "p": 7, "q": 6, "spacing": 1, "preview": 60},
+    {"Np": 150, "p": 2, "q": 0, "dead_time": 13, "preview": 300},
+    {"Np": 50, "p": 20, "v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
+    {"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77, "measurement_delay": 7, "t_init": 0.0},
+]
+"""What parameters are set to in runs before; FMUs without most of them have one."""
 
 
 class Fuzzer:
@@ -57,6 +69,8 @@ class Fuzzer:
         if not self.library.blocks:
             raise AssertionError("the library does not count its blocks: compile it with tests/c/counted.h")
         self.library.FreeInstance(instance)
+        for case in CASES if "Np" in self.library.references else [{}]:
+            self._whole_run({name: value for name, value in case.items() if name in self.library.references})
         end = time.monotonic() + seconds
         calls = (self._instantiate, self._free, self._initialise, self._steps, self._access)
         weights = (6, 2, 8, 40, 20, 12, 10, 2)
@@ -67,6 +81,24 @@ class Fuzzer:
             self._free()
         if self.library.blocks:
             raise AssertionError(f"{len(self.library.blocks)} blocks of memory were not given back")
+
+    def _whole_run(self, case: dict[str, float]) -> None:
+        self.library.messages.clear()
+        instance = self.library.instantiate(resources=self._place(self.resources))
+        statuses = {self.library.set(instance, name, value) for name, value in case.items()}
+        statuses |= {self.library.begin(instance), self.library.ExitInitializationMode(instance)}
+        for k in range(2 * int(case.get("Np", 50)) + 20):
+            for name in self._inputs:
+                value = self.random.gauss(0, 1e-2) if self.library.kinds[name] == self.library.real else 0
+                statuses.add(self.library.set(instance, name, value))
+            statuses.add(self.library.do_step(instance, 1e-3 * k, 1e-3))
+        if statuses != {OK}:
+            raise AssertionError(f"a run with {case} was refused: {self.library.messages[:1]}")
+        self.library.FreeInstance(instance)
+
+    @property
+    def _inputs(self) -> list[str]:
+        return [name for name, causality in self.library.causalities.items() if causality == "input"]
 
     def _check(self, name: str, instance: int | None, status: int) -> int:
         self.calls += 1
@@ -185,7 +217,7 @@ class Fuzzer:
         if instance is None:
             self.library.do_step(None, 0.0, 1e-3)
             return
-        names = [name for name, causality in self.library.causalities.items() if causality == "input"]
+        names = self._inputs
         for _ in range(self.random.randint(1, 100)):
             odd = self._chance(0.05)
             for name in names:
