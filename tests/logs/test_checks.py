@@ -48,15 +48,15 @@ def test_a_recorded_log_is_taken_as_it_is(path: Path) -> None:
     assert (log.starts, log.remarks) == ((0,), ())
 
 
-@pytest.mark.parametrize("first", [1000, 1048, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1096, 1144))])
-def test_a_hundred_simulated_axes_are_not_refused(first: int) -> None:
-    for seed in range(first, first + 48):
-        assert names(generated_log(seed).log) == [], seed
+@pytest.mark.parametrize("first", [0, 42, pytest.param(84, marks=pytest.mark.nightly)])
+def test_simulated_axes_are_not_refused(first: int) -> None:
+    for seed in range(first, first + 42):
+        assert names(generated_log(seed)) == [], seed
 
 
 @pytest.mark.parametrize("name", ACCUSED_BEFORE)
 def test_a_good_log_that_was_refused(name: str) -> None:
-    assert names(ACCUSED_BEFORE[name][1]()) == []
+    assert names(ACCUSED_BEFORE[name]()) == []
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
@@ -83,7 +83,7 @@ def early(log: Log) -> Log:
 
 
 def moves() -> Log:
-    return generated_log(1008).log
+    return generated_log(91)
 
 
 FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
@@ -97,7 +97,7 @@ FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
     "minus the following error": ("following error", lambda log: replace(log, x_meas=log.x_meas - log.x_d)),
     "velocity measured": ("velocity", lambda log: replace(log, x_meas=np.gradient(log.x_meas) / log.T_s)),
     "velocity commanded": ("velocity", lambda log: replace(log, x_d=np.gradient(log.x_d) / log.T_s)),
-    "another axis": ("hardly follows", lambda log: replace(log, x_meas=generated_log(1016).log.x_d)),
+    "another axis": ("hardly follows", lambda log: replace(log, x_meas=generated_log(7).x_d)),
     "one column": ("same column", lambda log: replace(log, x_meas=log.x_d)),
     "no command": ("no motion", lambda log: replace(log, x_d=np.zeros_like(log.x_d))),
     "no motion": ("no motion", lambda log: replace(log, x_meas=np.zeros_like(log.x_d))),
