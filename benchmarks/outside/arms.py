@@ -7,7 +7,8 @@ Multibody models that others wrote: UR5e and Panda as the package robosuite ship
 "robosuite: A modular simulation framework and benchmark for robot learning", arXiv:2009.12293), integrated by MuJoCo
 (Apache licence; E. Todorov, T. Erez, Y. Tassa, IROS 2012). Servos and friction are ours: at each joint a
 proportional-derivative servo at 2 kHz, whose command arrives a sample of 500 Hz late, Coulomb and viscous friction, an
-encoder of 17 bits. The Panda's gravity is compensated, as its firmware does.
+encoder of 17 bits. The Panda's gravity is compensated, as its firmware does. ``x_load``: each compensator is told, from
+the multibody model, what torque the other joints, gravity and changed inertia will add.
 
 Each joint's model is ``hybridsep.fit``'s, of 24 s of moves; then 20 s of other moves. Largest and RMS of the true
 position's error, mrad. The rival is a finite impulse response with friction's sign, fitted to the same log.
@@ -33,7 +34,7 @@ from hybridsep.machines.machine import Machine
 T_S, NP, RESOLUTION = 2e-3, 50, 2 * np.pi / 2**17
 LOG, TEST = 24.0, 20.0  # durations of the log and of the test, s
 
-WAYS = ("off", "physics", "hybrid, cold", "hybrid, warm", "FIR inverse")
+WAYS = ("off", "physics", "hybrid, cold", "hybrid, warm", "cold, x_load", "warm, x_load", "FIR inverse")
 MRAD = 1e3
 
 
@@ -133,6 +134,20 @@ class ArmInMujoco:
             data.qfrc_applied[:] = np.clip(torque, -self._most, self._most)
             self._mujoco.mj_step(self._model, data)
 
+    def load(self, commands: Array) -> Array:
+        """Return the torques on joints but for those of their own inertia, over stiffness, ``(n, joints)``, rad."""
+        model, data, torque = self._model, self._mujoco.MjData(self._model), np.empty_like(commands)
+        velocity = np.gradient(commands, T_S, axis=0)
+        acceleration = np.gradient(velocity, T_S, axis=0)
+        for k, (data.qpos[:], data.qvel[:], data.qacc[:]) in enumerate(
+            zip(commands, velocity, acceleration, strict=True)
+        ):
+            self._mujoco.mj_fwdPosition(model, data)
+            self._mujoco.mj_fwdVelocity(model, data)
+            self._mujoco.mj_rne(model, data, 1, torque[k])
+        inertia = np.sum(torque * acceleration, axis=0) / np.sum(acceleration**2, axis=0)
+        return np.asarray((inertia * acceleration - torque) / self._kp)
+
     @property
     def x(self) -> Array:
         """True positions, ``(n,)``, rad."""
@@ -175,19 +190,21 @@ def played(arm: ArmInMujoco, commands: Array) -> Array:
     return x
 
 
-def compensated(arm: ArmInMujoco, r: Array, controllers: Sequence[Controller]) -> Array:
-    """Return the true positions with a controller at each joint, ``(n, joints)``, rad."""
+def compensated(arm: ArmInMujoco, r: Array, controllers: Sequence[Controller], load: Array | None = None) -> Array:
+    """Return the true positions with a controller at each joint, which may know its load, ``(n, joints)``, rad."""
     arm.reset(r[0])
     delay = max(one.delay for one in controllers)
     for one, start in zip(controllers, r[0].tolist(), strict=True):
         one.restart(start)
-    ahead = np.concatenate((r, np.tile(r[-1], (delay, 1))))
-    x, x_dm = np.empty_like(ahead), r[0]
-    for k, wanted in enumerate(ahead):
+    # commands arrive a sample late, loads do not
+    given = np.stack((r, np.zeros_like(r) if load is None else np.vstack((load[1:], load[-1:]))), axis=1)
+    ahead = np.concatenate((given, np.tile(given[-1], (delay, 1, 1))))
+    x, x_dm = np.empty((len(ahead), r.shape[1])), r[0]
+    for k, (wanted, torques) in enumerate(ahead):
         x[k] = arm.x
         arm.step(x_dm)
-        each = zip(controllers, wanted.tolist(), measured(x[k]).tolist(), strict=True)
-        x_dm = np.array([one.step(position, shown) for one, position, shown in each])
+        each = zip(controllers, wanted.tolist(), measured(x[k]).tolist(), torques.tolist(), strict=True)
+        x_dm = np.array([one.step(*inputs) for one, *inputs in each])
     return x[delay:]
 
 
@@ -223,11 +240,14 @@ def errors(name: str) -> dict[str, Array]:
 
     rivals = [FirInverse.fitted([one], NP) for one in joints]
     commands = [rival.command(wanted) for rival, wanted in zip(rivals, r.T, strict=True) if rival is not None]
+    load = plant.load(r)
     reached = (
         played(plant, r),
         compensated(plant, r, controllers("physics")),
         compensated(plant, r, controllers("hybrid")),
         compensated(plant, r, controllers("hybrid", warm=True)),
+        compensated(plant, r, controllers("hybrid"), load),
+        compensated(plant, r, controllers("hybrid", warm=True), load),
         played(plant, np.stack(commands, axis=1)),
     )
     return {way: r - one for way, one in zip(WAYS, reached, strict=True)}
@@ -259,12 +279,12 @@ def draw(file: Path, labels: Sequence[str], sizes: dict[str, list[float]]) -> No
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
-    for marker, (way, each) in zip("os^vx", sizes.items(), strict=True):
+    for marker, (way, each) in zip("os^v<>x", sizes.items(), strict=True):
         axes.semilogy(range(len(labels)), each, marker, label=way)
     axes.set_xticks(range(len(labels)), labels, rotation=45)
     axes.set(ylabel="tracking error, RMS [mrad]")
     axes.grid(alpha=0.3)
-    axes.legend(ncols=5, loc="upper center", bbox_to_anchor=(0.5, 1.15))
+    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.15))
     figure.savefig(file, dpi=100)
 
 

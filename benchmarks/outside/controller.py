@@ -29,8 +29,9 @@ class Controller:
             raise ValueError(f"the C library refused to begin: {began}, {self._library.refused()}")
         self.x_h = []
 
-    def step(self, x_d_ahead: float, x_meas: float) -> float:
+    def step(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> float:
         """Process a sample, m; return the command of the next one, m."""
+        self._library.load(x_load)
         outputs = self._library.sample(x_d_ahead, x_meas)
         self.x_h.append(outputs.predicted.x_h)
         return float(outputs.x_dm)

@@ -18,6 +18,7 @@
  *   hsep_compensator_sample  | the same                                              | divergence is set, latched
  *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
  *   hsep_compensator_reset   | constant                                              | nothing
+ *   hsep_compensator_load    | constant                                              | nothing
  *   hsep_*_read, hsep_predictor_std | constant                                       | nothing
  *
  * The dearest sample costs the same at the first and at the 10^9th sample, but for a first window that begins in
@@ -155,6 +156,12 @@ HSEP_API int hsep_compensator_change(
  * x_d than following_error_max for three samples in a row: from the next window on the change fades, as with compensate
  * off. With averaging nothing that is measured above it, or until the reset, is learned. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
+
+/* Set the load that the samples from now on bring, 0 before: force or torque on the axis divided by the stiffness of
+ * its position loop, m, positive where it pushes the axis forwards, as a rigid-body model, gravity or a table tells it;
+ * known preview samples ahead, as x_d_ahead is. It is added to the command of the drive's model, counted from that of
+ * the first sample, so plans make up for it, within the limits. */
+HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas);

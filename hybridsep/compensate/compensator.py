@@ -154,7 +154,7 @@ class SepCompensator:
         """Samples by which :meth:`step` delays the command: ``preview``."""
         return self.preview
 
-    def step(self, x_d_ahead: float, x_meas: float) -> float:
+    def step(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> float:
         """Process one sample and return the modified command of the next one, m: an online loop in one call.
 
         It is a :class:`~hybridsep.online.look_ahead.LookAhead` over this compensator, which begins at the first call
@@ -166,6 +166,8 @@ class SepCompensator:
             Commanded position for ``preview`` samples later.
         x_meas : float, m
             Position measured now.
+        x_load : float, m
+            Load for ``preview`` samples later, as :meth:`plan` takes it; it counts from that of the first sample.
 
         Raises
         ------
@@ -177,11 +179,11 @@ class SepCompensator:
             start = self.predictor.start
             online = LookAhead(self, float(x_d_ahead if start is None else start))
             self._online = online  # making it restarts the compensator
-        online.sample(x_d_ahead, x_meas)
+        online.sample(x_d_ahead, x_meas, x_load)
         return online.x_dm
 
     @one_blas_thread
-    def plan(self, x_d: ArrayLike) -> PublishedWindow:
+    def plan(self, x_d: ArrayLike, load: ArrayLike | None = None) -> PublishedWindow:
         """Plan the next window.
 
         May be called again, with other commands, before :meth:`update`; the last call counts.
@@ -190,6 +192,10 @@ class SepCompensator:
         ----------
         x_d : (preview,) array_like, m
             Commanded positions of the preview.
+        load : (preview,) array_like, m, optional
+            Force or torque on the axis over the preview, divided by the stiffness of its position loop, positive where
+            it pushes the axis forwards, counted from the start of the run: from a rigid-body model, gravity or a table.
+            The drive's model gets it beside the command, so plans make up for it; none if left out.
 
         Returns
         -------
@@ -198,21 +204,22 @@ class SepCompensator:
         Raises
         ------
         SignalError
-            If ``x_d`` has another length or is not finite, or the window's prediction diverges.
+            If ``x_d`` or ``load`` has another length or is not finite, or the window's prediction diverges.
         """
         command = as_samples(x_d, "x_d", self.preview)
+        loads = np.zeros(self.preview) if load is None else as_samples(load, "load", self.preview)
         predictor, Np = self.predictor, self.predictor.Np
         if predictor.start is None:  # at rest where the first command is
             predictor.rest_at(float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        preview = Preview(command, self._x_d_before[-3:], self._delta_before, self._previous_plan)
+        preview = Preview(command, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan)
         fades = self.monitor.is_tripped or self.monitor.is_lost
         compensate = SepState.OFF if fades else self.compensate
         chosen = self._planning.choose(predictor, preview, compensate)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, path=command, scales=chosen.scales)
+        prediction = predictor.predict(x_dm + loads[:Np], path=command, scales=chosen.scales)
         now = command[:Np].copy()
         self._pending = PendingPlan(chosen.coefficients, delta, now, chosen.state, chosen.runs_away)
         as_published(prediction.x_pb, "x_pb")

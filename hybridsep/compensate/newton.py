@@ -91,12 +91,15 @@ class PlanModel:
     (n_state,): state of ``G_pb`` there; ``late``: (n_late,), m: commands between there and the plan, relative to the
     start; ``start``: m; ``x_d``: (n,), m: commands from which the scales of the features and the variances of
     predictions follow, of the remainder of the last plan, relative to the start; ``path``: (preview,), m: unmodified
-    commands, likewise.
+    commands, likewise; ``load``: (preview,), m: what the drive's load adds to any commands.
     """
 
-    def __init__(self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array) -> None:
+    def __init__(
+        self, model: AveragedModel, state: Array, late: Array, start: float, x_d: Array, path: Array, load: Array
+    ) -> None:
         self._model, self._static, self._discrete = model, model.static, model.static.discrete
         self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
+        self._load = load
         window = self._window(x_d)
         self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)
@@ -108,7 +111,7 @@ class PlanModel:
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the plan under commands ``x_d``, and what is late before it."""
-        command = np.concatenate((self._late, x_d))
+        command = np.concatenate((self._late, x_d + self._load))
         x_pb, _ = self._discrete.forced_response(self._state, command)
         return ResidualWindow(command, x_pb, self._start, self._path)
 

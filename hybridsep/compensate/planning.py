@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
@@ -40,7 +41,9 @@ class PendingPlan:
 class Preview:
     """Commands to plan, and what the plan goes on from."""
 
-    command: Array  # (preview,), m: commanded positions
+    # (preview,), m: commanded positions, and what the drive's load adds to the command of its model
+    command: Array
+    load: Array
     # (3,), m: last commanded positions before, and last changes of them
     x_d_before: Array
     delta_before: Array
@@ -122,6 +125,7 @@ class Planning(ABC):
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
+        free = free + np.asarray(lfilter(g, [1.0], preview.load))
         cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, self.weight)
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((decided, found.x))
@@ -293,4 +297,5 @@ class AveragedPlanning(Planning):
         assert predictor.start is not None
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
             x_d = path + self.basis.delta(preview.previous_plan)
-            return PlanModel(averaged, predictor.state.physics, predictor.state.late, predictor.start, x_d, path)
+            state = predictor.state
+            return PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)

@@ -6,8 +6,8 @@ the header ``hsep_fmu.h`` has them; a library that serves all FMUs of a kind rea
 
 Layout of that file, little-endian: ``HSEPVAR2``; as u64 the size of the file in bytes, the number of the kind's
 interface, the number of modes, whether the axis is rotary, and the samples of each window, 0 if it has none; the GUID
-in 48 bytes, filled with zeros; as float64 the start values of single variables and of the modes' numbers; the CRC-32 of
-all before as u64.
+in 48 bytes, filled with zeros; as float64 the start values of all variables but the windows'; the CRC-32 of all before
+as u64.
 """
 
 import hashlib
@@ -45,10 +45,11 @@ KINDS: Mapping[str, FmuTable] = {
 
 @dataclass(frozen=True)
 class _Layout:
-    """The parts of an FMU's table: single variables, then the modes' variables, then windows."""
+    """The parts of an FMU's table: single variables, the modes' variables, more single ones, then windows."""
 
     scalars: tuple[Variable, ...]
     modes: tuple[Variable, ...]
+    last: tuple[Variable, ...]
     windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
 
     @property
@@ -58,8 +59,13 @@ class _Layout:
 
     @property
     def starts(self) -> list[float]:
-        """Start values of single variables and modes, 0 for what is calculated; windows have none."""
-        return [float(variable.start or 0.0) for variable in (*self.scalars, *self.modes)]
+        """Start values of all but windows, which have none; 0 for what is calculated."""
+        return [float(variable.start or 0.0) for variable in self.started]
+
+    @property
+    def started(self) -> tuple[Variable, ...]:
+        """Variables before the windows."""
+        return *self.scalars, *self.modes, *self.last
 
 
 def layout_of(table: Sequence[Variable]) -> _Layout:
@@ -67,12 +73,12 @@ def layout_of(table: Sequence[Variable]) -> _Layout:
     arrays: dict[str, list[Variable]] = defaultdict(list)
     for variable in table:
         array, bracket, _ = variable.name.partition("[")
-        arrays[array if bracket else ""].append(variable)
-    scalars, modes = arrays.pop("", []), arrays.pop("mode", [])
+        arrays[array if bracket else "last" if "mode" in arrays else ""].append(variable)
+    scalars, modes, last = (tuple(arrays.pop(name, [])) for name in ("", "mode", "last"))
     windows = tuple(map(tuple, arrays.values()))
-    layout = _Layout(tuple(scalars), tuple(modes), windows)
-    flat = [*layout.scalars, *layout.modes, *(sample for window in windows for sample in window)]
-    assert flat == list(table), "single variables come first, then modes, then windows"
+    layout = _Layout(scalars, modes, last, windows)
+    flat = [*layout.started, *(sample for window in windows for sample in window)]
+    assert flat == list(table), "single variables come first, then modes, then single ones, then windows"
     assert len({len(window) for window in windows}) <= 1, "windows are of one length"
     return layout
 
@@ -87,8 +93,7 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     """Return the header of one FMU, with its table and, instead of the resources' file, the content of its weights."""
     layout = layout_of(table.variables)
     starts = ",\n".join(
-        f"    {start!r} /* {variable.name} */"
-        for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
+        f"    {start!r} /* {variable.name} */" for start, variable in zip(layout.starts, layout.started, strict=True)
     )
     text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
 #ifndef FMI{fmi}_FUNCTION_PREFIX
@@ -98,7 +103,7 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
 #define HSEP_GUID {json.dumps(guid)}
 #define HSEP_N_MODES {len(layout.modes) // len(_MODE)}
 #define HSEP_WINDOW {layout.window} /* samples in each window, 0 where they are left out */
-#define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES)
+#define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES + HSEP_N_LAST)
 #define HSEP_N_VARIABLES (HSEP_N_STARTS + HSEP_N_WINDOWS * HSEP_WINDOW)
 #define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)
 
@@ -109,6 +114,7 @@ static const double hsep_starts[HSEP_N_STARTS] = {{
     .variables = hsep_variables,
     .n_scalars = HSEP_N_SCALARS,
     .n_modes = HSEP_N_MODES,
+    .n_last = HSEP_N_LAST,
     .window = HSEP_WINDOW,
     .n_variables = HSEP_N_VARIABLES,
     .starts = hsep_starts,
@@ -151,18 +157,22 @@ def _interface(kind: str) -> str:
         places.append(f"    HSEP_VR_mode = {len(layout.scalars)}")
     windows = [window[0].name.partition("[")[0] for window in layout.windows]
     first = "HSEP_N_SCALARS + HSEP_MODE_NUMBERS * (context)->n_modes"
-    macros = "".join(
-        f"#define HSEP_VR_{name}(context) ({first} + {i} * (context)->window)\n" for i, name in enumerate(windows)
+    macros = "".join(f"#define HSEP_VR_{one.name}(context) ({first} + {i})\n" for i, one in enumerate(layout.last))
+    macros += "".join(
+        f"#define HSEP_VR_{name}(context) ({first} + HSEP_N_LAST + {i} * (context)->window)\n"
+        for i, name in enumerate(windows)
     )
     one = layout.modes[: len(_MODE)]
     rows = [_row(variable, variable.name) for variable in layout.scalars]
     rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
+    rows += [_row(variable, variable.name) for variable in layout.last]
     rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
     references, lines = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
     return f"""#define HSEP_MODEL_NAME {json.dumps(model)}
 #define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
 #define HSEP_N_SCALARS {len(layout.scalars)}
 #define HSEP_HAS_MODES {int(bool(layout.modes))}
+#define HSEP_N_LAST {len(layout.last)} /* single variables behind the modes */
 #define HSEP_N_WINDOWS {len(windows)}
 #define HSEP_VR_LENGTH {"HSEP_VR_Np" if windows else 0} /* of the samples in each window, where there are some */
 
@@ -171,7 +181,7 @@ enum {{
 {references}
 }};
 {macros}
-/* Rows of the table: single variables, the numbers of a mode, windows. */
+/* Rows of the table: single variables, the numbers of a mode, single variables again, windows. */
 static const hsep_variable hsep_variables[{len(rows)}] = {{
 {lines}
 }};

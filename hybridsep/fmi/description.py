@@ -35,7 +35,7 @@ def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int |
     if fmi == "2":
         return [(variable, None) for variable in table.shown]
     layout = layout_of(table.shown)
-    found: list[tuple[Variable, int | None]] = [(variable, None) for variable in (*layout.scalars, *layout.modes)]
+    found: list[tuple[Variable, int | None]] = [(variable, None) for variable in layout.started]
     for one, *more in layout.windows:  # only an output can be connected
         found.append((replace(one, name=one.name.partition("[")[0], causality="output"), 1 + len(more)))
     of_type = [(replace(one, kind=_FMI3_TYPES[one.kind]), size) for one, size in (*found, (_TIME, None))]

@@ -1,8 +1,9 @@
 """Variable table of each FMU.
 
 The modelDescription, the value references, the Python slave and the interface tables of the documentation follow from
-it. Single variables come first, then the modes, then the windows, so that the places of all before the windows are the
-same in all FMUs of a kind. This module is packed into the FMUs: it needs nothing but the standard library.
+it. Single variables come first, then the modes, then the windows, so that the places of all before the modes are the
+same in all FMUs of a kind. A variable that a kind got later stands behind the modes, so that no other one has moved.
+This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,6 +37,10 @@ _NO_MEASUREMENT = (
 _ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
+_LOAD = (
+    "force or torque that pushes the axis forwards, divided by the stiffness of its position loop, preview samples "
+    "early; counted from its first value"
+)
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _HEADINGS = {
     "input": "Inputs",
@@ -241,6 +246,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         Variable("reset", "Boolean", "parameter", "tunable", _RESET, False, group="Compensation"),
         *_modes(modes),
+        _position("x_load", "input", _LOAD, start=0.0),
     ]
 
 
@@ -336,7 +342,7 @@ class FmuTable:
         if not self.windows:
             table = [variable for variable in table if variable.causality != "local"]
         table = [
-            replace(one, start=self.rest) if one.causality == "input" and one.kind == "Real" else one for one in table
+            replace(one, start=self.rest) if one.causality == "input" and one.name != "x_load" else one for one in table
         ]
         return tuple(map(_angular, table) if self.is_angular else table)
 

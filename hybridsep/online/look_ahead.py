@@ -76,8 +76,8 @@ class WindowPlanner(Protocol):
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``, m, for ``lead_in`` samples; what was learned is kept."""
 
-    def plan(self, x_d: Array) -> PublishedWindow:
-        """Plan the next window from ``(preview,)`` commands, m."""
+    def plan(self, x_d: Array, load: Array) -> PublishedWindow:
+        """Plan the next window from ``(preview,)`` commands and loads, m."""
 
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
@@ -111,11 +111,11 @@ class _Unmodified:
         self.predictor.restart(start, t_init=t_init)
         self._at_rest = lead_in > 0
 
-    def plan(self, x_d: Array) -> PublishedWindow:
-        """Predict the next window, but for the lead-in; SignalError if the prediction diverges."""
+    def plan(self, x_d: Array, load: Array) -> PublishedWindow:
+        """Predict the next window under the load, but for the lead-in; SignalError if the prediction diverges."""
         if self._at_rest:
             return PublishedWindow.at_rest(float(x_d[0]), self.preview)
-        return PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d))
+        return PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d + load))
 
     def update(self, x: Array) -> None:
         """Learn from the positions measured over a predicted window, ``(Np,)``, m."""
@@ -164,7 +164,7 @@ class LookAhead:
     diverged: str = ""
     _SAVED = (
         *("k", "start", "window", "_first_scored", "_n_scored", "_sums", "_residual", "_next", "_compared"),
-        *("_ahead", "_measured"),
+        *("_ahead", "_measured", "_loads", "_first_load"),
     )
 
     def __init__(
@@ -177,7 +177,7 @@ class LookAhead:
         self._at_rest(start)
         self._first_scored += samples_before(warm_up, self.predictor.T_s)
         self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
-        self.window = self.planner.plan(self._ahead.copy())
+        self.window = self.planner.plan(self._ahead.copy(), self._loads.copy())
         self._compare()
 
     def _at_rest(self, start: float) -> None:
@@ -190,6 +190,8 @@ class LookAhead:
         self._compared = np.full((4, self.predictor.settings.n_late + self.Np), start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, start), np.full(self.Np, start)
+        # Their loads, from that of the first sample on
+        self._loads, self._first_load = np.zeros(self.delay), 0.0
         self.window = PublishedWindow.at_rest(start, self.Np)
 
     def _hold(self, model: HybridPredictor | Planner, k: int) -> None:
@@ -287,7 +289,7 @@ class LookAhead:
         """Running RMS of hold, ``x_pb`` plus the last residual measured before a window, since ``t_init``, m."""
         return self._rms(3)
 
-    def sample(self, x_d_ahead: float, x_meas: float) -> None:
+    def sample(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Process sample ``k`` and advance to ``k + 1``.
 
         Parameters
@@ -296,6 +298,9 @@ class LookAhead:
             ``r(k)``, the command for ``delay`` samples later.
         x_meas : float, m
             ``x(k)``, the position measured now; with a ``measurement_delay`` of −1 ``x(k + 1)``.
+        x_load : float, m
+            Load for ``delay`` samples later, as :meth:`SepCompensator.plan
+            <hybridsep.compensate.compensator.SepCompensator.plan>` takes it; it counts from that of the first sample.
 
         Raises
         ------
@@ -303,11 +308,14 @@ class LookAhead:
             If one of them is not finite; nothing is changed then. If the window that begins diverges,
             every later sample is refused, too.
         """
-        self.check(x_d_ahead, x_meas)
+        self.check(x_d_ahead, x_meas, x_load)
         if self.predictor.settings.measurement_delay < 0:
             x_meas, self._next = self._next, x_meas
         is_sound = self.planner.monitor.take_in(float(x_meas - self._compared[0, self.k % self.Np]))
+        if self.k == 0:
+            self._first_load = x_load
         self._ahead[self.k % self.delay] = x_d_ahead
+        self._loads[self.k % self.delay] = x_load - self._first_load
         self._measured[self.k % self.Np] = x_meas if is_sound or not self.may_miss else math.nan
         if self.k >= self._first_compared and not math.isnan(x_meas):
             self._residual = float(x_meas - self._compared[1, self.k % self.Np])
@@ -319,11 +327,11 @@ class LookAhead:
             self.planner.update(self._measured)
             self._begin_window()
 
-    def check(self, x_d_ahead: float, x_meas: float) -> None:
+    def check(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Raise SignalError if a window has diverged, or an input of the next sample is invalid."""
         if self.diverged:
             raise SignalError(self.diverged)
-        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
+        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas), ("x_load", x_load)):
             if not (name == "x_meas" and math.isnan(x_meas) and self.may_miss):
                 check_position(name, value, f" at sample {self.k}", self.unit)
 
@@ -366,7 +374,8 @@ class LookAhead:
     def _begin_window(self) -> None:
         """Plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
         try:
-            self.window = self.planner.plan(np.roll(self._ahead, -(self.k % self.delay)))
+            ahead, loads = (np.roll(one, -(self.k % self.delay)) for one in (self._ahead, self._loads))
+            self.window = self.planner.plan(ahead, loads)
             self._compare()
         except SignalError as error:
             self.diverged = str(error)

@@ -72,7 +72,8 @@ def learned(period: float = 0.0) -> bytes:
 def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
     """Return the model over commands of which the first ones are late."""
     physics = sep.predictor.state.physics
-    return PlanModel(averaged_model(sep.predictor), physics, x_d[:late], 0.0, x_d[late:], x_d[late:])
+    of_plan = x_d[late:]
+    return PlanModel(averaged_model(sep.predictor), physics, x_d[:late], 0.0, of_plan, of_plan, np.zeros(len(of_plan)))
 
 
 @pytest.mark.slow

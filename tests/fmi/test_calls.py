@@ -227,7 +227,7 @@ def test_values_are_read_and_written(fmu: Library) -> None:
 @pytest.mark.parametrize(
     ("names", "orders", "values", "message"),
     [
-        (["x_d_ahead", "x_h"], [1, 1], [1.0, 1.0], "x_h takes no derivative, only inputs do"),
+        (["x_d_ahead", "x_h"], [1, 1], [1.0, 1.0], "x_h takes no derivative, only x_d_ahead and x_meas do"),
         (["x_d_ahead", "p"], [1, 1], [1.0, 1.0], "p (value reference {p}) is of type Integer, not Real"),
         (["x_d_ahead", "x_meas"], [1, 2], [1.0, 1.0], "the order of x_meas must be 1, got 2"),
         (["x_d_ahead", "x_meas"], [1, 1], [1.0, math.nan], "the derivative of x_meas must be finite, got nan"),

@@ -40,6 +40,8 @@ def random_run(stream: Stream, seed: int) -> Array:
             stream.set("following_error_max", float(10.0 ** rng.uniform(-3.5, -1.0)))
         elif what < 14:
             stream.set("reset", bool(what % 2))
+        elif what < 17:
+            stream.set("x_load", float(rng.choice((1e-5, 1e-3, 0.1)) * rng.standard_normal()))
         velocity += np.clip(wanted - velocity, -8.0 * T_S, 8.0 * T_S)
         position += float(velocity) * T_S
         stream.set("x_d_ahead", position)

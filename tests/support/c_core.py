@@ -123,7 +123,7 @@ class Context(ctypes.Structure):
 
     _fields_ = (
         ("variables", ctypes.c_void_p),
-        *((name, ctypes.c_size_t) for name in ("n_scalars", "n_modes", "window", "n_variables")),
+        *((name, ctypes.c_size_t) for name in ("n_scalars", "n_modes", "n_last", "window", "n_variables")),
         ("starts", ctypes.c_void_p),
         ("guid", ctypes.c_char_p),
         ("angular", ctypes.c_int),

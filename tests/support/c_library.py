@@ -178,6 +178,10 @@ class Library:
         )
         return int(self._call("init", self.block, *arguments))
 
+    def load(self, x_load: float) -> None:
+        """Set the load that a compensator's samples bring from now on, m."""
+        self._call("load", self.block, ctypes.c_double(x_load))
+
     def sample(self, x_d_ahead: float, x_meas: float) -> CompensatorOutputs:
         """Process a sample and return the outputs of the next one; of a predictor in ``predicted``."""
         self._call("sample", self.block, ctypes.c_double(x_d_ahead), ctypes.c_double(x_meas))

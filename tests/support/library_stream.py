@@ -30,7 +30,7 @@ def refusing() -> Iterator[None]:
 def start_values(model: str) -> dict[str, Any]:
     """Return the start values of a model's inputs and parameters."""
     table = table_of_model(model)
-    inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0, "reset": False}
+    inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0, "x_load": 0.0, "reset": False}
     return {**inputs, **table.parameters, **numbered(table.modes)}
 
 
@@ -82,18 +82,19 @@ class LookAheadStream(LibraryStream):
         with refusing():
             self._look_ahead = library_look_ahead(self._values, self._weights)
             self._clock = SampleClock.begin(start, self._values["T_s"])
-        self._latched, self._was_reset = (self._values["x_d_ahead"],) * 2, False
+        self._latched: tuple[float, ...] = (self._values["x_d_ahead"],) * 2 + (0.0,)
+        self._was_reset = False
 
     def step(self, t: float, h: float) -> None:
         """Latch the inputs at each instant within the step, and execute them where the next one is reached."""
-        inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
+        inputs = tuple(float(self._values[name]) for name in ("x_d_ahead", "x_meas", "x_load"))
         with refusing():
             if self._look_ahead.diverged:
                 raise SignalError(self._look_ahead.diverged)
             step, pending = self._clock.stepped(t, h), self._clock.latched
             if step.n_latched:
-                for name, value in zip(("x_d_ahead", "x_meas"), inputs, strict=True):
-                    if name == "x_d_ahead" or not (np.isnan(value) and self._look_ahead.may_miss):
+                for name, value in zip(("x_d_ahead", "x_meas", "x_load"), inputs, strict=True):
+                    if name != "x_meas" or not (np.isnan(value) and self._look_ahead.may_miss):
                         check_position(name, value, f" at sample {self._clock.k + pending}")
             self._tune()
             for _ in range(step.n_samples):
@@ -129,8 +130,8 @@ class LookAheadStream(LibraryStream):
         with refusing():
             meta, _, parts = unpack(f"stream {self.model}", blob)
             self._look_ahead = restored_look_ahead(self._kind, parts["core"])
-        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"][:2])
-        self._values, self._was_reset = meta["values"], meta["latched"][2]
+        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"][:3])
+        self._values, self._was_reset = meta["values"], meta["latched"][3]
 
 
 class PlantStream(LibraryStream):

@@ -135,7 +135,7 @@ typedef struct {
     uint64_t angular;          /* whether the axis is rotary */
     uint64_t window;           /* samples of each window, 0 if there is none */
     char guid[HSEP_GUID_SIZE]; /* padded with zeros */
-    double starts[];           /* of the single variables and of the modes; the CRC-32 of all before as uint64 */
+    double starts[];           /* of all but the windows; the CRC-32 of all before as uint64 */
 } opening_table;
 
 HSEP_ASSERT_WORDS(opening_table, 12);
@@ -150,7 +150,8 @@ static hsep_status opening_fill(hsep_context *context, const opening_table *tabl
     if (table->kind != HSEP_INTERFACE) {
         return hsep_message_add(reason, "it is of another kind of FMU or another version than this library");
     }
-    const double n = HSEP_N_SCALARS + HSEP_MODE_NUMBERS * (double)table->n_modes; /* of the start values */
+    const double n =
+        HSEP_N_SCALARS + HSEP_MODE_NUMBERS * (double)table->n_modes + HSEP_N_LAST; /* of the start values */
     const int modes_fit = HSEP_HAS_MODES ? table->n_modes > 0 : table->n_modes == 0;
     if ((double)size != (double)sizeof *table + (n + 1.0) * (double)sizeof(double) || table->size != size ||
         !modes_fit || table->angular > 1 || table->guid[HSEP_GUID_SIZE - 1] != '\0') {
@@ -164,6 +165,7 @@ static hsep_status opening_fill(hsep_context *context, const opening_table *tabl
         .variables = hsep_variables,
         .n_scalars = HSEP_N_SCALARS,
         .n_modes = (size_t)table->n_modes,
+        .n_last = HSEP_N_LAST,
         .n_variables = (size_t)n, /* windows have no start values */
         .starts = table->starts,
         .guid = table->guid,

@@ -145,7 +145,8 @@ static hsep_status fmi2_check_derivatives(
     for (size_t i = 0; i < access->n_references; i++) {
         const char *name = hsep_table_name(&instance->context, access->references[i], input);
         if (access->references[i] + 1 > HSEP_N_INTERPOLATED) {
-            return hsep_message_add(message, "%s: %s takes no derivative, only inputs do", access->call, name);
+            return hsep_message_add(
+                message, "%s: %s takes no derivative, only x_d_ahead and x_meas do", access->call, name);
         }
         if (order[i] != 1) {
             return hsep_message_add(

@@ -17,10 +17,11 @@ static double inputs_last(const hsep_clock_step *counted)
 }
 
 HSEP_API hsep_status hsep_inputs_count(
-    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss,
-    double t, double h, hsep_inputs_step *step, char message[])
+    const hsep_context *context, const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double x_load,
+    int may_miss, double t, double h, hsep_inputs_step *step, char message[])
 {
-    *step = (hsep_inputs_step){.x_d_ahead = x_d_ahead, .x_meas = x_meas, .pending = hsep_clock_latched(&self->clock)};
+    *step = (hsep_inputs_step){
+        .x_d_ahead = x_d_ahead, .x_meas = x_meas, .x_load = x_load, .pending = hsep_clock_latched(&self->clock)};
     if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -30,6 +31,9 @@ HSEP_API hsep_status hsep_inputs_count(
     /* Inputs are linear in time, so the first and the last one bound them all. */
     const double after[2] = {step->counted.first, inputs_last(&step->counted)};
     const double sample = (double)(self->clock.k + step->pending);
+    if (hsep_check_position(context, "x_load", x_load, " at sample %.0f", sample, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     for (int i = 0; i < 2; i++) {
         const double ahead = inputs_at(x_d_ahead, after[i]), measured = inputs_at(x_meas, after[i]);
         const int missing = may_miss && isnan(measured);
@@ -58,6 +62,7 @@ HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
         const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
         self->x_d_ahead = inputs_at(step->x_d_ahead, after);
         self->x_meas = inputs_at(step->x_meas, after);
+        self->x_load = step->x_load;
         step->pending = 1;
         step->n_latched++;
     }

@@ -54,14 +54,17 @@ typedef struct {
 #define HSEP_MODE_NUMBERS 4 /* of a mode: f_n, zeta, alpha, beta */
 
 /* What stays the same for one instance: the table, what this FMU has of it, and where its resources are. The variables
- * are n_scalars single ones, then the numbers of each mode, then the samples of each window. */
+ * are n_scalars single ones, then the numbers of each mode, then n_last single ones, which came later than the modes'
+ * places, then the samples of each window. */
 typedef struct {
-    const hsep_variable *variables; /* rows of the table: n_scalars, HSEP_MODE_NUMBERS if it has modes, windows */
+    const hsep_variable *variables; /* rows: n_scalars, HSEP_MODE_NUMBERS if it has modes, n_last, windows */
     size_t n_scalars;
     size_t n_modes;
+    size_t n_last; /* single variables behind the modes */
     size_t window; /* samples in each window, 0 where they are left out */
     size_t n_variables;
-    const double *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes,), 0 for what is calculated; so are the windows */
+    const double
+        *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes + n_last,), 0 for what is calculated; so are the windows */
     const char *guid;
     int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */

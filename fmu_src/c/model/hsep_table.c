@@ -10,16 +10,18 @@ HSEP_ASSERT(numbers_of_a_mode, sizeof(hsep_mode) == HSEP_MODE_NUMBERS * sizeof(d
 
 HSEP_API size_t hsep_table_n_starts(const hsep_context *context)
 {
-    return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
+    return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes + context->n_last;
 }
 
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place)
 {
-    const size_t before = hsep_table_n_starts(context);
+    const size_t before = hsep_table_n_starts(context), last = before - context->n_last;
+    const size_t behind = context->n_scalars + (context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0);
     size_t row = place;
     if (place >= before) {
-        const size_t modes = context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0;
-        row = context->n_scalars + modes + (place - before) / context->window;
+        row = behind + context->n_last + (place - before) / context->window;
+    } else if (place >= last) {
+        row = behind + place - last;
     } else if (place >= context->n_scalars) {
         row = context->n_scalars + (place - context->n_scalars) % HSEP_MODE_NUMBERS;
     }
@@ -33,7 +35,7 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
     if (place >= before) {
         const size_t sample = (place - before) % context->window + 1;
         hsep_text(text, HSEP_NAME_SIZE, "%.40s[%lu]", name, (unsigned long)sample);
-    } else if (place >= context->n_scalars) {
+    } else if (place >= context->n_scalars && place < before - context->n_last) {
         const size_t mode = (place - context->n_scalars) / HSEP_MODE_NUMBERS + 1;
         hsep_text(text, HSEP_NAME_SIZE, "mode[%lu].%.30s", (unsigned long)mode, name);
     } else {

@@ -57,13 +57,23 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
 /* The model's own ---------------------------------------------------------------------------------------------------
  * online_check: of its settings together, each problem added to message. online_derive: its parameters, after all were
  * checked and the common ones read. online_tune: the tunable parameters, from the next window on. online_begin: after
- * learned weights were loaded. */
+ * learned weights were loaded. online_x_load: the drive's load. online_sample: process a
+ * sample. */
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 
 static void online_check(const double values[], char message[]) { (void)values, (void)message; }
 static void online_tune(hsep_predictor *self, const double values[]) { (void)self, (void)values; }
 static void online_begin(hsep_predictor *self) { (void)self; }
+static double online_x_load(const hsep_context *context, const double values[])
+{
+    (void)context, (void)values;
+    return 0.0;
+}
+static void online_sample(hsep_predictor *self, const hsep_inputs *inputs)
+{
+    (void)hsep_predictor_sample(self, inputs->x_d_ahead, inputs->x_meas);
+}
 static hsep_predictor *online_predictor(hsep_predictor *self) { return self; }
 
 static hsep_predictor_parameters online_derive(const double values[], hsep_parameters *parameters)
@@ -140,6 +150,15 @@ static void online_tune(hsep_compensator *self, const double values[])
 }
 
 static void online_begin(hsep_compensator *self) { hsep_compensator_begin(self); }
+static double online_x_load(const hsep_context *context, const double values[])
+{
+    return values[HSEP_VR_x_load(context)];
+}
+static void online_sample(hsep_compensator *self, const hsep_inputs *inputs)
+{
+    hsep_compensator_load(self, inputs->x_load);
+    (void)hsep_compensator_sample(self, inputs->x_d_ahead, inputs->x_meas);
+}
 static hsep_predictor *online_predictor(hsep_compensator *self) { return hsep_compensator_predictor(self); }
 
 static hsep_compensator_parameters online_derive(const double values[], hsep_parameters *parameters)
@@ -304,6 +323,7 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     self->inputs.x_d_ahead = self->inputs.x_meas = start;
+    self->inputs.x_load = online_x_load(context, values);
     ONLINE(block_init)(&self->online, &derived, start);
     hsep_predictor *predictor = online_predictor(&self->online);
     if (online_load(context, values, &parameters, predictor, message) != HSEP_OK) {
@@ -344,14 +364,14 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
-    const hsep_status status =
-        hsep_inputs_count(context, &self->inputs, x_d_ahead, x_meas, may_miss, t, h, &step, message);
+    const hsep_status status = hsep_inputs_count(
+        context, &self->inputs, x_d_ahead, x_meas, online_x_load(context, values), may_miss, t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
     online_tune(&self->online, values);
     while (hsep_inputs_next(&self->inputs, &step)) {
-        (void)ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
+        online_sample(&self->online, &self->inputs);
         if (online_converges(predictor, message) != HSEP_OK) {
             return HSEP_REFUSED;
         }

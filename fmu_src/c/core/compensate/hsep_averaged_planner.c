@@ -34,7 +34,7 @@ static void averaged_planner_command(
     memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
-        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
+        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
         hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
 }

@@ -73,7 +73,8 @@ typedef struct {
     hsep_averaged *model;
     hsep_planner *planner;
     const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
-    const hsep_real *x_d;    /* (preview,) m, commanded positions */
+    const hsep_real *x_d;    /* (preview,) m, commanded positions, */
+    const hsep_real *load;   /* (preview,) m, and what the drive's load adds to them */
     /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
      * the last residuals measured, (p,) m, likewise */
     const hsep_physics *physics;

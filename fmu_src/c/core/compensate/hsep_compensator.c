@@ -16,6 +16,8 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
+    self->loads = hsep_take(&end, preview);
+    self->load = hsep_take(&end, preview);
     self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
     self->trial_e = hsep_take(&end, preview + (hsep_real)predictor->settings.p);
     self->target = hsep_take(&end, preview);
@@ -73,6 +75,7 @@ static hsep_averaged_task compensator_task(hsep_compensator *self)
         .planner = hsep_compensator_planner(self),
         .spline = hsep_at(self, self->spline_pb),
         .x_d = hsep_at(predictor, predictor->x_d),
+        .load = hsep_at(self, self->load),
         .physics = hsep_predictor_physics(predictor),
         .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
         .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
@@ -86,13 +89,14 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     const hsep_planner *planner = hsep_compensator_planner(self);
     const hsep_int preview = predictor->preview, Np = predictor->Np;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *c = hsep_at_const(planner, planner->c);
+    const hsep_real *load = hsep_at(self, self->load);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
     for (hsep_int k = 0; k < preview; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
-        const hsep_real command = x_d[k] - predictor->start + decided;
+        const hsep_real command = x_d[k] - predictor->start + decided + load[k];
         hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
@@ -165,12 +169,12 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_int Np = predictor->Np, first = predictor->n_published;
-    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *load = hsep_at(self, self->load);
     hsep_real *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
     hsep_real *command = hsep_at(predictor, predictor->command);
     for (hsep_int k = first; k < last; k++) {
         x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
-        command[Np - 1 - k] = x_dm[k] - predictor->start;
+        command[Np - 1 - k] = x_dm[k] - predictor->start + load[k];
         hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
     }
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
@@ -316,15 +320,40 @@ static int compensator_monitor(hsep_compensator *self, hsep_real error)
     return self->over == 0;
 }
 
+HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load) { self->x_load = x_load; }
+
+/* Take in the load of a sample, which the drive meets preview samples later. */
+static void compensator_take_load(hsep_compensator *self)
+{
+    const hsep_predictor *predictor = hsep_compensator_predictor(self);
+    if (predictor->k == 0) {
+        self->first_load = self->x_load;
+    }
+    hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
+}
+
+/* Take over the loads of the next window and of what follows it. */
+static void compensator_begin_loads(hsep_compensator *self)
+{
+    const hsep_predictor *predictor = hsep_compensator_predictor(self);
+    const hsep_int oldest = predictor->k % predictor->preview, newest = predictor->preview - oldest;
+    const hsep_real *loads = hsep_at(self, self->loads);
+    hsep_real *load = hsep_at(self, self->load);
+    memcpy(load, loads + oldest, (size_t)newest * sizeof(hsep_real));
+    memcpy(load + newest, loads, (size_t)oldest * sizeof(hsep_real));
+}
+
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
+    compensator_take_load(self);
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np];
     const int is_sound = compensator_monitor(self, error) || !self->averaged;
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
         hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+        compensator_begin_loads(self);
         hsep_compensator_begin(self);
         return 1;
     }

@@ -54,8 +54,13 @@ struct hsep_compensator {
     hsep_real error_max;       /* m, largest following error; 0: none */
     hsep_int over;             /* samples above it one after another, HSEP_OVER at most: it has tripped */
     hsep_int was_reset;        /* last level of the reset */
+    hsep_real x_load;          /* m, load that a sample brings, */
+    hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
     /* Offsets in words from the beginning of the struct */
     hsep_int x_dm;      /* (Np,) m, the window: modified commands */
+    hsep_int loads;     /* (preview,) m, ring of the loads that came last, */
+    hsep_int load;      /* (preview,) m, and those of the window and of what follows it: the drive moves as by so much
+                           more command */
     hsep_int trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
     hsep_int trial_e;   /* (preview + p,) m, its residuals */
     hsep_int target;    /* (preview,) m */
@@ -65,7 +70,7 @@ struct hsep_compensator {
     hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */
 };
 
-HSEP_ASSERT_WORDS(hsep_compensator, 19);
+HSEP_ASSERT_WORDS(hsep_compensator, 23);
 
 HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
