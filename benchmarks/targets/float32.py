@@ -47,8 +47,8 @@ def main() -> int:
         ratios: dict[int, list[float]] = {Np: [] for Np in WINDOWS}
         for drive in random_drives(range(options.n), options.seed):
             log = folder / "log.csv"
-            rows = np.stack((drive.x_d, drive.x_meas), axis=1)
-            np.savetxt(log, rows, delimiter=",", header="x_d,x_meas", comments="", fmt="%.17g")
+            rows = np.stack((1e-3 * np.arange(len(drive.x_d)), drive.x_d, drive.x_meas), axis=1)
+            np.savetxt(log, rows, delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
             for Np, of_window in ratios.items():
                 single, double = (hybrid_error(program, log, Np, drive) for program in programs)
                 of_window.append(single / double)

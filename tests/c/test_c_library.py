@@ -56,20 +56,6 @@ def test_pkg_config_tells_where_it_is(tmp_path: Path) -> None:
     assert program(tmp_path / "main") == "9 1\n"
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="the example of a loop in real time is Linux's alone")
-def test_a_loop_in_real_time_prints_its_histogram() -> None:
-    said = program(installed() / "build" / "realtime", "0.3")
-    for title in ("step", "late by"):
-        _, _, histogram = said.partition(f"\n{title}: ")
-        counts = re.match(r".*\n((?:  from .*\n)+)", histogram)
-        assert counts is not None, said
-        assert sum(int(line.split()[-1]) for line in counts.group(1).splitlines()) == 300
-    error = re.search(r"rms of the servo error: (\S+) um over 300 samples", said)
-    assert error is not None
-    assert 0.0 < float(error.group(1)) < 100.0
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_parameters_out_of_their_ranges_are_refused(kind: str) -> None:
     """One by one, at either end and as no number, and only then."""

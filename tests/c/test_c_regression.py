@@ -40,7 +40,7 @@ class CRegression:
 
     @property
     def n_rows(self) -> float:
-        return float(self.block[2])
+        return float(self.block[1])
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 16, 23])

@@ -3,10 +3,10 @@
  *     replay LOG.csv NP F_N ZETA
  *     replay LOG.csv                 compiled with -include my_axis.h -DAXIS=my_axis
  *
- * LOG.csv: a header with the columns x_d and x_meas, or x (commanded and measured position, m, or [mm] or [um] as it
- * says), a row each sampling interval, as hybridsep example-log writes it. NP: samples of a window; F_N, Hz, and ZETA:
- * the drive's linear model, one mode with unit gain. my_axis.h: an axis that hybridsep fit has identified, by hybridsep
- * header --predictor, with what it has learned if it has --weights.
+ * LOG.csv: rows of time, commanded and measured position, m, or [mm] or [um] as a header says, one each sampling
+ * interval, as hybridsep example-log writes it. NP: samples of a window; F_N, Hz, and ZETA: the drive's linear model,
+ * one mode with unit gain. my_axis.h: an axis that hybridsep fit has identified, by hybridsep header --predictor, with
+ * what it has learned if it has --weights.
  */
 #include "hsep.h"
 
@@ -16,67 +16,11 @@
 
 #define LINE_SIZE 4096
 
-/* A column of the log. */
-typedef struct {
-    int place;    /* -1: there is none */
-    double scale; /* m in its unit */
-} column;
-
-/* Take a column if a name in the header is its, alone or with its unit: x_d [mm]. */
-static void take_column(column *self, const char *name, const char *own, int place)
-{
-    const size_t length = strlen(own);
-    if (strncmp(name, own, length) == 0 && (name[length] == '\0' || name[length] == ' ')) {
-        self->place = place;
-        self->scale = strstr(name, "[mm]") != NULL ? 1e-3 : strstr(name, "[um]") != NULL ? 1e-6 : 1.0;
-    }
-}
-
-/* Find x_d and x_meas in the header; return whether both are there. */
-static int find_columns(char line[], column *x_d, column *x)
-{
-    int place = 0;
-    x_d->place = x->place = -1;
-    for (char *name = strtok(line, ",\r\n"); name != NULL; name = strtok(NULL, ",\r\n"), place++) {
-        take_column(x_d, name, "x_d", place);
-        take_column(x, name, "x_meas", place);
-        take_column(x, name, "x", place);
-    }
-    return x_d->place >= 0 && x->place >= 0;
-}
-
-/* The number in a column, m; return whether there is one. */
-static int read_number(const char *line, column from, double *number)
-{
-    char *end;
-    for (int i = 0; i < from.place; i++) {
-        line = strchr(line, ',');
-        if (line == NULL) {
-            return 0;
-        }
-        line++;
-    }
-    *number = from.scale * strtod(line, &end);
-    return end != line;
-}
-
-/* Read the next line that is no comment; return whether there is one. */
-static int read_line(FILE *file, char line[LINE_SIZE])
-{
-    do {
-        if (fgets(line, LINE_SIZE, file) == NULL) {
-            return 0;
-        }
-    } while (line[0] == '#');
-    return 1;
-}
-
-/* Read the log, x_d and x_meas by turns, (n, 2), m; return it, to be freed, or NULL. */
+/* Read the log, x_d and x by turns, (n, 2), m; return it, to be freed, or NULL. */
 static double *read_log(const char *path, size_t *n)
 {
     char line[LINE_SIZE];
-    column x_d = {0}, x = {0};
-    double *log = NULL;
+    double *log = NULL, scale = 1.0; /* m in the unit of the header */
     size_t room = 0;
     FILE *file = fopen(path, "r");
     *n = 0;
@@ -84,12 +28,12 @@ static double *read_log(const char *path, size_t *n)
         perror(path);
         return NULL;
     }
-    if (!read_line(file, line) || !find_columns(line, &x_d, &x)) {
-        fprintf(stderr, "%s must be a CSV with the columns x_d and x_meas, or x\n", path);
-        fclose(file);
-        return NULL;
-    }
-    while (read_line(file, line)) {
+    while (fgets(line, LINE_SIZE, file) != NULL) {
+        double t, x_d, x;
+        if (sscanf(line, "%lf,%lf,%lf", &t, &x_d, &x) < 3) {
+            scale = strstr(line, "[mm]") != NULL ? 1e-3 : strstr(line, "[um]") != NULL ? 1e-6 : scale;
+            continue;
+        }
         if (*n == room) {
             double *larger = realloc(log, 2 * (room = 2 * room + 1024) * sizeof *log);
             if (larger == NULL) {
@@ -97,9 +41,8 @@ static double *read_log(const char *path, size_t *n)
             }
             log = larger;
         }
-        if (read_number(line, x_d, &log[2 * *n]) && read_number(line, x, &log[2 * *n + 1])) {
-            ++*n;
-        }
+        log[2 * *n] = scale * x_d;
+        log[2 * (*n)++ + 1] = scale * x;
     }
     fclose(file);
     return log;
@@ -193,7 +136,7 @@ int main(int argc, char *argv[])
     }
     double *log = read_log(argv[1], &n);
     hsep_predictor *predictor = malloc(size);
-    int done = log != NULL && n > 0 && predictor != NULL;
+    int done = n > 0 && predictor != NULL;
     if (done) {
         const hsep_began began =
             hsep_predictor_init(predictor, &parameters, log[0], OF_AXIS(AXIS, _weights), OF_AXIS(AXIS, _weights_size));
@@ -202,8 +145,8 @@ int main(int argc, char *argv[])
                 stderr, "cold: the weights are %s\n", began == HSEP_WEIGHTS_OTHER ? "of other settings" : "damaged");
         }
         done = replay(predictor, (size_t)parameters.predictor.Np, log, n);
-    } else if (log != NULL) {
-        fprintf(stderr, "%s\n", n == 0 ? "the log has no samples" : "no memory");
+    } else {
+        fprintf(stderr, "%s\n", n == 0 ? "the log must have rows of t,x_d,x" : "no memory");
     }
     free(predictor);
     free(log);

@@ -19,12 +19,12 @@
 
 typedef struct {
     hsep_int n;       /* features */
-    hsep_int n_tiles; /* tiles of 4 columns that n features and the target need */
     hsep_real n_rows; /* rows so far */
     /* Offsets in words from the beginning of the struct */
-    hsep_int inverse_d; /* (4 n_tiles,) 1/D */
-    hsep_int row;       /* (4 n_tiles,) the row that comes next */
-    hsep_int tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
+    hsep_int inverse_d; /* (n,) 1/D */
+    hsep_int row;       /* (n + 1,) the row that comes next */
+    hsep_int factor;    /* (n (n + 1) / 2,) U and z, by rows, from behind the diagonal on */
+    hsep_int carries;   /* (n (n + 1) / 2,) what rounding took from them */
 } hsep_regression;
 
 HSEP_ASSERT_WORDS(hsep_regression, 6);
@@ -40,7 +40,7 @@ HSEP_API hsep_real *hsep_regression_row(hsep_regression *self);
 
 /* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite.
  * Cost: n^2 / 2 times 2 multiplications and 5 additions, and 2 n divisions, no matter how many rows were there
- * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
+ * before. */
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
