@@ -19,6 +19,7 @@ from ..base.settings import PLAN_END
 from ..base.signals import Array
 
 N_DECIDED = 3  # cubic splines that began before a plan and overlap it
+_END = PLAN_END  # the settings', which C has among the constants of splines
 
 _LEAST = 0.1
 """Weight of the last error of a plan of the averaged model: from the middle of the plan on the weights fall to it. A
@@ -66,7 +67,7 @@ class SplineBasis:
         begin = max(Np, preview // 2)
         falling = np.arange(preview - begin, 0, -1) / (preview - begin + 1)
         self.weight: Array = np.concatenate((np.ones(begin), np.maximum(_LEAST, falling)))
-        self.n_free = (preview - width - PLAN_END) // spacing + 1
+        self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
         # Tails of the splines at −3, −2, −1 spacings, then the free splines
         tails = [_padded(spline[i * spacing :], preview) for i in (3, 2, 1)]
