@@ -117,9 +117,10 @@ def test_outputs_are_the_models(averaging: int) -> None:
     assert compensator.begin(float(x_d[0])) == 0
     model = CModel("compensator_2", {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
     for k, x_d_ahead in enumerate(x_d):
-        x_meas = x_d[max(0, k - 101)] + 1e-5 * math.sin(0.1 * k)
-        model["x_d_ahead"], model["x_meas"] = x_d_ahead, x_meas
+        x_meas, x_load = x_d[max(0, k - 101)] + 1e-5 * math.sin(0.1 * k), 1e-4 * math.cos(0.03 * k)
+        model["x_d_ahead"], model["x_meas"], model["x_load"] = x_d_ahead, x_meas, x_load
         model.step(k * 1e-3)
+        compensator.load(x_load)
         outputs = compensator.sample(x_d_ahead, x_meas)
         found = (outputs.x_dm, outputs.predicted.x_h, outputs.predicted.x_h_std, outputs.state)
         assert found == tuple(model[name] for name in ("x_dm", "x_h", "x_h_std", "sep_state")), k

@@ -5,10 +5,11 @@ import pytest
 from driving import SHORT, T_S
 from library_stream import LookAheadStream
 from staircase_data import commanded
-from stream import COMPENSATOR, OUTPUTS, Array, Stream, Value, machine_of
+from stream import COMPENSATOR, OUTPUTS, PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
 
 from hybridsep.base.metrics import rms
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.plant import Encoder
 
 N, PREVIEW = 1400, 60
@@ -86,3 +87,14 @@ def test_it_is_compensated_as_by_the_library(new_stream: StreamMaker, kind: str)
     assert rms(errors) > 0.0
     for name, one, other in zip(OUTPUTS[COMPENSATOR], found.T, expected.T, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9, err_msg=name)
+
+
+def test_a_predictor_of_the_library_predicts_under_it() -> None:
+    machine, r = machine_of(PREDICTOR), commanded()[:500]
+    ahead, found = LookAhead(machine.new_predictor(), 0.0), []
+    for position, told in zip(r, load(), strict=False):
+        found.append(ahead.x_pb)
+        ahead.sample(float(position), 0.0, float(told) + 3e-3)
+    discrete = machine.new_predictor().discrete
+    expected, _ = discrete.forced_response(discrete.rest(), r + load()[:500])
+    np.testing.assert_allclose(found[ahead.Np :], expected[: 500 - ahead.Np], rtol=0, atol=1e-15)
