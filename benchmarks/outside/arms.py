@@ -284,7 +284,7 @@ def draw(file: Path, labels: Sequence[str], sizes: dict[str, list[float]]) -> No
     axes.set_xticks(range(len(labels)), labels, rotation=45)
     axes.set(ylabel="tracking error, RMS [mrad]")
     axes.grid(alpha=0.3)
-    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.15))
+    figure.legend(ncols=4, loc="outside upper center")
     figure.savefig(file, dpi=100)
 
 
