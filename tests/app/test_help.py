@@ -1,14 +1,18 @@
-"""Help of the commands: examples, each of which is run."""
+"""Help of the commands: examples, each of which is run; commands of plug-ins."""
 
+import ast
 import shlex
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run, write_rows
+from places import ROOT
 from staircase_data import commanded, measured
 
 from hybridsep import load_machine
+from hybridsep.app import cli
 from hybridsep.app.cli import EXAMPLES
 from hybridsep.machines.text import machine_text
 
@@ -70,3 +74,32 @@ def test_help_has_examples(hybridsep: Run) -> None:
     status, out, _ = hybridsep("fit", "--help")
     assert status == 0
     assert "  hybridsep fit my_axis.csv --Np 100\n" in out
+
+
+@pytest.mark.parametrize("name", cli.PLUG_INS)
+def test_a_plug_in_that_is_not_installed_is_named(name: str, hybridsep: Run) -> None:
+    status, out, err = hybridsep(name, "--help")
+    assert (status, out) == (2, "")
+    assert f"pip install ./plugins/{name} in a checkout (hybridsep-{name} once released)" in err
+    assert (ROOT / "plugins" / name / "pyproject.toml").is_file()
+
+
+def test_a_plug_in_that_is_installed_is_a_command(hybridsep: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint("modal", "json:dumps", "hybridsep.commands")
+    monkeypatch.setattr(EntryPoint, "load", lambda _: _shown)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [point] * (group == point.group))
+    assert hybridsep("modal", "3")[:2] == (0, "got 3\n")
+    assert "Show a number." in hybridsep("--help")[1]
+
+
+def _shown(number: int) -> None:
+    """Show a number."""
+    print(f"got {number}")
+
+
+def test_nothing_of_the_core_imports_a_plug_in() -> None:
+    for path in (ROOT / "hybridsep").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            named = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            named += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            assert not any(one.startswith("hybridsep_") for one in named), path

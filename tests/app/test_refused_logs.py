@@ -1,11 +1,16 @@
-"""Logs that commands refuse, or change only with a word about it: what is said, and what is left on the disk."""
+"""What is said of logs: what they hold, what refuses them, what to type, and what is left on the disk."""
 
+import json
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run, write_rows
+from command_line import Run, write_log, write_rows
+from recorders import twincat_csv
 from staircase_data import commanded, measured
+
+from hybridsep.logs.log import read_log
 
 MACHINE = ("--machine", "spring_mass_damper")
 
@@ -60,3 +65,78 @@ def test_a_refusal_names_its_file_and_itself_once(
     assert (status, out) == (2, "")
     assert err.startswith("error: axis.csv: columns swapped: x_d follows x, ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["axis.csv"]
+
+
+@pytest.mark.parametrize("scale", [1e3, 6e4])  # refused by the checks, and by the reader
+def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
+    log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
+    given = ("fit", log, "--x_d", "goal", "--x", "present")
+    status, out, err = hybridsep(*given, "--out", tmp_path / "fit")
+    assert (status, out) == (2, "")
+    lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
+    command = shlex.split(lines[0], comments=True)
+    assert command == ["hybridsep", *map(str, given), "--out", str(tmp_path / "fit"), "--unit", "mm"]
+    assert lines[0].endswith("# a linear axis in mm")
+    assert shlex.split(lines[1], comments=True)[-2:] == ["--unit", "deg"]
+    assert "joint" in lines[1]
+
+
+def test_a_machine_file_that_fit_wrote_is_named(
+    tmp_path: Path, hybridsep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_log(Path("axis.csv"), n=20)
+    status, _, err = hybridsep("backtest", "axis.csv")
+    assert status == 2
+    assert "It is the axis's machine file, which hybridsep fit axis.csv writes" in " ".join(err.split())
+    Path("axis").mkdir()
+    Path("axis/machine.toml").touch()
+    status, _, err = hybridsep("backtest", "axis.csv")
+    assert status == 2
+    assert "There is axis/machine.toml: add -m axis/machine.toml" in " ".join(err.split())
+
+
+def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
+    logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
+    status, _, err = hybridsep("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")
+    assert status == 2  # a refusal that comes behind, and soon
+    assert f"note: {logs[1]} has the samples of {logs[0]}: it counts once" in err
+
+
+def recording(path: Path) -> Path:
+    """Write a command at 1 kHz, and a position and a torque at 500 Hz."""
+    x_d, x = commanded()[:4000], measured(0)[:4000]
+    path.write_text(twincat_csv({"x_d": (1e-3, x_d), "x": (2e-3, x[::2]), "torque": (2e-3, x[::2])}))
+    return path
+
+
+def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
+    path = recording(tmp_path / "log.csv")
+    status, out, err = hybridsep("fit", path, "--list-channels")
+    assert (status, err) == (0, "")
+    rows = [line.split() for line in out.splitlines() if line.strip()]
+    assert ["x_d", "m", "4000", "0.001", "commanded"] in rows
+    assert ["torque", "m", "2000", "0.002"] in rows
+    status, out, err = hybridsep("fit", path, "--list-channels", "--json")
+    assert (status, err) == (0, "")
+    listed = {one["name"]: one for one in json.loads(out)[str(path)]}
+    assert listed["x"] == {"name": "x", "unit": "m", "role": "x", "n_samples": 2000, "interval": 0.002}
+    assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
+    odd = write_log(tmp_path / "odd.csv", n=20, header="t,goal,present")
+    status, out, _ = hybridsep("fit", odd, "--list-channels")
+    assert status == 0
+    words = "none is read as the commanded and measured position; name it: hybridsep fit "
+    assert f"{words}{odd} --x_d NAME --x NAME" in out
+
+
+def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:
+    path = recording(tmp_path / "log.csv")
+    replay = ("backtest", path, "-m", "spring_mass_damper", "--json")
+    status, _, err = hybridsep(*replay)
+    assert status == 2
+    assert "'x_d' has 4000 samples every 0.001 s, 'x' has 2000 samples every 0.002 s" in err
+    assert "(--resample) takes both at the times of the slower one" in err
+    status, _, err = hybridsep(*replay, "--resample")
+    assert status == 2  # the machine has 1 kHz
+    assert "sampled every 0.002 s, but machine spring_mass_damper has T_s = 0.001 s" in err
+    assert len(read_log(path, resample=True).t) == 2000

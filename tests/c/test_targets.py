@@ -1,19 +1,21 @@
-"""The C library on processors of controllers, emulated without an operating system.
+"""The C library on processors of controllers, emulated without an operating system, and in WebAssembly.
 
 Libraries of mathematics differ in the last bit. What is compared to the bit has the same exp, pow, tanh, sin and cos on
 both machines (benchmarks/targets/plain_math.c); with each one's own, predictions differ by less than what the library
 and the C core may.
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from c_library import Library
 from controllers import target_or_skip
+from places import SUPPORT
 
 from benchmarks.targets.cases import KINDS, Case, parameters, recorded
-from benchmarks.targets.targets import Replay, build, replay
+from benchmarks.targets.targets import TARGETS, Replay, Target, build, replay
 from hybridsep.base.signals import Array
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
@@ -80,3 +82,26 @@ def test_contracted_products_would_be_seen(tmp_path: Path) -> None:
     contracted = played("m7", case, tmp_path / "there", options=("-ffp-contract=fast",))
     here = played("x86-64", case, tmp_path / "here")
     assert (contracted.outputs != here.outputs).any()
+
+
+WASM = Target(
+    "wasm32",
+    (sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi"),
+    "board_host.c",
+    emulator=(sys.executable, str(SUPPORT / "run_wasi.py")),
+)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_outputs_are_those_of_this_machine(kind: str, tmp_path: Path) -> None:
+    """The paper's drive, window and lags, warm; its libm is musl's."""
+    case = Case(kind, 100, 50, 40, warm=True)
+    there, here = (
+        replay(target, build(target, case, tmp_path / target.name), count=False) for target in (WASM, TARGETS["x86-64"])
+    )
+    np.testing.assert_allclose(there.outputs, here.outputs, rtol=0.0, atol=1e-12)
+    assert (there.block, there.began) == (here.block, 0)
+    assert len(there.outputs) == 4000
+    assert np.ptp(there.outputs[:, 0]) > 5e-3

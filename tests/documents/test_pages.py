@@ -1,12 +1,19 @@
-"""Links and file names on the pages of the repository, and its length and tone at the front."""
+"""Pages of the documentation, the listings' rows, and the Simulink example."""
 
+import json
 import re
 from datetime import date
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
+from built_once import BuiltFmus
 from places import ROOT
+
+from hybridsep.cosim.fmu import read_description
+from hybridsep.fmi.flavours import FMI_VERSIONS
+from hybridsep.fmi.ssp import SSP_VERSIONS
 
 DATED = ROOT / "docs" / "experiments"
 """Pages that tell of the code at their commit: names of files on them may have gone."""
@@ -75,3 +82,43 @@ def test_the_front_is_short() -> None:
     assert len(text.split()) <= 900
     assert len(text.splitlines()) <= 140
     assert len(TOP[1].read_text(encoding="utf-8").splitlines()) <= 250
+
+
+FOLDER = ROOT / "integrations" / "listings"
+
+
+def test_the_rows_name_the_versions_that_are_written() -> None:
+    entry = json.loads((FOLDER / "fmi-standard.org.json").read_text(encoding="utf-8"))
+    assert entry["fmiVersions"] == [f"{version}.0" for version in FMI_VERSIONS]
+    row = ET.fromstring((FOLDER / "ssp-standard.org.html").read_text(encoding="utf-8"))
+    *_, licence, reads, writes = (cell.text for cell in row.findall("td"))
+    assert (entry["license"], licence, reads) == ("osi", "osi", "no")
+    assert writes == "/".join(f"{version}.0" for version in SSP_VERSIONS)
+
+
+SCRIPT = (ROOT / "examples" / "simulink_loop.m").read_text(encoding="utf-8")
+PORTS = {
+    (fmu, f"{kind}put"): re.findall(r"'(\w+)'", names)
+    for fmu, kind, names in re.findall(r"^ports\.(\w+)\.(in|out)puts = \{(.*)\};$", SCRIPT, re.MULTILINE)
+}
+FMUS = ("ReferenceTrajectory", "HybridPredictor", "SepCompensator", "FeedDrive")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmu", FMUS)
+def test_ports_are_the_fmus_in_their_order(fmu: str, fmus: BuiltFmus) -> None:
+    variables = read_description(fmus(fmu)).modelVariables
+    for causality in ("input", "output"):
+        assert PORTS[fmu, causality] == [v.name for v in variables if v.causality == causality]
+
+
+@pytest.mark.slow
+def test_wires_end_at_ports() -> None:
+    text = SCRIPT.partition("wires = {")[2].partition("};")[0]
+    wires = [line.strip().split(", ") for line in text.strip().splitlines()]
+    assert len(wires) == 3
+    for look_ahead, command in (("HybridPredictor", "x_d"), ("SepCompensator", "x_dm")):
+        values = {"lookAhead": look_ahead, "command": command}
+        for source, output, sink, entry in ([values.get(word, word.strip("'")) for word in wire] for wire in wires):
+            assert output in PORTS[source, "output"]
+            assert entry in PORTS[sink, "input"]

@@ -1,4 +1,4 @@
-"""Disturbances of the user's own, functions in Python of position and commanded velocity."""
+"""Disturbances of the user, and those that repeat with the position."""
 
 import copy
 import pickle
@@ -10,6 +10,7 @@ from averaged_cases import TS, cycles, physics, run
 from numpy.typing import ArrayLike
 from predictor_cases import MODEL
 
+from benchmarks.periodic import errors
 from hybridsep.base.errors import ParameterError, SignalError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
@@ -117,3 +118,19 @@ def test_disturbances_need_averaging_and_must_be_functions() -> None:
         HybridPredictor(MODEL, PredictorSettings(averaging=False), disturbances=(spring,))
     with pytest.raises(ParameterError, match=r"disturbances\[1\] must be a function of x and v, got 3"):
         HybridPredictor(MODEL, disturbances=(spring, 3))  # type: ignore[arg-type]
+
+
+COGGING = 20e-6, 0.005  # amplitude and pitch, m; the noise is 1 µm
+
+
+@pytest.mark.parametrize("second_start", [0.0, 0.0313])
+def test_what_repeats_is_predicted_to_the_noise_wherever_a_run_starts(second_start: float) -> None:
+    cold, warm = errors(*COGGING, COGGING[1], (0.0, second_start))
+    without = errors(*COGGING, 0.0, (0.0, second_start))
+    assert cold < 0.7 * without[0]
+    assert warm < 1.2 < 10.0 < without[1]
+
+
+def test_another_period_does_no_harm() -> None:
+    for wrong, without in zip(errors(*COGGING, 0.83 * COGGING[1]), errors(*COGGING, 0.0), strict=True):
+        assert wrong < 1.05 * without

@@ -1,4 +1,4 @@
-"""Late measurements, starts in motion and plants that have changed, in every implementation.
+"""Late and missing measurements, starts in motion, faster motion and plants that have changed, in every implementation.
 
 Every implementation shows what the library shows: within 1e-12 m with averaging, 1e-11 m with the paper's model. That
 what it shows is good is tested beside it.
@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 from averaged_cases import averaged_model, change_learned
-from driving import T_S, run
+from driving import T_S, initialise, run
 from library_stream import LookAheadStream
 from staircase_data import commanded
-from stream import OUTPUTS, PREDICTOR, STAGE_PREDICTOR, Array, Value, machine_of
+from stream import COMPENSATOR, LIBRARY, OUTPUTS, PREDICTOR, STAGE_PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
 
+from hybridsep.base.metrics import rms
+from hybridsep.base.signals import Indices
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.plant import Encoder, simulate
@@ -218,3 +220,71 @@ def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
         x_h = shown[2000:-1, OUTPUTS[PREDICTOR].index("x_h")]
         error.append(np.sqrt(np.mean((x_h - inputs[1][2000:]) ** 2)))
     assert error[1] < most * error[0]
+
+
+N, NP, FIRST = 2000, 20, 1000
+"""Samples of a run and of a window; first sample that is judged, behind one half of the staircase."""
+
+MISSING: dict[str, Indices] = {
+    "none": np.arange(0),
+    "every fifth, at windows' ends": np.arange(4, N, 5),
+    "every seventh": np.arange(6, N, 7),
+    "a fifth": np.flatnonzero(np.random.default_rng(3).random(N) < 0.2),
+}
+
+
+@cache
+def complete() -> tuple[Array, Array]:
+    """Return commands and complete positions of the paper's drive, (N,), m."""
+    machine, x_d = machine_of(PREDICTOR), commanded()[:N]
+    assert machine.plant is not None
+    return x_d, Encoder(1e-7, 5).measure_all(simulate(machine.new_plant(), x_d, T_S))
+
+
+def predicted(stream: Stream, missing: Indices) -> Array:
+    """Return what is predicted without some measurements, (N − NP,), m."""
+    x_d, x = complete()
+    given = x.copy()
+    given[missing] = np.nan
+    values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_meas": x_d[0]}
+    outputs = run(stream, x_d, np.concatenate((np.full(NP, x_d[0]), given))[:N], values)
+    return np.asarray(outputs[NP:-1, OUTPUTS[PREDICTOR].index("x_h")])
+
+
+@cache
+def bridged_by_library(name: str) -> Array:
+    return predicted(LookAheadStream(PREDICTOR), MISSING[name])
+
+
+@pytest.mark.parametrize("name", list(MISSING)[1:])
+def test_many_missing_measurements_cost_little(name: str) -> None:
+    _, x = complete()
+    error, least = (rms((x[: N - NP] - bridged_by_library(one))[FIRST:]) for one in (name, "none"))
+    assert error < 1.15 * least
+
+
+@on_all((PREDICTOR,), alike=(LIBRARY,))
+@pytest.mark.parametrize("name", ["every fifth, at windows' ends", "a fifth"])
+def test_they_are_bridged_as_by_the_library(new_stream: StreamMaker, name: str) -> None:
+    np.testing.assert_allclose(predicted(new_stream(), MISSING[name]), bridged_by_library(name), rtol=0.0, atol=1e-11)
+
+
+CHANGE_MAX = 5e-6  # m: every plan of the physics model is at it
+
+
+@on_all((COMPENSATOR,))
+def test_half_of_the_largest_change_until_the_motion_was_measured(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    initialise(stream, compensate=1, change_max=CHANGE_MAX)
+    velocity = np.convolve(np.repeat([0.0, 0.02, 0.2], [20, 300, 160]), np.full(40, 1 / 40))[:480]
+    x_d, x_dm = OUTPUTS[COMPENSATOR].index("x_d"), OUTPUTS[COMPENSATOR].index("x_dm")
+    changes, path = [], np.cumsum(velocity) * T_S
+    for k, ahead in enumerate(path):
+        stream.set("x_d_ahead", float(ahead))
+        stream.set("x_meas", float(path[max(k - 60, 0)]))
+        stream.step(k * T_S, T_S)
+        outputs = stream.outputs()
+        changes.append(abs(outputs[x_dm] - outputs[x_d]))
+    # At 20 mm/s for the first time; later; and behind what is left of the plans from before 200 mm/s came in sight
+    found = [max(changes[first:last]) / CHANGE_MAX for first, last in ((0, 120), (120, 340), (380, 480))]
+    assert found == pytest.approx([0.5, 1.0, 0.5], rel=1e-3)

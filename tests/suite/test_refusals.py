@@ -1,10 +1,12 @@
-"""What every implementation refuses, in the same words, and that a refused call changes nothing."""
+"""What every implementation refuses, in the same words; that it changes nothing; windows that diverge."""
 
 import math
 import re
 
+import numpy as np
 import pytest
 from driving import T_S, initialise, set_inputs, steps
+from library_models import runaway_predictor
 from stream import (
     CANNOT,
     COMPENSATOR,
@@ -15,14 +17,16 @@ from stream import (
     STAGE,
     STAGE_PREDICTOR,
     TRAJECTORY,
+    WINDOWS,
     RefusedStreamError,
     Stream,
     Value,
     table_of_model,
 )
-from streams import StreamMaker, on_adapters
+from streams import StreamMaker, on_adapters, on_all
 
 from hybridsep.base.parameters import Parameter
+from hybridsep.fmi.weights import weights_file
 
 Case = tuple[dict[str, Value], str]
 
@@ -212,3 +216,44 @@ def test_a_step_too_long_for_a_fast_plant_is_refused(new_stream: StreamMaker) ->
     stream.initialise({"k": 9e9})
     assert_refused(stream, 0.0, 50.0, "the step size must be at most 0.658808 s for a drive as fast as 94868.3 1/s")
     stream.step(0.0, T_S)
+
+
+SAID = re.escape("x_h must stay within ±1e+100 m: the learned recursion diverges; raise lambda, lower p or reset")
+
+
+@on_all((PREDICTOR,))
+def test_a_window_that_diverges_is_refused_until_another_state_is_set(new_stream: StreamMaker) -> None:
+    stream, other = (new_stream.planted(weights_file(runaway_predictor())) for _ in range(2))
+    stream.initialise({"t_init": 0.0, "x_d_ahead": 0.01})
+    beginning = stream.save()
+    first = steps(stream, 0, 99)
+    before, outputs = stream.save(), stream.outputs()
+    windows = [stream.window(name) for name in WINDOWS]
+    for k in range(99, 103):
+        with pytest.raises(RefusedStreamError, match=SAID):
+            stream.step(k * T_S, T_S)
+        if (new_stream.implementation, "outputs kept") not in CANNOT:
+            assert stream.outputs() == outputs
+        np.testing.assert_array_equal([stream.window(name) for name in WINDOWS], windows)
+    diverged = stream.save()
+    # It may be saved, and stays what it is.
+    for state in (before,) if (new_stream.implementation, "diverged states") in CANNOT else (diverged, before):
+        other.restore(state)
+        with pytest.raises(RefusedStreamError, match=SAID):
+            other.step(99 * T_S, T_S)
+    stream.restore(beginning)
+    assert steps(stream, 0, 99) == first
+
+
+@on_all((PREDICTOR,))
+def test_the_warm_up_hides_what_diverges(new_stream: StreamMaker) -> None:
+    stream = new_stream.planted(weights_file(runaway_predictor()))
+    stream.initialise({"t_init": 0.1})
+    for row in steps(stream, 0, 199):
+        assert row[1] == row[2]
+        assert np.isfinite(row).all()
+    with pytest.raises(RefusedStreamError, match=SAID):
+        stream.step(199 * T_S, T_S)
+    stream.reset()
+    stream.initialise({"t_init": 1e3})
+    steps(stream, 0, 300)
