@@ -1,15 +1,12 @@
 """The C core's solutions with penalties against the library's and exact ones. Each test states its tolerance."""
 
 import ctypes
-import subprocess
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import c_core
 import numpy as np
 import pytest
-from c_compiler import C_SOURCES, include_flags, run_compiler
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -343,21 +340,3 @@ def test_digits_do_not_wear_off() -> None:
     sums = gram.block[-12:-6]
     for found, expected in zip(sums[:3], exact, strict=True):
         assert abs(Fraction(float(found)) - expected) <= Fraction(3e-16) * abs(expected)
-
-
-@pytest.mark.slow
-def test_vectors_change_no_bit(tmp_path: Path) -> None:
-    numeric = C_SOURCES / "core" / "numeric"
-    sources = [
-        Path(__file__).with_name("lanes.c"),
-        *(numeric / f"hsep_{name}.c" for name in ("gram", "solution", "cholesky")),
-    ]
-    shown = []
-    for flags in (["-O3"], ["-O3", "-DHSEP_NO_VECTORS"], ["-O1", "-DHSEP_NO_VECTORS"]):
-        program = tmp_path / "lanes"
-        run_compiler([*flags, *include_flags(), *sources, "-lm", "-o", program])
-        done = subprocess.run([program], check=True, capture_output=True, text=True)
-        *bits, last = done.stdout.split()
-        shown.append((bits, int(last)))
-    assert [lanes for _, lanes in shown] == [2, 1, 1]
-    assert shown[0][0] == shown[1][0] == shown[2][0]

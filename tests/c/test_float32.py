@@ -1,4 +1,4 @@
-"""The C library in single precision, ``HSEP_FLOAT32``, beside itself in double precision."""
+"""The C library in single precision, ``HSEP_FLOAT32``, and without vectors, beside itself in double precision."""
 
 import re
 import subprocess
@@ -20,33 +20,34 @@ AGREES, AGREES_PLANNED = 5e-3, 1e-2
 compensator and behind one, whose bounded plans differ."""
 
 
-def options(*, single: bool) -> list[str]:
-    """Return the options of a precision for the compiler of this machine."""
-    # Constants are doubles without gcc's option; optimised, the core would take longer to compile than to run
-    return [*(["-O0", "-DHSEP_FLOAT32", "-Wno-conversion"] if single else ["-O2"]), *include_flags()]
+DOUBLE = ("-O2",)
+# Constants are doubles without gcc's option; optimised, the core would take longer to compile than to run
+SINGLE = ("-O0", "-DHSEP_FLOAT32", "-Wno-conversion")
+NO_VECTORS = ("-O1", "-DHSEP_NO_VECTORS")
 
 
 @cache
-def core(*, single: bool) -> list[Path]:
+def core(options: tuple[str, ...]) -> list[Path]:
     """Return the library's object files, the same for all cases; in double precision those of the other tests."""
     sources = core_sources()
-    if not single:
+    if options == DOUBLE:
         names = {source.stem for source in sources}
         return [path for path in map(Path, object_files()) if path.stem in names]
-    folder = build_folder() / "core_single"
+    folder = build_folder() / f"core{options[1]}"
     folder.mkdir()
     for source in sources:
-        run_compiler([*options(single=single), "-c", source, "-o", folder / f"{source.stem}.o"])
+        run_compiler([*options, *include_flags(), "-c", source, "-o", folder / f"{source.stem}.o"])
     return sorted(folder.iterdir())
 
 
-def played(case: Case, *, single: bool) -> Replay:
+def played(case: Case, options: tuple[str, ...]) -> Replay:
     """Return a replay with the compiler of this machine, not counted."""
-    folder = build_folder() / f"{case.kind}_{case.Np}_{case.windows}_{case.warm}_{single}"
+    folder = build_folder() / f"{case.kind}_{case.Np}_{case.windows}_{case.warm}_{options[-1]}"
     folder.mkdir()
     (folder / "case.h").write_text(header(case), encoding="utf-8")
-    files = [HERE / "replay.c", HERE / "board_host.c", *core(single=single)]
-    run_compiler([*options(single=single), f"-I{HERE}", f"-I{folder}", *files, "-lm", "-o", folder / "program"])
+    files = [HERE / "replay.c", HERE / "board_host.c", *core(options)]
+    included = [*include_flags(), f"-I{HERE}", f"-I{folder}"]
+    run_compiler([*options, *included, *files, "-lm", "-o", folder / "program"])
     return replay(TARGETS["x86-64"], folder / "program", count=False)
 
 
@@ -59,9 +60,9 @@ def error(case: Case, found: Replay) -> float:
 
 
 @cache
-def errors(case: Case, single: bool) -> tuple[float, Replay]:
+def errors(case: Case, options: tuple[str, ...]) -> tuple[float, Replay]:
     """Return the error and the replay."""
-    found = played(case, single=single)
+    found = played(case, options)
     return error(case, found), found
 
 
@@ -69,7 +70,7 @@ def errors(case: Case, single: bool) -> tuple[float, Replay]:
 @pytest.mark.parametrize("warm", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_predictions_are_as_good(warm: bool) -> None:
     case = Case("predictor", 20, 20, 60, warm)
-    (single, of_single), (double, of_double) = errors(case, True), errors(case, False)
+    (single, of_single), (double, of_double) = errors(case, SINGLE), errors(case, DOUBLE)
     assert single == pytest.approx(double, rel=AGREES)
     assert of_single.began == of_double.began == 0
     assert 2 * of_single.block == of_double.block
@@ -79,10 +80,16 @@ def test_predictions_are_as_good(warm: bool) -> None:
 @pytest.mark.slow
 def test_a_plan_is_that_of_double_precision() -> None:
     case = Case("compensator", 20, 20, 60)
-    (single, of_single), (double, of_double) = errors(case, True), errors(case, False)
+    (single, of_single), (double, of_double) = errors(case, SINGLE), errors(case, DOUBLE)
     assert single == pytest.approx(double, rel=AGREES)
     change = of_double.outputs[:, 0] - np.concatenate(([0.0] * 40, recorded(case)[0][:-40, 0]))
     assert np.sqrt(np.mean((of_single.outputs[:, 0] - of_double.outputs[:, 0]) ** 2)) < AGREES * np.ptp(change)
+
+
+@pytest.mark.slow
+def test_vectors_change_no_bit() -> None:
+    case = Case("compensator", 20, 20, 60)
+    np.testing.assert_array_equal(errors(case, NO_VECTORS)[1].outputs, errors(case, DOUBLE)[1].outputs)
 
 
 @pytest.mark.nightly
@@ -98,7 +105,7 @@ def test_a_processor_without_doubles_predicts_as_well(
     there = replay(machine, build(machine, case, tmp_path / "there"), count=False)
     assert there.began == 0
     agrees = AGREES_PLANNED if kind == "compensator" else AGREES
-    assert error(case, there) == pytest.approx(errors(case, False)[0], rel=agrees)
+    assert error(case, there) == pytest.approx(errors(case, DOUBLE)[0], rel=agrees)
 
 
 @pytest.mark.nightly

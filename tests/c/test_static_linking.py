@@ -1,5 +1,6 @@
 """Several source FMUs in one program: the FMI functions' names begin with the model identifier (FMI 2.0 and 3.0)."""
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,9 @@ import elf
 import pytest
 from c_compiler import FMI_HEADERS, run_compiler
 from fmi_library import OK, Library, library_of, steps
+from library_models import trained_state
 
+from hybridsep import build_fmu, paper_machine
 from hybridsep.fmi.compile import FLAGS
 
 MODELS = ("HybridPredictor", "FeedDrive", "ReferenceTrajectory")
@@ -77,6 +80,35 @@ def test_three_fmus_in_one_program_compute_what_their_libraries_do(
         linked._dll = Linked(tmp_path / "three.so", model, library)
         resources = (folders(model) / "resources").as_uri() if model == "ReferenceTrajectory" else None
         assert trace(linked, resources) == trace(library, resources)
+
+
+BARE = ("-DHSEP_NO_FILES", "-DHSEP_NO_STDIO", "-DHSEP_NO_MALLOC")
+OF_A_SYSTEM = {"fopen", "fread", "strtod", "vsnprintf", "snprintf", "malloc", "calloc", "realloc", "free"}
+MEMORY = """#include <stdlib.h>
+void *hsep_target_calloc(size_t count, size_t size);
+void hsep_target_free(void *block);
+void *hsep_target_calloc(size_t count, size_t size) { return calloc(count, size); }
+void hsep_target_free(void *block) { free(block); }
+"""
+
+
+@pytest.mark.slow
+def test_a_source_fmu_starts_warm_without_a_system(headers: Path, tmp_path: Path) -> None:
+    """Without files, printf and malloc, with the weights in its sources: as its library does with them in a file."""
+    model, folder, machine = "HybridPredictor", tmp_path / "HybridPredictor", paper_machine("spring_mass_damper")
+    weights = trained_state(model)
+    fmu = build_fmu(machine, model, tmp_path / "built", targets=("host",), weights=weights, embed_weights=True)
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    built = compiled(folder, headers, tmp_path, *BARE)
+    needed = {symbol.name for symbol in elf.symbols(built) if not symbol.defined}
+    assert needed.isdisjoint(OF_A_SYSTEM)
+    assert "hsep_target_calloc" in needed
+    (tmp_path / "memory.c").write_text(MEMORY)
+    run_compiler(["-shared", "-fPIC", built, tmp_path / "memory.c", "-lm", "-o", tmp_path / "bare.so"])
+    library, linked = library_of(folder), library_of(folder)
+    linked._dll = Linked(tmp_path / "bare.so", model, library)
+    assert trace(linked, None) == trace(library, (folder / "resources").as_uri())
 
 
 class Linked:
