@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arx_oracle import arx_by_definition, free_run_by_definition
 from command_line import Run, predictor, write_rows
+from oracle import arx_by_definition, free_run_by_definition
 from places import RECORDINGS
 from plotly.offline import get_plotlyjs
 from quick_fits import without_larger_structures, without_other_settings

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bounded_oracle import clarabel_minimum
 from compensator_cases import MODEL, TS, compensator, move, plant
+from oracle import clarabel_minimum
 from scipy.linalg import toeplitz
 from staircase_data import commanded
 

@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from bounded_oracle import clarabel_minimum
 from library_stream import LookAheadStream
+from oracle import clarabel_minimum
 from places import ROOT
 from random_loops import random_loop, run
 from stream import COMPENSATOR

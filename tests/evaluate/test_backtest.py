@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hold_oracle import held
+from oracle import held
 from places import EMPS
 
 from benchmarks.fit import errors_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from arx_oracle import arx_by_definition, free_run_by_definition
+from oracle import arx_by_definition, free_run_by_definition
 from scipy.signal import lfilter
 
 from hybridsep.base.metrics import rms

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from driving import T_S, run
-from hold_oracle import held
+from oracle import held
 from staircase_data import commanded
 from stream import COMPENSATOR, LIBRARY, OUTPUTS, PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_all

@@ -1,15 +1,17 @@
-"""A slow, obvious and independent oracle: equations (2) to (6) transcribed sample by sample.
+"""Slow, obvious and independent oracles: equations (2) to (6), ARX models and the hold sample by sample; bounded plans.
 
-It shares no code with the library. The physics model is discretised as one transfer function, features are lists,
+They share no code with the library. The physics model is discretised as one transfer function, features are lists,
 the ridge problem is solved once per batch from all rows so far, and a window is a loop of its own predictions.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import clarabel
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, tf2ss
+from scipy.sparse import csc_matrix
 
 Array = NDArray[np.float64]
 LongArray = NDArray[np.longdouble]
@@ -145,3 +147,60 @@ def run(
         e_pb += [float(x[k]) - start - x_pb[k] for k in batch]
         rows += [features(x_pb, e_pb, k, p, q) for k in batch]
     return out
+
+
+def arx_by_definition(x_d: Array, x: Array, n: int, n_fitted: int) -> Array:
+    """Return the coefficients from the samples before ``n_fitted``, row by row."""
+    y, rows, targets = x - x_d, [], []
+    for k in range(n + 1, n_fitted):
+        steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
+        row = [y[k - i] for i in range(1, n + 1)] + steps + [1.0]
+        if not np.isnan([*row, y[k]]).any():
+            rows.append(row)
+            targets.append(y[k])
+    return np.asarray(np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)[0])
+
+
+def free_run_by_definition(w: Array, x_d: Array, x: Array, n: int, begin: int, end: int) -> Array:
+    """Return the positions predicted from what is measured before ``begin``, sample by sample."""
+    y = (x - x_d)[:begin].tolist()
+    for k in range(n + 1, end):
+        if k >= len(y) or np.isnan(y[k]):
+            steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
+            value = float(np.dot(w, [y[k - i] for i in range(1, n + 1)] + steps + [1.0]))
+            y[k : k + 1] = [value]
+    return np.asarray(x_d[begin:end] + np.array(y[begin:end]))
+
+
+def held(x_pb: Array, x_meas: Array, Np: int, *, delay: int = 0, first: int = 0) -> Array:
+    """Return ``x_pb`` plus the residual of the last sample measured before each window, (n,), m.
+
+    ``x_meas`` is what was measured at each sample, NaN where missing; it arrived ``delay`` samples later. What is
+    measured before sample ``first`` does not count.
+    """
+    found: Array = x_pb.copy()
+    for begin in range(0, len(x_pb), Np):
+        known = first + np.flatnonzero(~np.isnan(x_meas[first : max(first, begin - delay)]))
+        if len(known):
+            found[begin : begin + Np] += x_meas[known[-1]] - x_pb[known[-1]]
+    return found
+
+
+def clarabel_minimum(P: Array, v: Array, rows: Array, low: Array, high: Array, tolerance: float = 1e-8) -> Array:
+    """Return the minimum of ``½ xᵀPx − vᵀx`` within the bounds by Clarabel (Goulart and Chen, arXiv:2405.12762)."""
+    unit = float(np.max(np.abs(np.linalg.solve(P, v))))
+    scale = 1.0 / float(np.max(np.diag(P)))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+    solver = clarabel.DefaultSolver(
+        csc_matrix(np.triu(P * scale)),
+        -v * (scale / unit),
+        csc_matrix(np.concatenate((rows, -rows)) * unit),
+        np.concatenate((high, -low)),
+        [clarabel.NonnegativeConeT(2 * len(rows))],
+        settings,
+    )
+    solution = solver.solve()
+    assert str(solution.status) in ("Solved", "AlmostSolved")
+    return np.asarray(solution.x) * unit
