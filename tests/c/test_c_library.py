@@ -154,7 +154,7 @@ def test_weights_from_memory(kind: str) -> None:
 
 
 def test_a_limit_of_the_following_error_is_checked_and_a_trip_ends_with_a_rising_reset() -> None:
-    """What becomes of a trip: tests/suite/test_monitor.py."""
+    """What becomes of a trip: tests/suite/test_tunable.py."""
     given = library("compensator", following_error_max=1e-3)
     assert given.begin(0.0) == 0
     for allowed, taken in ((-1e-3, 0), (math.nan, 0), (math.inf, 0), (2e-3, 1)):

@@ -79,7 +79,7 @@ def test_only_what_is_tunable_changes_in_a_run() -> None:
 
 
 def test_windows_are_monitored_as_samples_are() -> None:
-    """Sample by sample, on every implementation: tests/suite/test_monitor.py."""
+    """Sample by sample, on every implementation: tests/suite/test_tunable.py."""
     predictor = HybridPredictor(MODEL, PredictorSettings(Np=50, p=10, measurement_delay=2))
     sep = SepCompensator(predictor, CompensatorSettings(preview=200, limits=DRIVE_LIMITS, following_error_max=1e-6))
     x_d = move(400)
