@@ -337,17 +337,17 @@ def test_steps_take_no_memory_and_reset_gives_it_back(fmu2: Library) -> None:
 def array_bytes() -> int:
     """Return the size of the arrays that eqs. (2) to (6) need, counted from the paper's parameters, not from the code.
 
-    ``n = 2 + p + q`` features; the upper triangle of the factor of ``[phi | target]``, each entry with what rounding
-    took from it; five windows; the past of ``x_pb`` and ``e_pb`` behind a window; the weights, and the weights of
-    ``e_pb`` once more in the order of their use; for the uncertainty two windows and one of each of its seven
-    components; per mode a matrix, two vectors, the feed-through and the state; and one number for each FMI variable.
+    ``n = 2 + p + q`` features; the factor of ``[phi | target]`` above its diagonal, each entry with what rounding took
+    from it, the scales and the incoming row; seven windows; the past of ``x_pb`` and ``e_pb`` behind a window; the
+    weights; for the uncertainty two windows and one of each of its three components; per mode a matrix, two vectors,
+    the feed-through and the state; and one number for each FMI variable.
     """
     machine = paper_machine("spring_mass_damper")
     values = machine.fmi_parameters()
     Np, p, q = (int(values[name]) for name in ("Np", "p", "q"))
     n = 2 + p + q
-    factor = (n + 1) * (n + 2) + 2 * (n + 1)  # twice the triangle; the scales and the incoming row
-    windows = (5 + 2 + 7) * Np + (Np + q) + (Np + p) + n + p
+    factor = n * (n + 1) + 2 * n + 1
+    windows = (7 + 2 + 3) * Np + (Np + q) + (Np + p) + n
     table = table_of(machine, "HybridPredictor", "HybridPredictor")
     return 8 * (factor + windows + 11 * len(table.modes) + len(table.variables))
 

@@ -79,7 +79,7 @@ def test_an_axis_starts_with_what_was_learned(hybridsep: Run, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("machines", "letters", "folder", "options", "said"),
     [
-        (["emps"], 1, "out", [], "[drive_limits] in the machine file of emps; --predictor writes"),
+        (["emps"], 1, "out", [], "emps has no [drive_limits], which a compensator must keep"),
         ([], 1, "my axes", [], "at which loadrt takes axes= apart"),
         ([], 1, "x,y", [], "at which loadrt takes axes= apart"),
         ([], 1, "a$b", [], "at which loadrt takes axes= apart"),
