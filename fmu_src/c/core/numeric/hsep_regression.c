@@ -2,7 +2,6 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
-#include "hsep_vector.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -90,11 +89,24 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
 
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
+    const hsep_int n = self->n;
     const hsep_real *u = hsep_at_const(self, self->carries); /* behind the last row */
-    /* U w = z from the last row to the first; z is the last entry of each. */
-    for (hsep_int i = self->n, length = 1; i-- > 0; length++) {
-        u -= length;
-        w[i] = u[length - 1] - hsep_dot(u, w + i + 1, length - 1);
+    /* U w = z from the last row to the first: by fours from the next multiple of 4 on, then the others one by one. */
+    for (hsep_int i = n; i-- > 0;) {
+        const hsep_int fours = i - i % 4 + 4, rest = fours > n ? n : n - n % 4;
+        u -= n - i;
+        const hsep_real *row = u - (i + 1); /* by columns; z is column n */
+        hsep_real sum = 0.0;
+        for (hsep_int j = fours; j + 4 <= n; j += 4) {
+            sum += row[j] * w[j] + row[j + 1] * w[j + 1] + row[j + 2] * w[j + 2] + row[j + 3] * w[j + 3];
+        }
+        w[i] = row[n] - sum;
+        for (hsep_int j = rest; j < n; j++) {
+            w[i] -= row[j] * w[j];
+        }
+        for (hsep_int j = i + 1; j < fours && j < n; j++) {
+            w[i] -= row[j] * w[j];
+        }
     }
 }
 
