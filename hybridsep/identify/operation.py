@@ -14,7 +14,7 @@ from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
 from .search import fit_near
-from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
+from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out, without_long_delay
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
@@ -71,7 +71,8 @@ def identify_operation(
         if structure.order <= max(order_max, 1) and unit_gain in (None, structure.unit_gain)
     ]
     candidates = compare_structures(segments, T_s, structures, progress)
-    chosen = choose(candidates)
+    chosen = without_long_delay(choose(candidates), segments, T_s)
+    candidates = [chosen if one.structure == chosen.structure else one for one in candidates]
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
     findings = []

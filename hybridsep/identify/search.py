@@ -1,13 +1,16 @@
 """Search for poles and dead time of one structure: starts from simpler fits, dead time in doubling, halving steps."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..base.signals import Array
 from .output_error import Delay, Fit, Segment, fit_structure
 from .structure import DECAY_MIN, SLOWEST, Structure
+from .uncertainty import estimates
 
+_CONTRADICTED = 4.0  # ratio of likelihoods, twice its logarithm, that contradicts: two standard deviations
+_SHORTER = 8  # shorter dead times that are tried, evenly spaced
 _DEAD_TIME_MAX = 0.25  # longest dead time that is tried, s, and at most a quarter of the recording
 
 
@@ -40,6 +43,29 @@ def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit) -> Fit:
     best = min(fits, key=lambda fit: fit.rms)
     n = sum(segment.stop for segment in segments)
     return fit_structure(segments, T_s, fit.structure, best.delay, [best.theta], fit.slowest, rows_max=n)
+
+
+def shorter_delays(segments: Sequence[Segment], T_s: float, fit: Fit) -> Iterator[Fit]:
+    """Yield second orders with shorter dead times, shortest first, that the recording contradicts no more than the fit.
+
+    Only of a lag, or a second order, with a dead time longer than half of what its poles lag by. Contradicted is by the
+    likelihood ratio, of as many samples as tell as much as white ones.
+    """
+    structure, theta, halves = fit.structure, fit.theta, fit.delay.halves
+    if structure.zero or structure.order not in (1, 2):
+        return
+    lag = np.exp(-theta[-1]) if structure.lag else 2.0 * np.exp(theta[1] - theta[0])
+    if halves * T_s <= lag:
+        return
+    fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
+    _, n_effective = estimates(fit, fitted, T_s)
+    most = fit.rms * np.sqrt(1.0 + _CONTRADICTED / n_effective)
+    second, all_late = Structure(1, unit_gain=structure.unit_gain), lag + halves * T_s / 2
+    for shorter in range(0, halves, -(-halves // _SHORTER)):
+        starts = [np.log([2.0 * zeta / (all_late - shorter * T_s / 2), zeta]) for zeta in (0.5, 1.0)]
+        found = fit_structure(segments, T_s, second, Delay(shorter), starts, fit.slowest)
+        if found.rms <= most and not found.at_bound:
+            yield found
 
 
 def _minimum(at: Callable[[int], Fit], first: int, limit: int) -> Fit:
