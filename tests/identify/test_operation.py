@@ -52,6 +52,46 @@ def test_a_lag_with_dead_time_is_found() -> None:
     assert found.rms == pytest.approx(1e-6, rel=0.05)
 
 
+@pytest.mark.slow
+def test_an_arm_that_sags_has_poles_not_a_dead_time() -> None:
+    """A PD servo of 3.56 Hz, ζ 0.56, a sample late, whose load sags by cos(x): a lag with 58 ms fits 7 % better."""
+    x_d, T_s = _reaches(6000, 2e-3), 2e-3
+    x, position, velocity = np.empty_like(x_d), x_d[0] - 0.03 * np.cos(x_d[0]), 0.0
+    for k, late in enumerate(np.concatenate((x_d[:1], x_d[:-1]))):
+        x[k] = position
+        for _ in range(8):
+            friction = 6.0 * np.tanh(velocity / 0.01)
+            torque = 2000.0 * (late - position) - 100.0 * velocity - 60.0 * np.cos(position) - friction
+            velocity += torque / 4.0 * T_s / 8
+            position += velocity * T_s / 8
+    found = identify_operation([(x_d, x)], T_s, unit="rad")
+    assert found.structure.startswith("second order, gain")
+    assert found.model.dead_time <= 2
+    f_n, zeta = (value(found, f"mode[1].{name}")[0] for name in ("f_n", "zeta"))
+    assert (f_n, zeta) == pytest.approx((3.56, 0.56), rel=0.2)
+
+
+@pytest.mark.slow
+def test_a_dead_time_that_the_log_shows_is_kept() -> None:
+    truth = ModalModel([Mode(8.0, 0.7, (16 * np.pi) ** 2, 0.0)], dead_time=40)
+    x_d = moves(6000)
+    found = identify_operation([(x_d, measured(truth, x_d, "zoh", 2e-5))], T_S, order_max=2)
+    assert found.model.dead_time == 40
+
+
+def _reaches(n: int, T_s: float) -> Array:
+    """Return rest-to-rest moves of an arm, ``(n,)``, rad."""
+    rng = np.random.default_rng(1)
+    pieces = [np.full(100, -0.5)]
+    while sum(map(len, pieces)) < n:
+        begin, steps = pieces[-1][-1], round(rng.uniform(0.8, 1.6) / T_s)
+        goal = np.clip(begin + rng.choice((-1, 1)) * rng.uniform(0.2, 0.8), -1.2, 1.2)
+        u = np.arange(1, steps + 1) / steps
+        pieces.append(begin + (goal - begin) * (10 * u**3 - 15 * u**4 + 6 * u**5))
+        pieces.append(np.full(1 + round(rng.uniform(0.0, 0.4) / T_s), goal))
+    return np.concatenate(pieces)[:n]
+
+
 def test_a_second_order_axis_with_an_offset_is_found() -> None:
     x_d = moves(2000)
     found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 1e-6) + 5e-3)], T_S)
