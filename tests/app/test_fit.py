@@ -92,8 +92,8 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(built: dict[str, Path
 def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, built: dict[str, Path]) -> None:
     advice = fitted.advice
     page = built["report"].read_text(encoding="utf-8")
-    others = "ARX40 (refitted)"
-    assert advice == f"The hybrid is neither better nor worse here: 1.02 × the error of {others}, judged by 30 windows."
+    others = "ARX40 (refitted), the best of the others"
+    assert advice == f"Use the hybrid: its error is 0.63 × the error of {others}, judged by 30 windows."
     assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.replay.rms())
     assert "HybridPredictor_axis.fmu" in page
