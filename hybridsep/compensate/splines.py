@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
-from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from ..base.settings import PLAN_END
@@ -112,26 +110,6 @@ class SplineBasis:
             W, target = weight[:, None] * W, weight * target
         P = W.T @ W + jerk_weight * (D.T @ D)
         return PlanCost.regular(P, W.T @ target - jerk_weight * (D.T @ third_decided))
-
-
-def direct_samples(g: ArrayLike, free: ArrayLike, x_d: ArrayLike, before: ArrayLike, jerk_weight: float) -> Array:
-    """Return the optimal change δ with every sample free, the limit of a basis of small spacing.
-
-    The minimiser of ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` by least squares on the full matrices.
-
-    ``g``, ``free``, ``x_d``: (n,): first column of ``G``, free response and commanded positions, as in eq. (3);
-    ``before``: (3,), m: the last three values of δ; ``jerk_weight``: weight of the third differences, > 0. Returns
-    ``delta``: (n,), m.
-    """
-    column, command = np.asarray(g, dtype=np.float64), np.asarray(x_d, dtype=np.float64)
-    n = len(command)
-    G = toeplitz(column, np.zeros(n))
-    third = np.diff(np.eye(n + 3), 3, axis=0)
-    weight = np.sqrt(jerk_weight)
-    A = np.concatenate((G, weight * third[:, 3:]))
-    b = np.concatenate((command - G @ command - np.asarray(free), -weight * (third[:, :3] @ np.asarray(before))))
-    delta, *_ = np.linalg.lstsq(A, b, rcond=None)
-    return np.asarray(delta)
 
 
 def _padded(samples: Array, n: int) -> Array:

@@ -14,7 +14,7 @@ from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
-from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis, direct_samples
+from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.plant import Encoder
@@ -27,11 +27,18 @@ def tracking_cost(g: Array, x_d: Array, delta: Array, weight: float) -> float:
     return float(error @ error + weight * np.sum(np.diff(np.concatenate((np.zeros(3), delta)), 3) ** 2))
 
 
+def direct_samples(g: Array, x_d: Array, weight: float) -> Array:
+    """Return the best change of a motion from rest with every sample free, by least squares on the full matrices."""
+    G, third = toeplitz(g, np.zeros(len(g))), np.diff(np.eye(len(g) + 3), 3, axis=0)[:, 3:]
+    A, b = np.concatenate((G, np.sqrt(weight) * third)), np.concatenate((x_d - G @ x_d, np.zeros(len(g))))
+    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
+
+
 def test_splines_approach_the_direct_samples() -> None:
     x_d, weight, rest = move(), 1.0, np.zeros(3)
     predictor = HybridPredictor(MODEL, PredictorSettings(averaging=False), start=0.0)
     g, free = predictor.operator(200).g_pb, np.zeros(200)
-    direct = direct_samples(g, free, x_d, rest, weight)
+    direct = direct_samples(g, x_d, weight)
     least = tracking_cost(g, x_d, direct, weight)
     excess, distance = [], []
     for spacing in (10, 5, 2, 1):
