@@ -44,16 +44,20 @@ def print_judged(judged: "Judged", title: str, verdict: str) -> None:
     """Print the errors of a replay, what they mean, and what the controller says of itself."""
     from ..fitting.advice import OF_ITSELF
 
-    head, rows = judged.figures()
+    print_rows(title, *judged.figures())
+    console.print(verdict)
+    if said := judged.of_the_controller():
+        console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
+
+
+def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table of figures, with the names of its rows first."""
     table = Table(head[0], title=title, box=box.SIMPLE, pad_edge=False)
     for column in head[1:]:
         table.add_column(column, justify="right", no_wrap=True)
     for row in rows:
         table.add_row(*row)
     console.print(table)
-    console.print(verdict)
-    if said := judged.of_the_controller():
-        console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
 def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[str, Any] | None = None) -> None:

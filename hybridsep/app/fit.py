@@ -138,7 +138,7 @@ def _print_fit(found: "Fit") -> None:
     import numpy as np
 
     from ..fitting.advice import extent
-    from .console import console, print_judged
+    from .console import console, print_judged, print_rows
 
     judged, model, settings = found.judged, found.identification, found.machine.predictor_settings
     factor, position = judged.shown.position
@@ -160,6 +160,8 @@ def _print_fit(found: "Fit") -> None:
     print_judged(judged, "Error on held-out samples", str(judged.replay.verdict()))
     for line in found.tracking.lines(judged.shown) if found.tracking else ():
         console.print(line)
+    if found.tracking and found.tracking.look_aheads:
+        print_rows(*found.tracking.look_aheads.figures(judged.shown))
 
 
 def _next_steps(found: "Fit", files: Mapping[str, Path]) -> list[str]:

@@ -48,18 +48,20 @@ def expected_errors(
     settings: PredictorSettings,
     compensator: CompensatorSettings,
     recordings: Sequence[tuple[Array, Array]],
+    *,
+    learn: bool = True,
 ) -> Iterator[Expected]:
     """Yield the tracking errors to be expected of one recording each.
 
     ``model``: ``G_pb``; ``recordings``: sequence of pairs ``(x_d, x)`` of (n,), m: ``x`` as it arrives, with the
     ``measurement_delay`` of the settings; NaN where it is missing. The errors of what has not arrived at its end are
-    left out.
+    left out. Where the compensator is not to ``learn``, the physics model plans, for a drive that may be exactly it.
     """
     planner = SepCompensator(HybridPredictor(model, settings), compensator)
     discrete, Np, late = model.discretise(settings.T_s, settings.input_hold), settings.Np, settings.n_late
     for i, (x_d, x) in enumerate(recordings):
-        if i:
-            planner.restart(float(x_d[0]))
+        if i or not learn:
+            planner.restart(float(x_d[0]), lead_in=0 if learn else len(x_d) + settings.Np)
         n, start = len(x_d) - late, float(x_d[0])
         if n < 1:
             continue

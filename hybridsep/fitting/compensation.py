@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
-from ..base.metrics import ErrorSize, peak_derivatives
-from ..base.settings import DRIVE_LIMIT_ENTRIES, CompensatorSettings, Limits
+from ..base.metrics import ErrorSize, peak_derivatives, rms
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..cosim.inverse import FirInverse
@@ -43,6 +43,10 @@ _CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large is advised
 COSTS_MAX = 4000  # leading samples over which that is tried: eight runs
+
+_AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
+_DEMANDING = 2000  # most samples of the stretch on which they are: all of them take a twentieth of a fit
+_LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -153,6 +157,63 @@ def limit_costs(
 
 
 @dataclass(frozen=True)
+class Ahead:
+    """What plans leave with one look-ahead."""
+
+    preview: int  # samples
+    left: float  # RMS of the error that is left, m
+    limits: Mapping[str, float]  # as of :func:`~hybridsep.compensate.expected.limits_that_bind`
+
+
+@dataclass(frozen=True)
+class LookAheads:
+    """What the physics model's plans leave of the error of a drive that is exactly it, with several look-aheads."""
+
+    tried: tuple[Ahead, ...]  # shortest first
+    chosen: int  # preview of the machine, samples
+    off: float  # RMS of the error without compensation, m
+    duration: float  # of the stretch, s
+    T_s: float
+
+    def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
+        """Return title, head and rows of a table."""
+        factor, unit = shown.error(self.off)
+        title = (
+            f"What a plan can do where the model is right: left of {factor * self.off:.4g} {unit} RMS on the log's "
+            f"most demanding {self.duration:.3g} s"
+        )
+        rows = []
+        for one in self.tried:
+            binds = ["look-ahead"] if self.longer(one) else []
+            binds += [f"{name} {100 * share:.2g} %" for name, share in one.limits.items()]
+            name = f"{1e3 * one.preview * self.T_s:.4g}{', chosen' if one.preview == self.chosen else ''}"
+            sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.3f}"
+            rows.append([name, *sizes, ", ".join(binds) or "nothing"])
+        return title, ["ahead [ms]", f"RMS [{unit}]", "× off", "what binds"], rows
+
+    def longer(self, than: Ahead) -> Ahead | None:
+        """Return the shortest longer look-ahead that gains all that a longer one can; None where none gains."""
+        least = _LITTLE * self.off
+        sizes = [(max(one.left, least), one) for one in self.tried if one.preview > than.preview]
+        best = min((size for size, _ in sizes), default=math.inf)
+        if best > (1.0 - _GAIN) * max(than.left, least):
+            return None
+        return next(one for size, one in sizes if (1.0 - _GAIN) * size <= best)
+
+    def lines(self) -> list[str]:
+        """Return the look-ahead that is advised, and its gain, in words; empty where the machine's gains as much."""
+        now = next(one for one in self.tried if one.preview == self.chosen)
+        if (longer := self.longer(now)) is None:
+            return []
+        here, there = (f"{1e3 * one.preview * self.T_s:.4g}" for one in (now, longer))
+        return [
+            f"The look-ahead of {here} ms is too short for the drive: where the model is right, plans leave "
+            f"{now.left / self.off:.2g} × the error without compensation, and with {there} ms "
+            f"{longer.left / self.off:.2g} ×. If the controller has it: --look-ahead {there}ms."
+        ]
+
+
+@dataclass(frozen=True)
 class Tracking:
     """Tracking errors to be expected over the test samples."""
 
@@ -172,6 +233,7 @@ class Tracking:
     largest: float
     fastest: float
     v_max: float  # the drive's, m/s
+    look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
@@ -200,6 +262,7 @@ class Tracking:
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
+            *(self.look_aheads.lines() if self.look_aheads is not None else ()),
             "Where the measured following error is above following_error_max = "
             f"{shown.words(self.following_error_max, '.4g')} for three samples in a row, the compensator trips: its "
             "change of the command fades until reset.",
@@ -229,11 +292,12 @@ def expected_tracking(
     progress: Callable[[float], object],
     largest: float = 0.0,
     fastest: float = 0.0,
+    ahead: LookAheads | None = None,
 ) -> Tracking:
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
 
     ``largest``, m, is the largest servo error of the logs that the recordings begin, ``fastest``, m/s, their commands'
-    largest velocity.
+    largest velocity, ``ahead`` of :func:`look_aheads`.
     """
     allowed = machine.compensator_settings
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
@@ -258,8 +322,48 @@ def expected_tracking(
     inverse, limits = _inverted(machine, recordings), (allowed.change_max, allowed.following_error_max)
     v_max = math.inf if allowed.limits is None else allowed.limits.velocity
     return Tracking(
-        none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s, largest, fastest, v_max
+        *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
+        *(largest, fastest, v_max, ahead),
     )
+
+
+def look_aheads(machine: Machine, recordings: Sequence[Recording]) -> LookAheads | None:
+    """Return what plans leave with some look-aheads on the most demanding stretch of the commands.
+
+    That is where the model alone errs most. Nothing is learned, and no residual is added: of a drive that differs from
+    its model more is left.
+    """
+    model, known, own = machine.model, machine.compensator_predictor, machine.compensator_settings
+    T_s, needed = known.T_s, model.look_ahead(known.T_s, known.input_hold)
+    discrete, n = model.discretise(T_s, known.input_hold), min(_DEMANDING, 5 * needed)
+
+    def response(x_d: Array) -> Array:
+        moved, _ = discrete.forced_response(discrete.rest(), x_d - x_d[0])
+        return np.asarray(moved + x_d[0])
+
+    begun, x_d = 0.0, np.empty(0)
+    for one in recordings:
+        sums = np.cumsum(np.concatenate(([0.0], (one.x_d - response(one.x_d)) ** 2)))
+        parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
+        first = int(np.argmax(parts))
+        if parts[first] > begun:
+            begun, x_d = float(parts[first]), one.x_d[max(0, first - n // 4) : first + n]
+    # A plan begins without any change of the command, and a drive at rest: both take as long as a step's response
+    judged, declared = slice(len(x_d) // 5, None), PARAMETERS["preview"]
+    if not begun or (off := rms((x_d - response(x_d))[judged])) <= _LITTLE * largest_motion(recordings, T_s)[1]:
+        return None
+    tried, given = [], {round(time / T_s) for time in _AHEAD}
+    sizes = {one for one in given if declared.minimum <= one <= min(declared.maximum, len(x_d))}
+    for preview in sorted({*sizes, own.preview or needed, needed}):
+        settings, Np = replace(own, compensate="physics"), known.Np
+        if preview != own.preview:
+            settings = replace(settings, preview=preview, spacing=None)
+            settings = settings.for_window(Np := settings.window(preview), preview)
+        predictor = replace(known, Np=Np, p=1, measurement_delay=0)
+        (found,) = expected_errors(model, predictor, settings, [(x_d, response(x_d))], learn=False)
+        bound = limits_that_bind(found.x_d[judged], found.x_dm[judged], T_s, own)
+        tried.append(Ahead(preview, rms(found.compensated[judged]), bound))
+    return LookAheads(tuple(tried), own.preview or needed, off, len(x_d[judged]) * T_s, T_s)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

@@ -42,6 +42,7 @@ from .compensation import (
     estimated_limits,
     expected_tracking,
     largest_motion,
+    look_aheads,
     taught,
 )
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
@@ -190,6 +191,10 @@ class Fit:
             report.heading("Compensation")
             for line in self.tracking.lines(judged.shown):
                 report.paragraph(line)
+            if self.tracking.look_aheads is not None:
+                title, head, rows = self.tracking.look_aheads.figures(judged.shown)
+                report.paragraph(f"{title}:")
+                report.table(head, rows, words=3)
         if fmus:
             write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
@@ -385,7 +390,8 @@ def fit(
     if given_limits:
         estimate = stage("tracking error with compensation", 0.95, 1.0)
         (fastest, *_), largest = largest_motion(recordings, T_s)
-        tracking = expected_tracking(machine, beginnings(recordings, _TRIED_MAX // 2), estimate, largest, fastest)
+        first, ahead_of = beginnings(recordings, _TRIED_MAX // 2), look_aheads(machine, recordings)
+        tracking = expected_tracking(machine, first, estimate, largest, fastest, ahead_of)
         predictor = taught(machine, recordings, fastest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),

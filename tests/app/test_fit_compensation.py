@@ -58,7 +58,10 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
     assert re.search(r"change_max is [\d.]+ µm\. (No limit binds|Limits bind) the compensated command", words)
     assert re.search(r"above following_error_max = [\d.]+ µm for three samples in a row", words)
     assert "An estimate: the compensator plans in closed loop on the identified model" in words
-    assert "Compensation" in (out / "report.html").read_text(encoding="utf-8")
+    assert re.search(r"where the model is right: left of [\d.]+ µm RMS on the log's most demanding [\d.]+ s", words)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Compensation" in page
+    assert "<td>200, chosen</td>" in page
     machine = load_machine(out / "machine.toml")
     assert machine.drive_limits is not None
     limits = machine.drive_limits

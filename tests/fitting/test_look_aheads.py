@@ -1,0 +1,78 @@
+"""What plans leave with several look-aheads, which ``fit`` prints with the drive's limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identification_cases import T_S
+
+from hybridsep import ModalModel, Mode, SepCompensator, rest_to_rest
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import Limits
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.fitting.compensation import LookAheads, look_aheads
+from hybridsep.fitting.replay import Recording
+from hybridsep.identify.model import machine_of
+from hybridsep.logs.units import shown_in
+from hybridsep.machines.machine import Machine
+from hybridsep.plants.stage_drive import StageDrive
+
+SERVO = ModalModel([Mode(6.0, 0.8, (12 * np.pi) ** 2)])  # it lags by 42 ms
+MOVES = rest_to_rest([0.0, 0.01, -0.008], Limits(0.1, 1.0, 50.0), T_S, start_times=[0.3, 0.7], duration=1.2)
+
+
+def axis(model: ModalModel, preview: int) -> Machine:
+    limits = {"velocity": 0.3, "acceleration": 3.0, "jerk": 500.0, "change_max": 0.02}
+    return machine_of(
+        *(model, "zoh", T_S, "axis", "Axis"),
+        unit="m",
+        sources=["drawn"],
+        predictor={"Np": 50, "p": 10},
+        compensator={"preview": preview},
+        drive_limits=limits,
+    )
+
+
+@pytest.fixture(scope="module")
+def found() -> LookAheads:
+    discrete = SERVO.discretise(T_S)
+    recording = Recording(MOVES, discrete.forced_response(discrete.rest(), MOVES)[0], 500)
+    found = look_aheads(axis(SERVO, 50), [recording])
+    assert found is not None
+    return found
+
+
+def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) -> None:
+    assert [one.preview for one in found.tried] == sorted({25, 50, 100, 200, 400, SERVO.look_ahead(T_S)})
+    assert found.duration == pytest.approx(0.8 * len(MOVES) * T_S, abs=T_S)
+    machine = axis(SERVO, 100)
+    settings = replace(machine.compensator_settings, compensate="physics")
+    compensator = SepCompensator(machine.new_predictor(machine.compensator_predictor), settings)
+    run = cosimulate(compensator, StageDrive(SERVO, f=0.0, kappa=0.0, T_s=T_S), MOVES)
+    judged = slice(len(MOVES) // 5, len(MOVES))
+    left = {one.preview: one.left for one in found.tried}
+    assert left[100] == pytest.approx(rms(run.error[judged]), rel=0.02)
+    assert left[25] > 0.7 * found.off
+    assert left[400] < 0.02 * found.off
+
+
+def test_a_look_ahead_that_is_too_short_is_said_with_the_gain_of_a_longer_one(found: LookAheads) -> None:
+    _, head, rows = found.figures(shown_in("mm"))
+    assert [len(row) for row in rows] == [len(head)] * len(rows)
+    binds = {row[0]: row[3] for row in rows}
+    assert binds["50, chosen"].startswith("look-ahead, ")
+    assert "j_max" in binds["50, chosen"]
+    assert "look-ahead" not in binds["400"]
+    here, there = found.tried[1], found.longer(found.tried[1])
+    assert there is not None
+    assert there.left < 0.1 * here.left
+    (line,) = found.lines()
+    assert f"plans leave {here.left / found.off:.2g} × the error without compensation" in line
+    assert f"{there.left / found.off:.2g} ×. If the controller has it: --look-ahead {there.preview}ms." in line
+    assert replace(found, chosen=there.preview).lines() == []
+
+
+def test_nothing_is_said_without_motion_or_of_an_error_that_the_model_does_not_know() -> None:
+    fast = ModalModel([Mode(400.0, 0.7, (800 * np.pi) ** 2)])
+    assert look_aheads(axis(fast, 100), [Recording(MOVES, MOVES + 0.01 * np.sign(MOVES), 500)]) is None
+    assert look_aheads(axis(SERVO, 100), [Recording(np.zeros(900), np.zeros(900), 500)]) is None
