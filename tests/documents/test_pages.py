@@ -58,6 +58,7 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target, anchor in links(page):
         place = page.parent / target
         assert place.exists(), target
+        assert place.resolve().parent != DATED or page.parent == DATED, f"{target} is not in the site"
         assert not anchor or anchor in anchors(place), (target, anchor)
 
 
