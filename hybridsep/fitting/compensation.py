@@ -341,16 +341,16 @@ def look_aheads(machine: Machine, recordings: Sequence[Recording]) -> LookAheads
         moved, _ = discrete.forced_response(discrete.rest(), x_d - x_d[0])
         return np.asarray(moved + x_d[0])
 
-    begun, x_d = 0.0, np.empty(0)
+    most, lead, x_d = 0.0, n // 4, np.empty(0)
     for one in recordings:
         sums = np.cumsum(np.concatenate(([0.0], (one.x_d - response(one.x_d)) ** 2)))
         parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
         first = int(np.argmax(parts))
-        if parts[first] > begun:
-            begun, x_d = float(parts[first]), one.x_d[max(0, first - n // 4) : first + n]
-    # A plan begins without any change of the command, and a drive at rest: both take as long as a step's response
-    judged, declared = slice(len(x_d) // 5, None), PARAMETERS["preview"]
-    if not begun or (off := rms((x_d - response(x_d))[judged])) <= _LITTLE * largest_motion(recordings, T_s)[1]:
+        if parts[first] > most:
+            # a drive at rest and a plan without any change begin it, which takes them as long as a step's response
+            most, x_d = float(parts[first]), np.pad(one.x_d, (lead, 0), mode="edge")[first : first + lead + n]
+    judged, declared = slice(lead, None), PARAMETERS["preview"]
+    if not most or (off := rms((x_d - response(x_d))[judged])) <= _LITTLE * largest_motion(recordings, T_s)[1]:
         return None
     tried, given = [], {round(time / T_s) for time in _AHEAD}
     sizes = {one for one in given if declared.minimum <= one <= min(declared.maximum, len(x_d))}
@@ -359,7 +359,7 @@ def look_aheads(machine: Machine, recordings: Sequence[Recording]) -> LookAheads
         if preview != own.preview:
             settings = replace(settings, preview=preview, spacing=None)
             settings = settings.for_window(Np := settings.window(preview), preview)
-        predictor = replace(known, Np=Np, p=1, measurement_delay=0)
+        predictor = replace(known, Np=Np, p=1, q=0, measurement_delay=0)
         (found,) = expected_errors(model, predictor, settings, [(x_d, response(x_d))], learn=False)
         bound = limits_that_bind(found.x_d[judged], found.x_dm[judged], T_s, own)
         tried.append(Ahead(preview, rms(found.compensated[judged]), bound))

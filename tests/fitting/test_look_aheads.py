@@ -44,14 +44,13 @@ def found() -> LookAheads:
 
 def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) -> None:
     assert [one.preview for one in found.tried] == sorted({25, 50, 100, 200, 400, SERVO.look_ahead(T_S)})
-    assert found.duration == pytest.approx(0.8 * len(MOVES) * T_S, abs=T_S)
+    assert found.duration == pytest.approx(len(MOVES) * T_S)
     machine = axis(SERVO, 100)
     settings = replace(machine.compensator_settings, compensate="physics")
     compensator = SepCompensator(machine.new_predictor(machine.compensator_predictor), settings)
     run = cosimulate(compensator, StageDrive(SERVO, f=0.0, kappa=0.0, T_s=T_S), MOVES)
-    judged = slice(len(MOVES) // 5, len(MOVES))
     left = {one.preview: one.left for one in found.tried}
-    assert left[100] == pytest.approx(rms(run.error[judged]), rel=0.02)
+    assert left[100] == pytest.approx(rms(run.error), rel=0.02)
     assert left[25] > 0.7 * found.off
     assert left[400] < 0.02 * found.off
 
@@ -70,6 +69,20 @@ def test_a_look_ahead_that_is_too_short_is_said_with_the_gain_of_a_longer_one(fo
     assert f"plans leave {here.left / found.off:.2g} × the error without compensation" in line
     assert f"{there.left / found.off:.2g} ×. If the controller has it: --look-ahead {there.preview}ms." in line
     assert replace(found, chosen=there.preview).lines() == []
+
+
+def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
+    """At 250 Hz, where the shortest plans have windows of three samples; the quick move comes after a slow one."""
+    T_s = 4 * T_S
+    x_d = rest_to_rest([0.0, 1e-4, 0.01], Limits(0.1, 1.0, 50.0), T_s, start_times=[0.1, 8.0], duration=13.0)
+    discrete = SERVO.discretise(T_s)
+    x = discrete.forced_response(discrete.rest(), x_d)[0]
+    found = look_aheads(replace(axis(SERVO, 50), T_s=T_s), [Recording(x_d, x, 500)])
+    assert found is not None
+    assert [one.preview for one in found.tried][:3] == [12, 25, 50]
+    n = round(found.duration / T_s)
+    assert n < len(x_d) // 2
+    assert found.off == pytest.approx(max(rms((x_d - x)[i : i + n]) for i in range(len(x_d) - n)), rel=1e-3)
 
 
 def test_nothing_is_said_without_motion_or_of_an_error_that_the_model_does_not_know() -> None:
