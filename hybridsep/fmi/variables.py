@@ -246,7 +246,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         Variable("reset", "Boolean", "parameter", "tunable", _RESET, False, group="Compensation"),
         *_modes(modes),
-        _position("x_load", "input", _LOAD, start=0.0),
+        _position("x_load", "input", _LOAD, start=0.0, variability="discrete"),  # constant over a step
     ]
 
 

@@ -19,6 +19,7 @@ from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.description import TERMINALS
 from hybridsep.fmi.reference import REFERENCE_FOLDER
 from hybridsep.fmi.spec import fmu_names, table_of
+from hybridsep.fmi.variables import INTERPOLATED
 from hybridsep.machines.machine import Machine, load_machine
 
 MACHINE = load_machine("spring_mass_damper")
@@ -80,6 +81,14 @@ def test_all_inputs_are_real(fmus: BuiltFmus, name: str) -> None:
     if name.startswith("SepCompensator"):
         reset = variables["reset"]
         assert (reset.type, reset.causality, reset.variability) == ("Boolean", "parameter", "tunable")
+
+
+@pytest.mark.parametrize("name", ["HybridPredictor", "SepCompensator"])
+def test_each_continuous_input_takes_a_derivative(fmus: BuiltFmus, name: str) -> None:
+    """As canInterpolateInputs says; a load is constant over a step, so it is discrete."""
+    inputs = [one for one in variables_of(fmus(name)).values() if one.causality == "input"]
+    assert fmpy.read_model_description(str(fmus(name))).coSimulation.canInterpolateInputs
+    assert [one.name for one in inputs if one.variability == "continuous"] == list(INTERPOLATED[name])
 
 
 @pytest.mark.parametrize(("new", "old"), each_kind(list(zip(FMI3, NATIVE, strict=True))))
