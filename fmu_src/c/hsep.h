@@ -157,10 +157,10 @@ HSEP_API int hsep_compensator_change(
  * off. With averaging nothing that is measured above it, or until the reset, is learned. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
-/* Set the load that the samples from now on bring, 0 before: force or torque on the axis divided by the stiffness of
- * its position loop, m, positive where it pushes the axis forwards, as a rigid-body model, gravity or a table tells it;
- * known preview samples ahead, as x_d_ahead is. It is added to the command of the drive's model, counted from that of
- * the first sample, so plans make up for it, within the limits. */
+/* Set the load that the samples from now on bring, finite, 0 before: force or torque on the axis divided by the
+ * stiffness of its position loop, m, positive where it pushes the axis forwards, as a rigid-body model, gravity or a
+ * table tells it; known preview samples ahead, as x_d_ahead is. It is added to the command of the drive's model,
+ * counted from that of the first sample, so plans make up for it, within the limits. */
 HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load);
 
 /* Process sample k, m; return whether a new window has begun. With averaging x_meas may be NaN: it is missing. */
