@@ -49,8 +49,9 @@ def identify_operation(
 
     The error of the simulated position is least over poles, zeros, gain, whole samples of dead time and the hold, for
     structures from a mere gain to three modes; offset and state at the start of each recording are estimated beside
-    them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before; the chosen
-    one is then fitted to everything.
+    them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before. Where the
+    chosen one has a long dead time, and a second order with a shorter one is as good, that takes its place; the result
+    is then fitted to everything.
 
     ``recordings``: iterable of pairs ``(x_d, x)`` of (n,), m: commanded and measured positions, one pair for each
     piece without a gap, sampled alike; ``x`` is NaN where it is missing. Such samples are left out of the error, the

@@ -58,7 +58,7 @@ TOLERANCE = 0.02  # relative increase of the held-out error that a simpler struc
 
 _EXCESS_MAX = 0.1
 """Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
-whose errors are alike tell little."""
+whose errors are alike tell little. With a shorter dead time the product of fitted and held-out error may have it."""
 
 _GAINS_MAX = 20.0
 """Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
