@@ -13,7 +13,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import COMMANDS, DEFAULT_MACHINE
-from ..base.settings import PARAMETERS, CompensatorSettings, Limits, check
+from ..base.settings import PARAMETERS, Limits, check
 from .options import (
     TRAJECTORIES,
     CompensateOption,
@@ -73,10 +73,10 @@ def cosim(
             raise ParameterError("-m, --trajectory, --compensate, --predictor, --plant and --weights are for one axis")
         _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
         return
-    from ..base.metrics import ErrorSize
     from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
-    from ..fitting.compensation import COSTS_MAX, limit_costs
+    from ..fitting.compensation import Stretch
+    from ..fitting.replay import Recording
     from ..fmi.archive import build_here
     from ..logs.units import shown_in
     from ..machines.machine import load_machine, machine_path
@@ -109,13 +109,9 @@ def cosim(
         if predictor is None and compensate not in (None, "off"):
             settings = replace(axis.compensator_settings, compensate=compensate)
             limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, settings)
-
-            def error_of(changed: CompensatorSettings) -> ErrorSize:
-                found = cosimulate(controller, drive, command[:COSTS_MAX], controller_values=changed.to_fmi())
-                return ErrorSize.of(found.error)
-
-            if limits:
-                costs = limit_costs(settings, error_of, lambda done: advance("what limits cost", done))
+            if limits and (stretch := Stretch.of(axis, [Recording(run.x_d, run.x, 0)])):
+                advance("what limits cost", 0.0)
+                costs = stretch.limit_costs()
     if out is not None:
         run.save(out)
     if figure is not None and compensate is None:

@@ -41,11 +41,11 @@ times the error of a cold one instead of 0.97. Predictions alone are 2 % worse w
 
 _CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]`` whose cost is said
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
-_GAIN = 0.05  # relative gain from which on a limit twice as large is advised
-COSTS_MAX = 4000  # leading samples over which that is tried: eight runs
+_GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
 
+_TRIED_MAX = 10_000  # leading samples on which a compensator is tried
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
-_DEMANDING = 2000  # most samples of the stretch on which they are: all of them take a twentieth of a fit
+_DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
 _HOW = (
@@ -108,7 +108,7 @@ class LimitCosts:
 
     def lines(self, shown: DisplayUnits, option: str = "--{name} ") -> list[str]:
         """Return a line for each limit and, last, the advised ones to paste, each after an ``option`` of its name."""
-        lines = [f"Over the first {COSTS_MAX} samples at most, with each limit times a factor:"]
+        lines = ["On the most demanding stretch, where the model is right, with each limit times a factor:"]
         for name, errors in self.effects.items():
             each = ", ".join(f"{factor:g} ×: {_words(error, shown)}" for factor, error in errors.items())
             lines.append(f"{name} {each}.")
@@ -116,7 +116,9 @@ class LimitCosts:
             entries = {one.name: entry for entry, one in DRIVE_LIMIT_ENTRIES.items()}
             paste = (f"{option.format(name=one, entry=entries[one])}{v:.4g}" for one, v in self.advised.items())
             left, today = _words(self.advised_error, shown), _words(next(iter(self.effects.values()))[1.0], shown)
-            lines.append(f"If the drive allows it: {' '.join(paste)}, with which about {left} is left of {today}.")
+            lines.append(
+                f"If the drive allows it: {' '.join(paste)}, with which about {left} is left of {today} there."
+            )
         return lines
 
 
@@ -131,29 +133,6 @@ def taught(machine: Machine, recordings: Sequence[Recording], fastest: float) ->
     predictor.state = replace(predictor.state, residual=replace(residual, learned=learned))
     replay(predictor, recordings)
     return predictor
-
-
-def limit_costs(
-    settings: CompensatorSettings,
-    error_of: Callable[[CompensatorSettings], ErrorSize],
-    progress: Callable[[float], object],
-) -> LimitCosts:
-    """Return what each limit of the drive costs, of the tracking errors with other settings.
-
-    A limit twice as large is advised where that takes away a part of the error, and all of them together do.
-    """
-    now, wanted, effects = error_of(settings), settings, {}
-    for i, entry in enumerate(_CHANGED[: 2 if settings.change_max is None else 3], start=1):
-        errors = {one: now if one == 1.0 else error_of(_scaled(settings, entry, one)) for one in FACTORS}
-        if errors[2.0].rms < (1.0 - _GAIN) * now.rms:
-            wanted = _scaled(wanted, entry, 2.0)
-        effects[DRIVE_LIMIT_ENTRIES[entry].name] = errors
-        progress(i / len(_CHANGED))
-    before, after = settings.to_fmi(), wanted.to_fmi()
-    advised = {name: float(after[name]) for name in effects if after[name] != before[name]}
-    advised_error = error_of(wanted) if advised else now
-    gains = advised_error.rms < (1.0 - _GAIN) * now.rms
-    return LimitCosts(effects, advised if gains else {}, advised_error)
 
 
 @dataclass(frozen=True)
@@ -224,7 +203,7 @@ class Tracking:
     inverse: ErrorSize  # estimate with the rival, fitted to the training samples; NaN without motion there
     # model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`
     limits: Mapping[str, Mapping[str, float]]
-    costs: LimitCosts | None  # with the hybrid, over the first samples of each log; None where no limit binds it
+    costs: LimitCosts | None  # on the stretch of ``look_aheads``; None where no limit binds the hybrid
     # largest change of the command, and following error above which the compensator trips, m
     change_max: float | None
     following_error_max: float
@@ -287,39 +266,26 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
 
 
 def expected_tracking(
-    machine: Machine,
-    recordings: Sequence[Recording],
-    progress: Callable[[float], object],
-    largest: float = 0.0,
-    fastest: float = 0.0,
-    ahead: LookAheads | None = None,
+    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
-
-    ``largest``, m, is the largest servo error of the logs that the recordings begin, ``fastest``, m/s, their commands'
-    largest velocity, ``ahead`` of :func:`look_aheads`.
-    """
-    allowed = machine.compensator_settings
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
+    allowed, first = machine.compensator_settings, beginnings(recordings, _TRIED_MAX)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
-    judged = {model: _expected(machine, one, recordings) for model, one in settings.items()}
-    progress(0.5)
+    judged = {model: _expected(machine, one, first) for model, one in settings.items()}
+    progress(0.8)
     bound = {
         model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
         for model, one in judged.items()
         if one is not None and len(one.x_d)
     }
-    costs = None
-    if bound.get("hybrid"):
-        first = beginnings(recordings, COSTS_MAX)
-        costs = limit_costs(
-            settings["hybrid"],
-            lambda one: _size(_expected(machine, one, first)),
-            lambda done: progress(0.5 + 0.4 * done),
-        )
+    stretch = Stretch.of(machine, recordings)
+    costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
+    ahead = stretch.look_aheads() if stretch else None
     progress(1.0)
     without = next((one.without for one in judged.values() if one is not None), np.empty(0))
     none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
-    inverse, limits = _inverted(machine, recordings), (allowed.change_max, allowed.following_error_max)
+    inverse, limits = _inverted(machine, first), (allowed.change_max, allowed.following_error_max)
+    (fastest, *_), largest = largest_motion(recordings, machine.T_s)
     v_max = math.inf if allowed.limits is None else allowed.limits.velocity
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
@@ -327,43 +293,89 @@ def expected_tracking(
     )
 
 
-def look_aheads(machine: Machine, recordings: Sequence[Recording]) -> LookAheads | None:
-    """Return what plans leave with some look-aheads on the most demanding stretch of the commands.
+@dataclass(frozen=True)
+class Stretch:
+    """Most demanding stretch of commands, on which the physics model plans for a drive that is exactly it.
 
-    That is where the model alone errs most. Nothing is learned, and no residual is added: of a drive that differs from
-    its model more is left.
+    Nothing is learned, and no residual is added: of a drive that differs from its model more is left.
     """
-    model, known, own = machine.model, machine.compensator_predictor, machine.compensator_settings
-    T_s, needed = known.T_s, model.look_ahead(known.T_s, known.input_hold)
-    discrete, n = model.discretise(T_s, known.input_hold), min(_DEMANDING, 5 * needed)
 
-    def response(x_d: Array) -> Array:
-        moved, _ = discrete.forced_response(discrete.rest(), x_d - x_d[0])
-        return np.asarray(moved + x_d[0])
+    machine: Machine
+    # (n,), m: commands, which begin at rest, and the model's response to them
+    x_d: Array
+    x: Array
+    judged: slice  # samples that are judged
 
-    most, lead, x_d = 0.0, n // 4, np.empty(0)
-    for one in recordings:
-        sums = np.cumsum(np.concatenate(([0.0], (one.x_d - response(one.x_d)) ** 2)))
-        parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
-        first = int(np.argmax(parts))
-        if parts[first] > most:
-            # a drive at rest and a plan without any change begin it, which takes them as long as a step's response
-            most, x_d = float(parts[first]), np.pad(one.x_d, (lead, 0), mode="edge")[first : first + lead + n]
-    judged, declared = slice(lead, None), PARAMETERS["preview"]
-    if not most or (off := rms((x_d - response(x_d))[judged])) <= _LITTLE * largest_motion(recordings, T_s)[1]:
-        return None
-    tried, given = [], {round(time / T_s) for time in _AHEAD}
-    sizes = {one for one in given if declared.minimum <= one <= min(declared.maximum, len(x_d))}
-    for preview in sorted({*sizes, own.preview or needed, needed}):
-        settings, Np = replace(own, compensate="physics"), known.Np
-        if preview != own.preview:
-            settings = replace(settings, preview=preview, spacing=None)
-            settings = settings.for_window(Np := settings.window(preview), preview)
-        predictor = replace(known, Np=Np, p=1, q=0, measurement_delay=0)
-        (found,) = expected_errors(model, predictor, settings, [(x_d, response(x_d))], learn=False)
-        bound = limits_that_bind(found.x_d[judged], found.x_dm[judged], T_s, own)
-        tried.append(Ahead(preview, rms(found.compensated[judged]), bound))
-    return LookAheads(tuple(tried), own.preview or needed, off, len(x_d[judged]) * T_s, T_s)
+    @classmethod
+    def of(cls, machine: Machine, recordings: Sequence[Recording]) -> "Stretch | None":
+        """Return the stretch where the model alone errs most; None where it has no error to compensate."""
+        model, known = machine.model, machine.compensator_predictor
+        discrete, n = model.discretise(known.T_s, known.input_hold), min(_DEMANDING, 5 * machine.look_ahead)
+        most, lead, x_d = 0.0, n // 4, np.empty(0)
+
+        def response(x_d: Array) -> Array:
+            return np.asarray(discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0])
+
+        for one in recordings:
+            sums = np.cumsum(np.concatenate(([0.0], (one.x_d - response(one.x_d)) ** 2)))
+            parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
+            first = int(np.argmax(parts))
+            if parts[first] > most:
+                # a drive at rest and a plan without any change begin it, which takes as long as a step's response
+                most, x_d = float(parts[first]), np.pad(one.x_d, (lead, 0), mode="edge")[first : first + lead + n]
+        if not most:
+            return None
+        found = cls(machine, x_d, response(x_d), slice(lead, None))
+        return found if found.off > _LITTLE * largest_motion(recordings, known.T_s)[1] else None
+
+    @property
+    def off(self) -> float:
+        """RMS of the error without compensation, m."""
+        return rms((self.x_d - self.x)[self.judged])
+
+    def expected(self, settings: CompensatorSettings, Np: int) -> Expected:
+        """Return the errors to be expected with a compensator's settings and ``Np`` samples in a window."""
+        known = replace(self.machine.compensator_predictor, Np=Np, p=1, q=0, measurement_delay=0)
+        physics, pair = replace(settings, compensate="physics"), (self.x_d, self.x)
+        (found,) = expected_errors(self.machine.model, known, physics, [pair], learn=False)
+        return Expected(*(signal[self.judged] for signal in found))
+
+    def limit_costs(self) -> LimitCosts:
+        """Return what each limit of the machine's drive costs.
+
+        A limit twice as large is advised where that takes away a part of the error, and all of them together do.
+        """
+        own, Np = self.machine.compensator_settings, self.machine.compensator_predictor.Np
+
+        def error_of(settings: CompensatorSettings) -> ErrorSize:
+            return ErrorSize.of(self.expected(settings, Np).compensated)
+
+        now, wanted, effects = error_of(own), own, {}
+        for entry in _CHANGED[: 2 if own.change_max is None else 3]:
+            errors = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
+            if errors[2.0].rms < (1.0 - _GAIN) * now.rms:
+                wanted = _scaled(wanted, entry, 2.0)
+            effects[DRIVE_LIMIT_ENTRIES[entry].name] = errors
+        before, after = own.to_fmi(), wanted.to_fmi()
+        advised = {name: float(after[name]) for name in effects if after[name] != before[name]}
+        advised_error = error_of(wanted) if advised else now
+        gains = advised_error.rms < (1.0 - _GAIN) * now.rms
+        return LimitCosts(effects, advised if gains else {}, advised_error)
+
+    def look_aheads(self) -> LookAheads:
+        """Return what plans leave with some look-aheads."""
+        known, own = self.machine.compensator_predictor, self.machine.compensator_settings
+        least, needed, tried = PARAMETERS["preview"].minimum, self.machine.look_ahead, []
+        chosen, sizes = own.preview or needed, (round(one / known.T_s) for one in _AHEAD)
+        for preview in sorted({*(one for one in sizes if least <= one <= len(self.x_d)), chosen, needed}):
+            settings, Np = own, known.Np
+            if preview != own.preview:
+                settings = replace(settings, preview=preview, spacing=None)
+                settings = settings.for_window(Np := settings.window(preview), preview)
+            found = self.expected(settings, Np)
+            bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
+            tried.append(Ahead(preview, rms(found.compensated), bound))
+        return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s)
 
 
 def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:

@@ -41,8 +41,6 @@ from .compensation import (
     drive_limits,
     estimated_limits,
     expected_tracking,
-    largest_motion,
-    look_aheads,
     taught,
 )
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
@@ -64,8 +62,8 @@ _LOOK_AHEAD = 0.1  # look-ahead, s, of a controller of which nothing is known
 _SHARE = 0.5  # share of each log's samples for training; the rest is held out for the test
 
 _TRIED_MAX = 20_000
-"""Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz, and a compensator
-on half of them: a fit of a minute's log took twice as long without."""
+"""Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz: a fit of a minute's log took twice
+as long without."""
 
 _SETTLING = (
     " The window after a gap is no test window: no model knows the state of the axis there; a controller has no gaps."
@@ -388,11 +386,8 @@ def fit(
     machine = _machine(name, logs, model, settings, ahead, plant.entries, limits, required=bool(given_limits))
     tracking = None
     if given_limits:
-        estimate = stage("tracking error with compensation", 0.95, 1.0)
-        (fastest, *_), largest = largest_motion(recordings, T_s)
-        first, ahead_of = beginnings(recordings, _TRIED_MAX // 2), look_aheads(machine, recordings)
-        tracking = expected_tracking(machine, first, estimate, largest, fastest, ahead_of)
-        predictor = taught(machine, recordings, fastest)
+        tracking = expected_tracking(machine, recordings, stage("tracking error with compensation", 0.95, 1.0))
+        predictor = taught(machine, recordings, tracking.fastest)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,

@@ -155,14 +155,14 @@ class Machine(Section):
         of the predictor's lags as fit into it.
         """
         own, predictor = self._compensator_entries(PredictorSettings), self.predictor_settings
-        Np = own.setdefault("Np", self._compensation().window(self._look_ahead))
+        Np = own.setdefault("Np", self._compensation().window(self.look_ahead))
         shorter = {"p": min(predictor.p, Np), "q": min(predictor.q, Np - 1)}
         return PredictorSettings(**{**self.predictor, **shorter, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
-        return self._compensation().for_window(self.compensator_predictor.Np, self._look_ahead)
+        return self._compensation().for_window(self.compensator_predictor.Np, self.look_ahead)
 
     def changed(
         self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]
@@ -233,7 +233,7 @@ class Machine(Section):
         return {**predictor.to_fmi(), **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     @cached_property
-    def _look_ahead(self) -> int:
+    def look_ahead(self) -> int:
         """Samples that the drive needs ahead."""
         return self.model.look_ahead(self.T_s, self.physics.input_hold)
 

@@ -3,6 +3,7 @@
 import gzip
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -14,17 +15,19 @@ from places import LOOPS
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.errors import ParameterError
-from hybridsep.base.metrics import ErrorSize, rms
-from hybridsep.base.settings import CompensatorSettings, Limits
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.signals import Array
+from hybridsep.compensate.expected import Expected
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import FACTORS, binding_words, drive_limits, expected_tracking, limit_costs
+from hybridsep.fitting.compensation import FACTORS, Stretch, binding_words, drive_limits, expected_tracking
 from hybridsep.fitting.replay import Recording
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import DisplayUnits
+from hybridsep.machines.machine import Machine
 from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.predict.averaging.model import AveragedModel
@@ -36,6 +39,16 @@ LIMITS = ("--v_max", 0.3, "--a_max", 30, "--j_max", 2e4)
 def stage() -> StageDrive:
     """Return an axis with friction and cable stiffness."""
     return StageDrive(ModalModel([Mode(35.0, 0.4, (70 * np.pi) ** 2)]), f=8e-6, kappa=0.05, T_s=T_S)
+
+
+def axis(drive_limits: dict[str, float]) -> Machine:
+    return machine_of(
+        *(stage().model, "zoh", T_S, "axis", "Axis"),
+        unit="m",
+        sources=["drawn"],
+        predictor={"Np": 50},
+        drive_limits=drive_limits,
+    )
 
 
 def command() -> Array:
@@ -111,19 +124,9 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     x_d = command()[:1000]
     x = simulate(stage(), x_d, T_S)
     change_max = 0.3 * float(np.abs(x_d - x).max())
-    limits = {"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max}
-    machine = machine_of(
-        stage().model,
-        "zoh",
-        T_S,
-        "axis",
-        "Axis",
-        unit="m",
-        sources=["drawn"],
-        predictor={"Np": 50},
-        drive_limits=limits,
-    )
-    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None, 1.5 * change_max, 0.5)
+    machine = axis({"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max})
+    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
+    found = replace(found, largest=1.5 * change_max, fastest=0.5)
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert found.costs is not None
     assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
@@ -184,14 +187,16 @@ def test_all_three_limits_are_needed() -> None:
 )
 def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], advised: list[str]) -> None:
     """Alone and together: in the last case both leave as much as today."""
-    settings = CompensatorSettings(limits=Limits(0.1, 1.0, 10.0), change_max=1e-3)
+    limits = {"velocity": 0.1, "acceleration": 1.0, "jerk": 10.0, "change_max": 1e-3}
+    x_d = command()[:200]
 
-    def error_of(tried: CompensatorSettings) -> ErrorSize:
-        assert tried.limits is not None
-        assert tried.change_max is not None
-        factors = {"acceleration": tried.limits.acceleration, "change_max": tried.change_max / 1e-3}
-        changed = [(name, factor) for name, factor in factors.items() if factor != 1.0]
-        size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
-        return ErrorSize(size, size)
+    class Drawn(Stretch):
+        def expected(self, settings: CompensatorSettings, Np: int) -> Expected:
+            assert settings.limits is not None
+            assert settings.change_max is not None
+            factors = {"acceleration": settings.limits.acceleration, "change_max": settings.change_max / 1e-3}
+            changed = [(name, factor) for name, factor in factors.items() if factor != 1.0]
+            size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
+            return Expected(x_d, np.full(Np, size), x_d, x_d)
 
-    assert list(limit_costs(settings, error_of, lambda _: None).advised) == advised
+    assert list(Drawn(axis(limits), x_d, x_d, slice(None)).limit_costs().advised) == advised

@@ -10,7 +10,7 @@ from hybridsep import ModalModel, Mode, SepCompensator, rest_to_rest
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import Limits
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import LookAheads, look_aheads
+from hybridsep.fitting.compensation import LookAheads, Stretch
 from hybridsep.fitting.replay import Recording
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import shown_in
@@ -33,13 +33,17 @@ def axis(model: ModalModel, preview: int) -> Machine:
     )
 
 
+def looked(machine: Machine, recording: Recording) -> LookAheads:
+    stretch = Stretch.of(machine, [recording])
+    assert stretch is not None
+    return stretch.look_aheads()
+
+
 @pytest.fixture(scope="module")
 def found() -> LookAheads:
     discrete = SERVO.discretise(T_S)
     recording = Recording(MOVES, discrete.forced_response(discrete.rest(), MOVES)[0], 500)
-    found = look_aheads(axis(SERVO, 50), [recording])
-    assert found is not None
-    return found
+    return looked(axis(SERVO, 50), recording)
 
 
 def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) -> None:
@@ -77,8 +81,7 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
     x_d = rest_to_rest([0.0, 1e-4, 0.01], Limits(0.1, 1.0, 50.0), T_s, start_times=[0.1, 8.0], duration=13.0)
     discrete = SERVO.discretise(T_s)
     x = discrete.forced_response(discrete.rest(), x_d)[0]
-    found = look_aheads(replace(axis(SERVO, 50), T_s=T_s), [Recording(x_d, x, 500)])
-    assert found is not None
+    found = looked(replace(axis(SERVO, 50), T_s=T_s), Recording(x_d, x, 500))
     assert [one.preview for one in found.tried][:3] == [12, 25, 50]
     n = round(found.duration / T_s)
     assert n < len(x_d) // 2
@@ -87,5 +90,5 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
 
 def test_nothing_is_said_without_motion_or_of_an_error_that_the_model_does_not_know() -> None:
     fast = ModalModel([Mode(400.0, 0.7, (800 * np.pi) ** 2)])
-    assert look_aheads(axis(fast, 100), [Recording(MOVES, MOVES + 0.01 * np.sign(MOVES), 500)]) is None
-    assert look_aheads(axis(SERVO, 100), [Recording(np.zeros(900), np.zeros(900), 500)]) is None
+    assert Stretch.of(axis(fast, 100), [Recording(MOVES, MOVES + 0.01 * np.sign(MOVES), 500)]) is None
+    assert Stretch.of(axis(SERVO, 100), [Recording(np.zeros(900), np.zeros(900), 500)]) is None
