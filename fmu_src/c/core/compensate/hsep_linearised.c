@@ -350,29 +350,23 @@ static void linearised_run(
 {
     const hsep_lanes *w = hsep_lanes_const(lags);
     for (hsep_int u = 0; u < count; u += LINEARISED_TOGETHER) {
-        const hsep_lanes *from = hsep_lanes_const(drive + HSEP_PHYSICS_ABREAST * u);
         const hsep_int before = u < p ? u : p;
-        hsep_lanes *now = hsep_lanes_at(e + HSEP_PHYSICS_ABREAST * u), sums[LINEARISED_TOGETHER][HSEP_OF_FOUR];
-        for (int s = 0; s < LINEARISED_TOGETHER; s++) {
-            for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                sums[s][l] = from[s * HSEP_OF_FOUR + l] + own[u + (hsep_int)s];
+        for (int l = 0; l < HSEP_OF_FOUR; l++) { /* each sum has a name, and so a register */
+            const hsep_lanes *from = hsep_lanes_const(drive + HSEP_PHYSICS_ABREAST * u) + l;
+            hsep_lanes *now = hsep_lanes_at(e + HSEP_PHYSICS_ABREAST * u) + l;
+            hsep_lanes s0 = from[0] + own[u], s1 = from[HSEP_OF_FOUR] + own[u + 1];
+            hsep_lanes s2 = from[2 * HSEP_OF_FOUR] + own[u + 2], s3 = from[3 * HSEP_OF_FOUR] + own[u + 3];
+            for (hsep_int i = 0; i < before; i++) {
+                const hsep_lanes past = *(now - HSEP_OF_FOUR * (i + 1));
+                s0 += w[i] * past;
+                s1 += w[i + 1] * past;
+                s2 += w[i + 2] * past;
+                s3 += w[i + 3] * past;
             }
-        }
-        for (hsep_int i = 0; i < before; i++) {
-            const hsep_lanes *past = now - HSEP_OF_FOUR * (i + 1);
-            for (int s = 0; s < LINEARISED_TOGETHER; s++) {
-                for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                    sums[s][l] += w[i + (hsep_int)s] * past[l];
-                }
-            }
-        }
-        for (int s = 0; s < LINEARISED_TOGETHER; s++) { /* samples of this group feed the later ones */
-            for (int l = 0; l < HSEP_OF_FOUR; l++) {
-                for (int i = s; i > 0; i--) {
-                    sums[s][l] += w[i - 1] * sums[s - i][l];
-                }
-                now[s * HSEP_OF_FOUR + l] = sums[s][l];
-            }
+            s1 += w[0] * s0; /* samples of this group feed the later ones */
+            s2 = (s2 + w[1] * s0) + w[0] * s1;
+            s3 = ((s3 + w[2] * s0) + w[1] * s1) + w[0] * s2;
+            now[0] = s0, now[HSEP_OF_FOUR] = s1, now[2 * HSEP_OF_FOUR] = s2, now[3 * HSEP_OF_FOUR] = s3;
         }
     }
 }

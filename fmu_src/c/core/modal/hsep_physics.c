@@ -1,6 +1,7 @@
 #include "hsep_physics.h"
 
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -193,22 +194,27 @@ static void physics_respond_abreast(
     const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
     const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
     const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d;
-    hsep_real s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
+    hsep_real states[2][HSEP_PHYSICS_ABREAST] = {{0.0}};
     for (size_t i = 0; i < count; i++) {
-        s0[i] = physics_modes(models[i])[mode].s[0];
-        s1[i] = physics_modes(models[i])[mode].s[1];
+        states[0][i] = physics_modes(models[i])[mode].s[0];
+        states[1][i] = physics_modes(models[i])[mode].s[1];
     }
-    for (size_t k = 0; k < n; k++, u += HSEP_PHYSICS_ABREAST, x += HSEP_PHYSICS_ABREAST) {
-        for (size_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-            const hsep_real next = a00 * s0[i] + a01 * s1[i] + b0 * u[i];
-            x[i] += c0 * s0[i] + c1 * s1[i] + d * u[i];
-            s1[i] = a10 * s0[i] + a11 * s1[i] + b1 * u[i];
-            s0[i] = next;
+    for (size_t l = 0; l < HSEP_OF_FOUR; l++) {
+        hsep_lanes *first = hsep_lanes_at(states[0]) + l, *second = hsep_lanes_at(states[1]) + l;
+        hsep_lanes s0 = *first, s1 = *second, *to = hsep_lanes_at(x) + l;
+        const hsep_lanes *from = hsep_lanes_const(u) + l;
+        for (size_t k = 0; k < n; k++, from += HSEP_OF_FOUR, to += HSEP_OF_FOUR) {
+            const hsep_lanes next = a00 * s0 + a01 * s1 + b0 * *from;
+            *to += c0 * s0 + c1 * s1 + d * *from;
+            s1 = a10 * s0 + a11 * s1 + b1 * *from;
+            s0 = next;
         }
+        *first = s0;
+        *second = s1;
     }
     for (size_t i = 0; i < count; i++) {
-        physics_modes(models[i])[mode].s[0] = s0[i];
-        physics_modes(models[i])[mode].s[1] = s1[i];
+        physics_modes(models[i])[mode].s[0] = states[0][i];
+        physics_modes(models[i])[mode].s[1] = states[1][i];
     }
 }
 

@@ -262,13 +262,12 @@ static void solution_forward_abreast(hsep_solution *self)
         }
         if (left > 4) {
             const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-            hsep_lanes at[4 * HSEP_OF_FOUR], *to = y + 4 * HSEP_OF_FOUR;
-            memcpy(at, y, sizeof at);
-            for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
-                for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                    to[l] =
-                        (((to[l] - r0[j] * at[l]) - r1[j] * at[HSEP_OF_FOUR + l]) - r2[j] * at[2 * HSEP_OF_FOUR + l]) -
-                        r3[j] * at[3 * HSEP_OF_FOUR + l];
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
+                const hsep_lanes *at = y + l, a0 = at[0], a1 = at[HSEP_OF_FOUR], a2 = at[2 * HSEP_OF_FOUR];
+                const hsep_lanes a3 = at[3 * HSEP_OF_FOUR];
+                hsep_lanes *to = y + l + 4 * HSEP_OF_FOUR;
+                for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
+                    *to = (((*to - r0[j] * a0) - r1[j] * a1) - r2[j] * a2) - r3[j] * a3;
                 }
             }
         }
@@ -278,23 +277,21 @@ static void solution_forward_abreast(hsep_solution *self)
 /* Sums of u_i x_i, or of x_i x_i without u, over four rows side by side; to the bit as hsep_dot has each. */
 static void solution_dot_abreast(const hsep_real *u, const hsep_lanes x[], hsep_int m, hsep_lanes sums[HSEP_OF_FOUR])
 {
-    hsep_lanes of[4][HSEP_OF_FOUR];
-    hsep_int i = 0;
-    memset(of, 0, sizeof of);
-    for (; i + 4 <= m; i += 4) {
-        for (hsep_int r = 0; r < 4; r++, x += HSEP_OF_FOUR) {
-            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                of[r][l] += (u != NULL ? u[i + r] * x[l] : x[l] * x[l]);
-            }
+    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++, x++) { /* each sum has a name, and so a register */
+        hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0;
+        const hsep_lanes *at = x;
+        hsep_int i = 0;
+        for (; i + 4 <= m; i += 4, at += 4 * HSEP_OF_FOUR) {
+            const hsep_lanes x0 = at[0], x1 = at[HSEP_OF_FOUR], x2 = at[2 * HSEP_OF_FOUR], x3 = at[3 * HSEP_OF_FOUR];
+            s0 += (u != NULL ? u[i] * x0 : x0 * x0);
+            s1 += (u != NULL ? u[i + 1] * x1 : x1 * x1);
+            s2 += (u != NULL ? u[i + 2] * x2 : x2 * x2);
+            s3 += (u != NULL ? u[i + 3] * x3 : x3 * x3);
         }
-    }
-    for (; i < m; i++, x += HSEP_OF_FOUR) {
-        for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-            of[0][l] += (u != NULL ? u[i] * x[l] : x[l] * x[l]);
+        for (; i < m; i++, at += HSEP_OF_FOUR) {
+            s0 += (u != NULL ? u[i] * *at : *at * *at);
         }
-    }
-    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-        sums[l] = (of[0][l] + of[1][l]) + (of[2][l] + of[3][l]);
+        sums[l] = (s0 + s1) + (s2 + s3);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include "hsep_math.h"
 #include "hsep_predict_constants.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -21,25 +22,46 @@ HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_pa
     return end * sizeof(hsep_real);
 }
 
-/* Compare the latched change with those first ... last - 1 samples before it. */
-static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last)
+/* distance := fading distance + difference^2 of a change now from count changes before it. */
+static void recall_add(
+    hsep_real *restrict distances, const hsep_real *restrict changes, hsep_int count, hsep_real now, hsep_real fading)
 {
-    const hsep_int length = self->size + self->stride, begin = first;
-    const hsep_real *changes = hsep_at(self, self->changes), now = changes[self->compared], fading = self->fading;
+    const hsep_int whole = count - count % HSEP_LANES;
+    const hsep_real alike = HSEP_RECALL_ALIKE;
+    hsep_int i = 0;
+    for (; i < whole; i += HSEP_LANES) {
+        hsep_lanes *to = hsep_lanes_at(distances + i);
+        const hsep_lanes difference = now - *hsep_lanes_const(changes + i);
+        *to = fading * *to + (difference * difference + alike);
+    }
+    for (; i < count; i++) {
+        const hsep_real difference = now - changes[i];
+        distances[i] = fading * distances[i] + (difference * difference + alike);
+    }
+}
+
+/* Compare the latched change with those first ... last - 1 samples before it; in the last comparison of a window, which
+ * its forecast has, look for the lag with the least distance. */
+static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last, int is_last)
+{
+    const hsep_int length = self->size + self->stride;
+    const hsep_real *changes = hsep_at(self, self->changes), now = changes[self->compared];
     hsep_real *distances = hsep_at(self, self->distances);
-    while (first < last) { /* up to the end of the ring, and from its beginning on */
-        const hsep_int place = (self->compared + first) % length, left = length - place;
-        const hsep_int count = last - first < left ? last - first : left;
-        for (hsep_int i = 0; i < count; i++) {
-            const hsep_real difference = now - changes[place + i];
-            distances[first - 1 + i] =
-                fading * distances[first - 1 + i] + (difference * difference + HSEP_RECALL_ALIKE);
+    hsep_int lag = self->lag;
+    for (hsep_int begin = first; begin < last;) { /* up to the end of the ring, and from its beginning on */
+        const hsep_int place = (self->compared + begin) % length, left = length - place;
+        const hsep_int count = last - begin < left ? last - begin : left;
+        recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
+        begin += count;
+    }
+    hsep_real least = distances[lag - 1];
+    for (hsep_int i = first > self->n ? first : self->n + 1; is_last && i < last && i < self->size; i++) {
+        if (distances[i - 1] < least) { /* the shortest one of equals */
+            least = distances[i - 1];
+            lag = i;
         }
-        first += count;
     }
-    for (hsep_int i = begin > self->n ? begin : self->n + 1; i < last && i < self->size; i++) {
-        self->lag = distances[i - 1] < distances[self->lag - 1] ? i : self->lag; /* the shortest one of equals */
-    }
+    self->lag = lag;
 }
 
 HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command)
@@ -53,14 +75,17 @@ HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command)
     hsep_at(self, self->changes)[self->newest] = command - *before;
     *before = command;
     self->oldest = self->oldest + 1 < self->stride ? self->oldest + 1 : 0;
-    if (self->heard < self->Np / self->stride * self->stride) {
+    const hsep_int compared = self->Np / self->stride * self->stride;
+    if (self->heard < compared) {
         if (part == 0) {
             const hsep_real change = hsep_at(self, self->changes)[self->newest];
             self->compared = self->newest;
             self->lag = self->n;
             self->moved = self->fading * self->moved + (change * change + HSEP_RECALL_ALIKE);
         }
-        recall_compare(self, 1 + part * size / self->stride, 1 + (part + 1) * size / self->stride);
+        recall_compare(
+            self, 1 + part * size / self->stride, 1 + (part + 1) * size / self->stride,
+            self->heard + self->stride >= compared);
     }
     self->heard = self->heard + 1 < self->Np ? self->heard + 1 : 0;
 }
