@@ -14,6 +14,7 @@
  *   hsep_defaults            | constant                                              | nothing
  *   hsep_*_size, _refused    | constant                                              | returns 0: refused
  *   hsep_*_init              | the block's size, the modes' exponentials, the weights| tells refused weights
+ *   hsep_*_weights           | n^3 / 3 multiply-adds for n features of an expert      | returns more than size
  *   hsep_predictor_sample    | bounded by the parameters: README.md, Footprint       | divergence is set, latched
  *   hsep_compensator_sample  | the same                                              | divergence is set, latched
  *   hsep_compensator_change  | constant; 10 spacing at the next window's end         | returns 0: refused
@@ -109,6 +110,13 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
 /* Read the outputs of the next sample. */
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
 
+/* Write what was learned so far as a file weights.bin into bytes, (size,), aligned for double: hsep_*_init, FMUs and
+ * the Python library of this version and later ones begin a run with it. parameters: as of hsep_*_init; in single
+ * precision they are rounded, and fit a library in single precision alone. Returns the bytes of the file; nothing is
+ * written where size is less, or bytes is NULL. No output changes by it. */
+HSEP_API size_t
+hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size);
+
 /* Standard deviation of the error of x_h at sample i of the window, i < Np, m; 0 where it is not known. */
 HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i);
 
@@ -143,6 +151,10 @@ HSEP_API const char *hsep_compensator_refused(const hsep_parameters *parameters)
 HSEP_API hsep_began hsep_compensator_init(
     hsep_compensator *self, const hsep_parameters *parameters, hsep_real start, const void *weights,
     size_t weights_size);
+
+/* As hsep_predictor_weights. */
+HSEP_API size_t
+hsep_compensator_weights(hsep_compensator *self, const hsep_parameters *parameters, void *bytes, size_t size);
 
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0;
  * following_error_max, m, which counts from the next sample on, 0: none. Every plan goes on from the remainder of the

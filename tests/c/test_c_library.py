@@ -9,6 +9,7 @@ import sys
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 import staircase_data as staircase
 from c_compiler import C_SOURCES, compiler, include_flags
@@ -18,9 +19,12 @@ from library_models import trained_state
 from places import ROOT
 from spoiled_weights import spoiled
 
-from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.settings import PARAMETERS, PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
-from hybridsep.fmi.weights import weights_file
+from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.machines.machine import load_machine
+from hybridsep.plants.plant import simulate
 from hybridsep.predict.predictor import HybridPredictor
 
 CONSUMER = ROOT / "tests" / "c" / "consumer"
@@ -151,6 +155,40 @@ def test_weights_from_memory(kind: str) -> None:
     elsewhere = given.begin(0.0, content), bytes(given.block)
     assert given.begin(0.0) == 0
     assert elsewhere == (2, bytes(given.block))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("averaging", [0, 1])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_was_learned_is_written_as_a_weights_file(kind: str, averaging: int) -> None:
+    """In C, read and written again by the library, it is what another run in C begins with."""
+    more = {"preview": 100} if kind == "compensator" else {}
+    x_d = staircase.commanded()[:600]
+    x_meas = 1e-6 * np.round(1e6 * simulate(load_machine("spring_mass_damper").new_plant(), x_d, 1e-3))
+
+    def run(samples: slice, weights: bytes | None = None, *, looked_at: bool = False) -> tuple[Library, Array]:
+        one, found = library(kind, Np=50, p=10, t_init=0.0, averaging=averaging, **more), []
+        assert one.begin(float(x_d[samples][0]), weights) == 0
+        for k, (ahead, measured) in enumerate(zip(x_d[samples], x_meas[samples], strict=True)):
+            outputs = one.sample(ahead, measured)
+            found.append((outputs.x_dm, outputs.predicted.x_h, outputs.predicted.x_h_std))
+            if looked_at and k % 37 == 0:
+                assert one.weights()
+        return one, np.array(found)
+
+    first, undisturbed = run(slice(0, 600))
+    np.testing.assert_array_equal(run(slice(0, 600), looked_at=True)[1], undisturbed)
+    assert first.weights(room=len(first.weights()) - 1) == b""
+    content = first.weights()
+    settings = PredictorSettings(Np=50, p=10, averaging=bool(averaging))
+    predictor = HybridPredictor(load_machine("spring_mass_damper").model, settings)
+    restore_weights(predictor, content)
+    assert predictor.regression.n_rows > 300
+    _, warm = run(slice(0, 300), content)
+    _, again = run(slice(0, 300), weights_file(predictor))
+    _, cold = run(slice(0, 300))
+    np.testing.assert_array_equal(again, warm)
+    assert np.abs(cold - warm).max() > 1e-6
 
 
 def test_a_limit_of_the_following_error_is_checked_and_a_trip_ends_with_a_rising_reset() -> None:

@@ -137,7 +137,8 @@ def interface() -> ctypes.CDLL:
     """Return the core's functions, from a shared library that other tests need as well."""
     loaded = core_library("compensator_2")
     for kind in ("predictor", "compensator"):
-        getattr(loaded, f"hsep_{kind}_size").restype = ctypes.c_size_t
+        for function in ("size", "weights"):
+            getattr(loaded, f"hsep_{kind}_{function}").restype = ctypes.c_size_t
         getattr(loaded, f"hsep_{kind}_refused").restype = ctypes.c_char_p
     return loaded
 
@@ -177,6 +178,14 @@ class Library:
             ctypes.c_size_t(len(weights or b"")),
         )
         return int(self._call("init", self.block, *arguments))
+
+    def weights(self, room: int = sys.maxsize) -> bytes:
+        """Return what was learned so far, as a weights file; empty if there is less room for it, bytes."""
+        needed = int(self._call("weights", self.block, ctypes.byref(self.parameters), None, ctypes.c_size_t(0)))
+        content = (ctypes.c_double * (needed // 8))()
+        given = ctypes.c_size_t(min(room, needed))
+        assert self._call("weights", self.block, ctypes.byref(self.parameters), content, given) == needed
+        return bytes(content) if any(bytes(content)) else b""
 
     def load(self, x_load: float) -> None:
         """Set the load that a compensator's samples bring from now on, m."""

@@ -1,5 +1,6 @@
 #include "hsep_learned.h"
 
+#include "hsep_cholesky.h"
 #include "hsep_crc.h"
 
 #include <math.h>
@@ -151,4 +152,78 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
         }
     }
     return learned_take(&from, &head, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
+}
+
+/* Write a setting of a file under a name: of the predictor with mode = 0, or of one of its modes, from 1 on. */
+static hsep_learned_setting learned_setting(uint64_t mode, const char *name, double value)
+{
+    hsep_learned_setting setting = {{0}, value};
+    size_t at = 0;
+    if (mode > 0) {
+        uint64_t place = 1;
+        memcpy(setting.name, "mode[", 5);
+        for (at = 5; place <= mode / 10; place *= 10) {}
+        for (; place > 0; place /= 10) {
+            setting.name[at++] = (char)('0' + mode / place % 10);
+        }
+        memcpy(setting.name + at, "].", 2);
+        at += 2;
+    }
+    for (; *name != '\0'; name++) {
+        setting.name[at++] = *name;
+    }
+    return setting;
+}
+
+/* Write n numbers as doubles; they may lie at the end of where they go. */
+static double *learned_put(double to[], const hsep_real from[], hsep_int n)
+{
+    for (hsep_int i = 0; i < n; i++) {
+        to[i] = (double)from[i];
+    }
+    return to + n;
+}
+
+HSEP_API size_t
+hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters, void *bytes, size_t size)
+{
+    hsep_residual_model *model = hsep_predictor_model(predictor);
+    const hsep_int n_learned = hsep_residual_n_learned(model);
+    const hsep_learned_head head = {
+        HSEP_LEARNED_MAGIC, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
+    size_t numbers = (size_t)head.n_learned + 1;
+    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
+        numbers += 1 + (size_t)hsep_triangle(hsep_residual_n_features(model, i) + 1);
+    }
+    const size_t needed =
+        sizeof head + (size_t)head.n_settings * sizeof(hsep_learned_setting) + numbers * sizeof(double);
+    if (bytes == NULL || size < needed) {
+        return needed;
+    }
+    memcpy(bytes, &head, sizeof head);
+    hsep_learned_setting *setting = (hsep_learned_setting *)((unsigned char *)bytes + sizeof head);
+#define WRITE(of, type, own, usual, least, most, nonzero, automatic, learned) \
+    if (learned) { \
+        *setting++ = learned_setting(0, #own, (double)parameters->of.own); \
+    }
+    HSEP_PREDICTOR_SETTINGS(WRITE)
+    HSEP_AVERAGING_SETTINGS(WRITE)
+#undef WRITE
+    for (uint64_t mode = 1; mode <= parameters->n_modes; mode++) {
+#define WRITE(of, type, number, ...) \
+    *setting++ = learned_setting(mode, #number, (double)parameters->modes[mode - 1].number);
+        HSEP_MODE_SETTINGS(WRITE)
+#undef WRITE
+    }
+    double *to = learned_put((double *)(void *)setting, hsep_residual_learned(model), n_learned);
+    to = learned_put(to, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY);
+    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
+        const hsep_int count = (hsep_int)hsep_triangle(hsep_residual_n_features(model, i) + 1);
+        hsep_real *triangle = (hsep_real *)(void *)(to + 1 + count) - count; /* at the end of where it goes */
+        *to = (double)hsep_residual_factor(model, i, triangle);
+        to = learned_put(to + 1, triangle, count);
+    }
+    const uint64_t sum = hsep_crc(bytes, needed - sizeof sum);
+    memcpy(to, &sum, sizeof sum);
+    return needed;
 }

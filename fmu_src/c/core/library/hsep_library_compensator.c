@@ -26,3 +26,9 @@ HSEP_API hsep_began hsep_compensator_init(
     hsep_compensator_begin(self);
     return began;
 }
+
+HSEP_API size_t
+hsep_compensator_weights(hsep_compensator *self, const hsep_parameters *parameters, void *bytes, size_t size)
+{
+    return hsep_learned_write(hsep_compensator_predictor(self), parameters, bytes, size);
+}

@@ -23,3 +23,9 @@ HSEP_API hsep_began hsep_predictor_init(
     }
     return began;
 }
+
+HSEP_API size_t
+hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size)
+{
+    return hsep_learned_write(self, parameters, bytes, size);
+}

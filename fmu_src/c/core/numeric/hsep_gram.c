@@ -107,6 +107,19 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
     }
 }
 
+HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_real triangle[])
+{
+    const hsep_int width = self->n + 1, count = (hsep_int)hsep_triangle(width);
+    hsep_axpy(triangle, 1.0, hsep_at_const(self, self->sums), count);
+    hsep_axpy(triangle, 1.0, hsep_at_const(self, self->carries), count);
+    for (hsep_int i = 0; i < width; triangle += width - i, i++) {
+        const hsep_real *row = hsep_at_const(self, self->rows) + i;
+        for (hsep_int b = 0; b < self->waiting; b++, row += width) {
+            hsep_axpy(triangle, *row, row, width - i);
+        }
+    }
+}
+
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self)
 {
     const hsep_int n = self->n;

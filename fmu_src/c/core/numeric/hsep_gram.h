@@ -49,6 +49,9 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 /* Add the rows that wait to the sums now, before they are read or saved. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
+/* Add all rows to a triangle of n + 1 rows, and change nothing. */
+HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_real triangle[]);
+
 /* Sum of the squares of the targets, m2. */
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self);
 

@@ -123,3 +123,16 @@ HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i)
         hsep_at(self, self->carries)[place + j] = 0.0;
     }
 }
+
+HSEP_API void hsep_regression_write(const hsep_regression *self, hsep_real triangle[])
+{
+    const hsep_real *u = hsep_at_const(self, self->factor), *inverse_d = hsep_at_const(self, self->inverse_d);
+    for (hsep_int i = 0, left = self->n; left > 0; i++, left--) { /* R = D^(1/2) U */
+        const hsep_real root = 1.0 / hsep_sqrt(inverse_d[i]);
+        *triangle++ = root;
+        for (hsep_int j = 0; j < left; j++) {
+            *triangle++ = root * *u++;
+        }
+    }
+    *triangle = 0.0;
+}

@@ -50,4 +50,7 @@ HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[]);
  * hsep_regression_row. All n + 1 rows make a factor. Cost: n divisions. */
 HSEP_API void hsep_regression_load(hsep_regression *self, hsep_int i);
 
+/* Write the factor, a triangle of n + 1 rows, with 0 for rho. */
+HSEP_API void hsep_regression_write(const hsep_regression *self, hsep_real triangle[]);
+
 #endif

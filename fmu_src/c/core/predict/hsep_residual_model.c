@@ -1,6 +1,16 @@
 #include "hsep_residual_model.h"
 
+#include "hsep_cholesky.h"
+
+#include <float.h>
 #include <stddef.h>
+#include <string.h>
+
+#ifdef HSEP_FLOAT32
+#define RESIDUAL_ROUNDING FLT_EPSILON
+#else
+#define RESIDUAL_ROUNDING DBL_EPSILON
+#endif
 
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int residual_parts = 25;
@@ -76,6 +86,30 @@ HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hse
         hsep_regression_load(regression, i);
         regression->n_rows = n_rows;
     }
+}
+
+HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int factor, hsep_real triangle[])
+{
+    const hsep_int width = hsep_residual_n_features(self, factor) + 1;
+    if (!self->averaged) {
+        hsep_regression *regression = hsep_paper_regression(hsep_residual_paper(self));
+        hsep_regression_write(regression, triangle);
+        return regression->n_rows;
+    }
+    hsep_warm_start *evidence = hsep_averaged_evidence(hsep_residual_averaged(self), factor);
+    hsep_gram *of_run = hsep_warm_start_of_run(evidence), *earlier = hsep_warm_start_earlier(evidence);
+    hsep_real *least = hsep_gram_row(of_run), *diagonal = triangle; /* work */
+    memset(triangle, 0, (size_t)hsep_triangle(width) * sizeof(hsep_real));
+    hsep_gram_add_to(of_run, triangle);
+    if (earlier->n_rows > 0.0) {
+        hsep_gram_add_to(earlier, triangle);
+    }
+    for (hsep_int i = 0; i < width; i++) { /* what rounding leaves of a pivot where rows are few or alike */
+        least[i] = RESIDUAL_ROUNDING * *diagonal + HSEP_TINY(1e-40);
+        diagonal += width - i;
+    }
+    (void)hsep_cholesky_rows(triangle, width, 0, width, least);
+    return hsep_warm_start_n_rows(evidence);
 }
 
 HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)

@@ -40,6 +40,10 @@ HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int f
 HSEP_API hsep_real *hsep_residual_factor_row(hsep_residual_model *self, hsep_int factor);
 HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hsep_int i, hsep_real n_rows);
 
+/* Write a factor of all that was learned, of this run and earlier ones, a triangle of n + 1 rows; return the rows that
+ * it is from, weighted. Cost: with averaging n^3 / 6 multiply-adds. */
+HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int factor, hsep_real triangle[]);
+
 /* Numbers learned besides them, the first of so many; none without averaging. */
 HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self);
 HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
