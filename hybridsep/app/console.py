@@ -75,13 +75,12 @@ def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[
         _print_tracking(summary, title, unit, limits)
         return
     scale, shown = shown_in(unit).error(1e-6 * summary["rms_pb_um"])
-    table = Table("", title=f"{title}: prediction error in {shown} against the measured position", box=box.SIMPLE)
-    for column in ("physics", "hold", "hybrid", "× hold"):
-        table.add_column(column, justify="right", no_wrap=True)
+    rows = []
     for label, size in (("RMS", "rms"), ("largest", "max")):
         figures = [1e-6 * scale * summary[f"{size}_{name}_um"] for name in ("pb", "hold", "h")]
-        table.add_row(label, *map(shown_figure, figures), shown_figure(rms_ratio(figures[2], figures[1])))
-    console.print(table)
+        rows.append([label, *map(shown_figure, (*figures, rms_ratio(figures[2], figures[1])))])
+    title = f"{title}: prediction error in {shown} against the measured position"
+    print_rows(title, ["", "physics", "hold", "hybrid", "× hold"], rows)
     console.print(str(verdict_of(run)))
 
 
@@ -94,17 +93,15 @@ def _print_tracking(
 
     factor, position = shown_in(unit).position
     scale, shown = shown_in(unit).error(1e-6 * summary["tracking_rms_um"])
-    table = Table(title=title)
-    for column in ("", f"RMS [{shown}]", f"max [{shown}]"):
-        table.add_column(column, justify="right" if column else "left")
-    for name, label in (
-        ("tracking", "tracking error, true position"),
-        ("tracking_measured", "tracking error, measured position"),
-        ("change", "change of the command"),
-    ):
-        figures = (1e-6 * scale * summary[f"{name}_{quantity}_um"] for quantity in ("rms", "max"))
-        table.add_row(label, *map(shown_figure, figures))
-    console.print(table)
+    rows = [
+        [label, *(shown_figure(1e-6 * scale * summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max"))]
+        for name, label in (
+            ("tracking", "tracking error, true position"),
+            ("tracking_measured", "tracking error, measured position"),
+            ("change", "change of the command"),
+        )
+    ]
+    print_rows(title, ["", f"RMS [{shown}]", f"max [{shown}]"], rows)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(
         f"command to the drive: at most {factor * peaks[0]:.1f} {position}/s, {peaks[1]:.2f} {unit}/s², "
@@ -123,12 +120,8 @@ def print_contours(figures: Mapping[str, Mapping[str, float]], as_json: bool, ti
     if as_json:
         print_json(figures)
         return
-    table = Table("contour error, µm", title=title)
-    for column in ("RMS", "99.9 %", "largest"):
-        table.add_column(column, justify="right")
-    for key, found in figures.items():
-        table.add_row(CASES.get(key, ("FIR inverse", ""))[0], *map(shown_figure, found.values()))
-    console.print(table)
+    rows = [[CASES.get(key, ("FIR inverse",))[0], *map(shown_figure, found.values())] for key, found in figures.items()]
+    print_rows(title, ["contour error, µm", "RMS", "99.9 %", "largest"], rows)
 
 
 def print_written(*paths: Path | None) -> None:

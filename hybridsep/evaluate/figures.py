@@ -68,7 +68,7 @@ def _finish_panels(panels: Sequence[Axes]) -> None:
         axes.spines[["top", "right"]].set_visible(False)
 
 
-def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
+def save_figure(figure: Figure, path: str | Path) -> None:
     """Write a figure to a PNG, or to a PDF or SVG where the name ends so; the same figure gives the same bytes."""
     FigureCanvasAgg(figure)
     engine = figure.get_layout_engine()
@@ -78,7 +78,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
     metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     # pieces of a line, which may be of any length
     with atomic_open(path) as file, rc_context({"svg.hashsalt": "hybridsep", "agg.path.chunksize": 10_000}):
-        figure.savefig(file, dpi=dpi, format=kind if metadata else "png", metadata=metadata)
+        figure.savefig(file, dpi=130, format=kind if metadata else "png", metadata=metadata)
 
 
 def prediction_figure(run: Run, title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:

@@ -14,9 +14,6 @@ from .variables import Variable
 
 _HERE = Path(__file__).parent
 
-_PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
-"""FMU between trajectory and drive on the wiring diagram, and its output to the drive; else HybridPredictor, x_d."""
-
 _PLAIN_NAMES = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_PREFIX"}
 """Option with which the standard's headers give the FMI functions their plain names, by the version of FMI."""
 
@@ -63,7 +60,8 @@ def documentation(
     if model != "ReferenceTrajectory":
         run["inputs"] = f', fed with <a href="reference/{name}_in.csv">{name}_in.csv</a>'
     named = _SOURCES.get(model, spec.machine.sources) or ("none is named in the machine file",)
-    partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
+    # FMU between trajectory and drive on the wiring diagram, and its output to the drive
+    partner, command = (model, "x_dm") if model == "SepCompensator" else ("HybridPredictor", "x_d")
     page = _section(
         "index",
         name=name,

@@ -50,7 +50,7 @@ def reference_run(spec: FmuSpec) -> dict[str, bytes]:
         return {}
     rows = {"FeedDrive": _drive_rows, "ReferenceTrajectory": _played_rows}.get(table.model, _look_ahead_rows)(spec)
     outputs = [(name, variable.kind) for name, variable in table.named("output").items()]
-    inputs = [(name, one.kind) for name, one in table.named("input").items() if name != "x_load"]  # there is none
+    inputs = [(name, one.kind) for name, one in table.named("input").items() if one.wired]
     base = f"{REFERENCE_FOLDER}/{table.name}"
     options = {"StartTime": 0.0, "StopTime": (len(rows) - 1) * T_s, "StepSize": T_s, "RelTol": _REL_TOL}
     files = {

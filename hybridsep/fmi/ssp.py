@@ -48,8 +48,8 @@ class _Component:
 
     @property
     def connectors(self) -> list[Variable]:
-        """Inputs and outputs, but enumerations and the load, which nothing in the system tells."""
-        return [v for v in self.variables if v.causality in ("input", "output") and not v.items and v.name != "x_load"]
+        """Inputs and outputs, but enumerations, and inputs that nothing in the system tells."""
+        return [v for v in self.variables if v.causality in ("input", "output") and not v.items and v.wired]
 
     @property
     def parameters(self) -> list[Variable]:

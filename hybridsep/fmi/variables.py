@@ -75,6 +75,7 @@ class Variable:
     nominal: float | None = None
     # inputs and parameters an output depends on during initialization; none at any later point
     initially_from: tuple[str, ...] = ()
+    wired: bool = True  # whether something in a system of the machine's FMUs tells this input
     items: tuple[str, ...] = ()  # names of an Enumeration's values, which count from 0
     item_meanings: tuple[str, ...] = ()  # what each of them means
     learned: bool = False  # whether a warm start needs the value with which the weights were learned
@@ -246,7 +247,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         Variable("reset", "Boolean", "parameter", "tunable", _RESET, False, group="Compensation"),
         *_modes(modes),
-        _position("x_load", "input", _LOAD, start=0.0, variability="discrete"),  # constant over a step
+        _position("x_load", "input", _LOAD, start=0.0, variability="discrete", wired=False),  # constant over a step
     ]
 
 
@@ -341,10 +342,11 @@ class FmuTable:
         table = _MODELS[self.model](self.parameters, self.modes)
         if not self.windows:
             table = [variable for variable in table if variable.causality != "local"]
-        table = [
-            replace(one, start=self.rest) if one.causality == "input" and one.name != "x_load" else one for one in table
-        ]
-        return tuple(map(_angular, table) if self.is_angular else table)
+        table = [replace(one, start=self.rest) if one.causality == "input" and one.wired else one for one in table]
+        if self.is_angular:
+            units = [(angular_unit(one.unit), angular_unit(one.display_unit)) for one in table]
+            table = [replace(one, unit=u, display_unit=shown) for one, (u, shown) in zip(table, units, strict=True)]
+        return tuple(table)
 
     @cached_property
     def shown(self) -> tuple[Variable, ...]:
@@ -374,9 +376,3 @@ class FmuTable:
     def named(self, causality: str) -> dict[str, Variable]:
         """Return the variables of a causality by name, in their order."""
         return {variable.name: variable for variable in self.variables if variable.causality == causality}
-
-
-def _angular(variable: Variable) -> Variable:
-    """Return a linear axis' variable with the units of a rotary one."""
-    unit, display = angular_unit(variable.unit), angular_unit(variable.display_unit)
-    return replace(variable, unit=unit, display_unit=display)

@@ -38,7 +38,6 @@ def identify_operation(
     recordings: Iterable[tuple[ArrayLike, ArrayLike]],
     T_s: float,
     *,
-    unit_gain: bool | None = None,
     order_max: int = 6,
     unit: str = "m",
     shown: DisplayUnits | None = None,
@@ -55,10 +54,10 @@ def identify_operation(
 
     ``recordings``: iterable of pairs ``(x_d, x)`` of (n,), m: commanded and measured positions, one pair for each
     piece without a gap, sampled alike; ``x`` is NaN where it is missing. Such samples are left out of the error, the
-    model runs over them; ``T_s``: sampling interval, s; ``unit_gain``: whether the static gain is 1; chosen by the
-    recordings if left out; ``order_max``: largest number of poles, at least 1; ``unit``: {"m", "rad"}: unit of the
-    positions, for estimates; ``shown``: units in which findings say errors; ``unit``'s if left out; ``part``: what
-    the recordings are, for findings and errors; ``progress``: called with a message and the fraction done.
+    model runs over them; ``T_s``: sampling interval, s; ``order_max``: largest number of poles, at least 1; ``unit``:
+    {"m", "rad"}: unit of the positions, for estimates; ``shown``: units in which findings say errors; ``unit``'s if
+    left out; ``part``: what the recordings are, for findings and errors; ``progress``: called with a message and the
+    fraction done.
     IdentificationError if the recordings cannot determine a model, with the reason; SignalError if samples are not
     finite or of different lengths; ParameterError if ``T_s`` is out of its range.
     """
@@ -66,11 +65,7 @@ def identify_operation(
     segments = as_segments(recordings)
     if reason := _hindrance(segments):
         raise IdentificationError(f"{part} cannot determine a model, because {reason}")
-    structures = [
-        structure
-        for structure in STRUCTURES
-        if structure.order <= max(order_max, 1) and unit_gain in (None, structure.unit_gain)
-    ]
+    structures = [structure for structure in STRUCTURES if structure.order <= order_max]
     candidates = compare_structures(segments, T_s, structures, progress)
     chosen = without_long_delay(choose(candidates), segments, T_s)
     candidates = [chosen if one.structure == chosen.structure else one for one in candidates]

@@ -239,7 +239,7 @@ def test_the_parts_with_most_motion_are_taken_of_a_long_recording() -> None:
 
 
 @pytest.mark.slow
-def test_the_static_gain_may_be_given() -> None:
+def test_a_static_gain_is_said_with_the_digits_that_are_known() -> None:
     x_d = moves(1500)
     x = 0.9 * measured(SECOND, x_d, "foh", 1e-6)
     free = identify_operation([(x_d, x)], T_S, order_max=2)
@@ -248,9 +248,6 @@ def test_the_static_gain_may_be_given() -> None:
     figure, _, std = gain.removeprefix("the static gain is ").partition(" ± ")
     decimals = len(figure.partition(".")[2])
     assert 10 ** (1 - decimals) <= float(std) < 10 ** (2 - decimals)  # no digit that the deviation does not know
-    unit = identify_operation([(x_d, x)], T_S, unit_gain=True, order_max=2)
-    assert unit.model.dc_gain == pytest.approx(1.0, abs=1e-12)
-    assert unit.rms > 10 * free.rms
 
 
 @pytest.mark.slow
