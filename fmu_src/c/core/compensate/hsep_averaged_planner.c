@@ -251,6 +251,7 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
 
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
+    hsep_real begun;     /* what hsep_averaged_planner_begin has cost */
     hsep_real number;    /* one of every sample of the plan */
     hsep_real commands;  /* commands of a plan, and their disturbances */
     hsep_real sample;    /* a sample of its prediction, with its variance, */
@@ -282,6 +283,7 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
     work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
                     all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
+    work.begun = 2.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
     work.linearise = all * HSEP_WORK_NUMBER * (4.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 8.0);
     work.factor = work.pairs * (n / 6.0 + 1.5);
@@ -334,7 +336,7 @@ static hsep_real averaged_planner_left(
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
     if (self->place == 0 && self->planned) {
-        left += 15.0 * work->number + HSEP_WORK_NUMBER * work->pairs + work->factor + work->solve +
+        left += 15.0 * work->number + 4.0 * work->pairs + work->factor + work->solve +
                 (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
@@ -372,7 +374,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        self->left = averaged_planner_left(self, task, &work);
+        self->left = work.begun + averaged_planner_left(self, task, &work);
+        AVERAGED_PLANNER_YIELD(18, work.begun);
 
         /* The remainder of the last plan, with the variances of all plans */
         while (self->judges && self->samples < all) {
@@ -387,7 +390,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->planned) {
             AVERAGED_PLANNER_YIELD(2, (self->follows ? 15.0 : 12.0) * work.number);
             averaged_planner_open(self, task);
-            AVERAGED_PLANNER_YIELD(3, HSEP_WORK_NUMBER * work.pairs);
+            AVERAGED_PLANNER_YIELD(3, 4.0 * work.pairs);
             hsep_planner_aim(planner, hsep_at(self, self->gram), task->spline, hsep_at(self, self->target));
             hsep_planner_pin(planner);
             AVERAGED_PLANNER_YIELD(4, work.factor);

@@ -300,7 +300,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
     const int solving = self->averaged || compensator_plan(self);
     compensator_publish(self, solving ? compensator_pinned(self) : predictor->Np);
-    if (predictor->n_published == 0) {
+    if (predictor->n_published < predictor->Np) {
         compensator_solve(self);
     }
 }

@@ -7,29 +7,20 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Slacks and multipliers of the bounds  low <= A x <= high, row by row. Side 0 are the lower bounds, B x >= b with
- * B = A and b = low, side 1 the upper ones, B = -A and b = -high. A proximal term rho regularises the multipliers:
- * ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z). */
-
-/* One side of the bounds, all (4 preview,): slack s = B x - b and multiplier z, both > 0. */
+/* Slacks and multipliers of the bounds B x >= b, those of the low rows, then those of the high ones, as qp.py has them:
+ * B = [A; -A], b = [low; -high]. A proximal term rho regularises the multipliers: ds = B dx + r_p + rho dz,
+ * z ds + s dz = r_c (s + rho z). */
 typedef struct {
-    hsep_real *b;       /* low or high */
-    hsep_real *s, *z;   /* shares; m2 */
-    hsep_real *inverse; /* 1 / (s + rho z) */
-    hsep_real *r_c;     /* complementarity that a step aims at, times inverse */
-    hsep_real *r_p;     /* primal residual B x - b - s */
-    hsep_real *ds, *dz; /* steps of s and z, once their lengths are known */
-} slacks_side;
-
-typedef struct {
-    hsep_real rho;       /* 1/m2, proximal regularisation of the multipliers */
-    hsep_real sides;     /* number of bounds, low and high ones */
-    hsep_real *Ax, *Adx; /* rows of the iterate and of its step */
-    hsep_real *work;     /* a row's value of both sides together */
-    slacks_side side[2]; /* low and high */
+    hsep_real rho;          /* 1/m2, proximal regularisation of the multipliers */
+    hsep_int n;             /* bounds, an even number */
+    hsep_real *rows, *work; /* (4 preview,) low and high before the beginning; then rows of x or dx, or for A' */
+    hsep_real *b, *s, *z;   /* (n,) shares; slack s = B x - b and multiplier z, m2, both > 0 */
+    hsep_real *inverse;     /* (n,) 1 / (s + rho z) */
+    hsep_real *r_c, *r_p;   /* (n,) complementarity that a step aims at, times inverse; primal residual B x - b - s */
+    hsep_real *ds, *dz;     /* (n,) B x or B dx, then the step of s; the step of z */
     struct {
-        hsep_int begin, end;
-    } range[HSEP_ORDERS]; /* the rows of an order that x touches, begin ... end - 1 */
+        hsep_int begin, count;
+    } range[HSEP_ORDERS]; /* the rows of an order that x touches */
 } slacks;
 
 /* Lengths of a step, 0 ... 1. */
@@ -37,179 +28,119 @@ typedef struct {
     hsep_real primal, dual;
 } slacks_step_lengths;
 
-/* Of the sides: B = A, B = -A. */
-static const hsep_real slacks_sign[2] = {1.0, -1.0};
+/* The vector of an array of the slacks `it` at bound r. */
+#define AT(array) (*hsep_lanes_at(it.array + r))
 
-/* Begin with Ax and the bounds as they are. cost: m2, of the beginning, for each of the bounds. */
+/* to := [low; -high] of rows, which are B x where both are A x. */
+static void slacks_take_rows(const slacks *self, const hsep_real *low, const hsep_real *high, hsep_real *to)
+{
+    hsep_real *second = to + self->n / 2;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const hsep_int begin = self->range[order].begin, end = begin + self->range[order].count;
+        for (hsep_int r = begin; r < end; r++) {
+            *to++ = low[r];
+            *second++ = -high[r];
+        }
+    }
+}
+
+/* Rows := y of the low bounds + sign y of the high ones. */
+static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real sign)
+{
+    const hsep_real *high = y + self->n / 2;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        hsep_real *rows = self->rows + self->range[order].begin;
+        for (hsep_int r = 0; r < self->range[order].count; r++) {
+            rows[r] = *y++ + sign * *high++;
+        }
+    }
+}
+
+/* Begin with B x in ds. cost: m2, of the beginning, for each of the bounds. */
 static void slacks_begin(const slacks *self, hsep_real cost)
 {
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                const slacks_side *side = &self->side[i];
-                side->s[r] = hsep_fmax(slacks_sign[i] * (self->Ax[r] - side->b[r]), HSEP_QP_FIRST_SLACK);
-                side->z[r] = HSEP_QP_FIRST_MU * cost / side->s[r];
-                side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
-            }
-        }
+    for (hsep_int r = 0; r < self->n; r++) {
+        self->s[r] = hsep_fmax(self->ds[r] - self->b[r], HSEP_QP_FIRST_SLACK);
+        self->z[r] = HSEP_QP_FIRST_MU * cost / self->s[r];
+        self->inverse[r] = 1.0 / (self->s[r] + self->rho * self->z[r]);
     }
 }
 
-/* Sums or maxima of rows, four side by side, and of the rows left over, so that compilers find vectors and results are
- * the same to the last bit whatever they find. */
-typedef struct {
-    hsep_real of[5];
-} slacks_values;
-
-static hsep_real slacks_sum(const slacks_values *values)
-{
-    const hsep_real *s = values->of;
-    return ((s[0] + s[1]) + (s[2] + s[3])) + s[4];
-}
-
-static hsep_real slacks_larger(hsep_real a, hsep_real b) { return a > b ? a : b; }
-
-static hsep_real slacks_largest(const slacks_values *values)
-{
-    hsep_real largest = values->of[4];
-    for (int i = 0; i < 4; i++) {
-        largest = slacks_larger(values->of[i], largest);
-    }
-    return largest;
-}
-
-/* work := B' sides of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
+/* Rows of A' := B' of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
 static void slacks_push(const slacks *self)
 {
-    const slacks_side *low = &self->side[0], *high = &self->side[1];
-    hsep_real *restrict work = self->work;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
-            work[r] = (low->r_c[r] - low->z[r] * low->inverse[r] * low->r_p[r]) -
-                      (high->r_c[r] - high->z[r] * high->inverse[r] * high->r_p[r]);
-        }
+    const slacks it = *self;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        AT(ds) = AT(r_c) - AT(z) * AT(inverse) * AT(r_p);
     }
+    slacks_give_rows(self, it.ds, -1.0);
 }
 
-/* Steps of count rows, ds = B dx + r_p + rho dz, dz = r_c - z (B dx + r_p) / (s + rho z), and the largest -change /
- * value of slacks and multipliers. */
-static inline void slacks_steps(
-    const slacks *self, int i, hsep_int r, hsep_int count, slacks_values *primal, slacks_values *dual)
+/* Rows := weights W of A' W A. */
+static void slacks_weigh(const slacks *self)
 {
-    const slacks_side *side = &self->side[i];
-    const hsep_real *restrict Adx = self->Adx + r, *restrict r_p = side->r_p + r, *restrict r_c = side->r_c + r;
-    const hsep_real *restrict s = side->s + r, *restrict z = side->z + r, *restrict inverse = side->inverse + r;
-    hsep_real *restrict ds = side->ds + r, *restrict dz = side->dz + r;
-    for (hsep_int l = 0; l < count; l++) {
-        const hsep_int at = count == 4 ? l : 4;
-        const hsep_real to = slacks_sign[i] * Adx[l] + r_p[l];
-        dz[l] = r_c[l] - z[l] * inverse[l] * to;
-        ds[l] = to + self->rho * dz[l];
-        primal->of[at] = slacks_larger(-ds[l] / s[l], primal->of[at]);
-        dual->of[at] = slacks_larger(-dz[l] / z[l], dual->of[at]);
+    const slacks it = *self;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        AT(ds) = AT(z) * AT(inverse);
     }
+    slacks_give_rows(self, it.ds, 1.0);
 }
 
-/* Steps ds and dz, and their lengths to where all values + length change stay >= 0: the largest -change / value is its
- * inverse. */
+/* Steps of B dx in ds, ds = B dx + r_p + rho dz and dz = r_c - z (B dx + r_p) / (s + rho z), and their lengths to where
+ * all values + length change stay >= 0: the largest -change / value is its inverse. */
 static slacks_step_lengths slacks_lengths(const slacks *self)
 {
-    slacks_values primal = {{0.0}}, dual = {{0.0}};
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (int i = 0; i < 2; i++) {
-            hsep_int r = self->range[order].begin;
-            for (; r + 4 <= self->range[order].end; r += 4) {
-                slacks_steps(self, i, r, 4, &primal, &dual);
-            }
-            slacks_steps(self, i, r, self->range[order].end - r, &primal, &dual);
-        }
+    const slacks it = *self;
+    const hsep_real rho = it.rho;
+    hsep_lanes primal = {0.0}, dual = primal;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        const hsep_lanes z = AT(z), to = AT(ds) + AT(r_p), dz = AT(r_c) - z * AT(inverse) * to, ds = to + rho * dz;
+        AT(dz) = dz;
+        AT(ds) = ds;
+        primal = hsep_larger(-ds / AT(s), primal);
+        dual = hsep_larger(-dz / z, dual);
     }
-    const hsep_real of_s = slacks_largest(&primal), of_z = slacks_largest(&dual);
+    const hsep_real of_s = hsep_largest(primal), of_z = hsep_largest(dual);
     return (slacks_step_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
-/* Residuals of count rows: the sum of s z, the largest primal residual, and the bound that is exceeded most. */
-static inline void slacks_residuals(
-    const slacks *self, int i, hsep_int r, hsep_int count, slacks_values *sum, slacks_values *largest,
-    slacks_values *outside)
-{
-    const slacks_side *side = &self->side[i];
-    const hsep_real *restrict Ax = self->Ax + r, *restrict b = side->b + r, *restrict s = side->s + r;
-    const hsep_real *restrict z = side->z + r, *restrict inverse = side->inverse + r;
-    hsep_real *restrict r_p = side->r_p + r, *restrict r_c = side->r_c + r;
-    hsep_real *restrict Adx = self->Adx + r, *restrict work = self->work + r;
-    for (hsep_int l = 0; l < count; l++) {
-        const hsep_int at = count == 4 ? l : 4;
-        const hsep_real product = s[l] * z[l], weight = z[l] * inverse[l], distance = slacks_sign[i] * (Ax[l] - b[l]);
-        r_p[l] = distance - s[l];
-        r_c[l] = -product * inverse[l];
-        sum->of[at] += product;
-        largest->of[at] = slacks_larger(slacks_larger(r_p[l], -r_p[l]), largest->of[at]);
-        outside->of[at] = slacks_larger(-distance, outside->of[at]);
-        Adx[l] = i == 0 ? weight : Adx[l] + weight;
-        work[l] = i == 0 ? z[l] : work[l] - z[l];
-    }
-}
-
-/* Return mu, the mean of s z; *primal: the largest primal residual; *beyond: by how much the worst bound is exceeded,
- * negative inside all of them. The weights of A' W A go to Adx, z's difference of
- * the sides to work, and the predictor's r_c is set, as if s z = 0 could be reached at once. */
+/* Return mu, the mean of s z, with B x in ds; *primal: the largest primal residual; *beyond: by how much the worst
+ * bound is exceeded, negative inside all of them. The predictor's r_c is set, as if s z = 0 could be reached at once.
+ */
 static hsep_real slacks_take_residuals(const slacks *self, hsep_real *primal, hsep_real *beyond)
 {
-    slacks_values sum = {{0.0}}, largest = {{0.0}};
-    slacks_values outside = {{-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY}};
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (int i = 0; i < 2; i++) {
-            hsep_int r = self->range[order].begin;
-            for (; r + 4 <= self->range[order].end; r += 4) {
-                slacks_residuals(self, i, r, 4, &sum, &largest, &outside);
-            }
-            slacks_residuals(self, i, r, self->range[order].end - r, &sum, &largest, &outside);
-        }
+    const slacks it = *self;
+    hsep_lanes largest = {0.0}, outside = largest - HSEP_HUGE(1e300);
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        const hsep_lanes s = AT(s), distance = AT(ds) - AT(b), r_p = distance - s;
+        AT(r_p) = r_p;
+        AT(r_c) = -(s * AT(z) * AT(inverse));
+        largest = hsep_larger(hsep_larger(r_p, -r_p), largest);
+        outside = hsep_larger(-distance, outside);
     }
-    *primal = slacks_largest(&largest);
-    *beyond = slacks_largest(&outside);
-    return slacks_sum(&sum) / self->sides;
-}
-
-/* Sum of s z of count rows after a step. */
-static inline void slacks_after(
-    const slacks_side *side, const slacks_step_lengths *alpha, hsep_int r, hsep_int count, slacks_values *sum)
-{
-    for (hsep_int l = 0; l < count; l++) {
-        sum->of[count == 4 ? l : 4] +=
-            (side->s[r + l] + alpha->primal * side->ds[r + l]) * (side->z[r + l] + alpha->dual * side->dz[r + l]);
-    }
+    *primal = hsep_largest(largest);
+    *beyond = hsep_largest(outside);
+    return hsep_dot(it.s, it.z, it.n) / (hsep_real)it.n;
 }
 
 /* mu after the predictor's step, as far as s and z stay >= 0. */
 static hsep_real slacks_predicted(const slacks *self)
 {
     const slacks_step_lengths alpha = slacks_lengths(self);
-    slacks_values sum = {{0.0}};
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (int i = 0; i < 2; i++) {
-            hsep_int r = self->range[order].begin;
-            for (; r + 4 <= self->range[order].end; r += 4) {
-                slacks_after(&self->side[i], &alpha, r, 4, &sum);
-            }
-            slacks_after(&self->side[i], &alpha, r, self->range[order].end - r, &sum);
-        }
+    const slacks it = *self;
+    hsep_real sums[2] = {0.0, 0.0}; /* two side by side, whatever a vector holds */
+    for (hsep_int r = 0; r < it.n; r++) {
+        sums[r % 2] += (it.s[r] + alpha.primal * it.ds[r]) * (it.z[r] + alpha.dual * it.dz[r]);
     }
-    return slacks_sum(&sum) / self->sides;
+    return (sums[0] + sums[1]) / (hsep_real)it.n;
 }
 
 /* The corrector's r_c: the centre sigma mu, with the curvature ds dz that the predictor shows. */
 static void slacks_correct(const slacks *self, hsep_real sigma_mu)
 {
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (int i = 0; i < 2; i++) {
-            const slacks_side *side = &self->side[i];
-            hsep_real *restrict r_c = side->r_c;
-            for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
-                r_c[r] = (sigma_mu - side->s[r] * side->z[r] - side->ds[r] * side->dz[r]) * side->inverse[r];
-            }
-        }
+    const slacks it = *self;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        AT(r_c) = (sigma_mu - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
     }
 }
 
@@ -219,16 +150,13 @@ static hsep_real slacks_move(const slacks *self)
     const slacks_step_lengths alpha = slacks_lengths(self);
     const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.primal;
     const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.dual;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (int i = 0; i < 2; i++) {
-            const slacks_side *side = &self->side[i];
-            hsep_real *restrict s = side->s, *restrict z = side->z, *restrict inverse = side->inverse;
-            for (hsep_int r = self->range[order].begin; r < self->range[order].end; r++) {
-                s[r] += primal * side->ds[r];
-                z[r] += dual * side->dz[r];
-                inverse[r] = 1.0 / (s[r] + self->rho * z[r]);
-            }
-        }
+    const slacks it = *self;
+    const hsep_real rho = it.rho;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        const hsep_lanes s = AT(s) + primal * AT(ds), z = AT(z) + dual * AT(dz);
+        AT(s) = s;
+        AT(z) = z;
+        AT(inverse) = (hsep_real)1.0 / (s + rho * z);
     }
     return primal;
 }
@@ -259,16 +187,13 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
     for (int i = 0; i < 5; i++) {
         *of_columns[i] = interior_take(block, &end, columns);
     }
-    a->slacks.Ax = interior_take(block, &end, rows);
-    a->slacks.Adx = interior_take(block, &end, rows);
-    a->slacks.work = interior_take(block, &end, rows);
-    for (int i = 0; i < 2; i++) {
-        slacks_side *side = &a->slacks.side[i];
-        hsep_real **const of_rows[8] = {&side->b,   &side->s,   &side->z,  &side->inverse,
-                                        &side->r_c, &side->r_p, &side->ds, &side->dz};
-        for (int j = 0; j < 8; j++) {
-            *of_rows[j] = interior_take(block, &end, rows);
-        }
+    slacks *bounds = &a->slacks;
+    bounds->rows = interior_take(block, &end, rows);
+    bounds->work = interior_take(block, &end, rows);
+    hsep_real **const of_bounds[8] = {&bounds->b,   &bounds->s,   &bounds->z,  &bounds->inverse,
+                                      &bounds->r_c, &bounds->r_p, &bounds->ds, &bounds->dz};
+    for (int i = 0; i < 8; i++) {
+        *of_bounds[i] = interior_take(block, &end, 2.0 * rows);
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
     return end * sizeof(hsep_real);
@@ -286,15 +211,21 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
     a.n = splines->n - self->first;
     a.slacks.rho = self->rho;
-    a.slacks.sides = 0.0;
+    a.slacks.n = 0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_int begin = self->first * splines->spacing + 1; /* a spline begins with 0 */
-        const hsep_int end = (splines->n + 3) * splines->spacing + order;
         a.slacks.range[order].begin = begin + order * splines->preview;
-        a.slacks.range[order].end = end + order * splines->preview;
-        a.slacks.sides += 2.0 * (hsep_real)(end - begin);
+        a.slacks.range[order].count = (splines->n + 3) * splines->spacing + order - begin;
+        a.slacks.n += 2 * a.slacks.range[order].count;
     }
     return a;
+}
+
+/* B of x or dx, (n,), to ds. */
+static void interior_rows(const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real x[])
+{
+    hsep_splines_rows(splines, x, first, a->slacks.rows);
+    slacks_take_rows(&a->slacks, a->slacks.rows, a->slacks.rows, a->slacks.ds);
 }
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
@@ -304,8 +235,8 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
         .v = a.v,
         .x = a.x,
         .inner = self->beyond < self->tolerance.margin ? a.inner : NULL,
-        .low = a.slacks.side[0].b,
-        .high = a.slacks.side[1].b};
+        .low = a.slacks.rows,
+        .high = a.slacks.work};
 }
 
 HSEP_API void hsep_interior_begin(
@@ -316,7 +247,7 @@ HSEP_API void hsep_interior_begin(
     self->tolerance = *tolerance;
     self->steps = self->part = 0;
     interior_arrays a = interior_open(self, splines);
-    self->cost = cost / a.slacks.sides;
+    self->cost = cost / (hsep_real)a.slacks.n;
     self->beyond = tolerance->margin;
     /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
      * would outgrow P. */
@@ -326,11 +257,12 @@ HSEP_API void hsep_interior_begin(
         P += a.n - i;
     }
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
-    hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
+    slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
+    interior_rows(&a, splines, first, a.x);
     slacks_begin(&a.slacks, self->cost);
 }
 
-/* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its
+/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its
  * terms. */
 static hsep_real interior_dual_residual(
     const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real *P)
@@ -344,7 +276,8 @@ static hsep_real interior_dual_residual(
         P += left + 1;
     }
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
-    hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
+    slacks_give_rows(&a->slacks, a->slacks.z, -1.0);
+    hsep_splines_transpose(splines, a->slacks.rows, first, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
         largest = hsep_fmax(
             hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
@@ -354,14 +287,14 @@ static hsep_real interior_dual_residual(
     return residual / largest;
 }
 
-/* dx := (P + A' W A)^-1 (r_d + A' push), and what it does to the rows. */
+/* dx := (P + A' W A)^-1 (r_d + B' push), and B dx. */
 static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_int first)
 {
     slacks_push(&a->slacks);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
-    hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
+    hsep_splines_transpose(splines, a->slacks.rows, first, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
-    hsep_splines_rows(splines, a->dx, first, a->slacks.Adx);
+    interior_rows(a, splines, first, a->dx);
 }
 
 /* Begin a step with its residuals; return whether there is none, as the plan is solved. */
@@ -369,7 +302,7 @@ static int interior_residuals(
     hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
 {
     hsep_real r_p, beyond;
-    hsep_splines_rows(splines, a->x, self->first, a->slacks.Ax);
+    interior_rows(a, splines, self->first, a->x);
     const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
@@ -394,7 +327,8 @@ static int interior_factor(
         return !hsep_cholesky_rows(a->factor, a->n, half, a->n, NULL);
     }
     memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
-    hsep_splines_gram(splines, a->slacks.Adx, self->first, a->factor, a->slacks.work);
+    slacks_weigh(&a->slacks);
+    hsep_splines_gram(splines, a->slacks.rows, self->first, a->factor, a->slacks.work);
     return !hsep_cholesky_rows(a->factor, a->n, 0, half, NULL);
 }
 
@@ -403,14 +337,16 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     const interior_arrays a = interior_open(self, splines);
     const hsep_int part = self->part;
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
-    if (part < HSEP_INTERIOR_PARTS - 1) {
+    if (part < 3) {
         return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part == 2);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
-    slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
-    interior_direction(&a, splines, self->first);
+    if (part == 3) {
+        const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
+        slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
+        return 0;
+    }
     const hsep_real alpha = slacks_move(&a.slacks);
     for (hsep_int j = 0; j < a.n; j++) {
         a.x[j] += alpha * a.dx[j];

@@ -19,6 +19,20 @@ typedef hsep_real hsep_lanes;
 
 #define HSEP_LANES_MOST 2 /* whatever the compiler has: blocks are the same */
 
+/* The larger one of two numbers, lane by lane, b if a is none; and the largest one of a vector. */
+#if HSEP_LANES == 2
+static inline hsep_lanes hsep_larger(hsep_lanes a, hsep_lanes b)
+{
+    typedef hsep_signed mask __attribute__((vector_size(2 * sizeof(hsep_signed))));
+    const mask is = a > b;
+    return (hsep_lanes)((is & (mask)a) | (~is & (mask)b));
+}
+static inline hsep_real hsep_largest(hsep_lanes a) { return a[0] > a[1] ? a[0] : a[1]; }
+#else
+static inline hsep_lanes hsep_larger(hsep_lanes a, hsep_lanes b) { return a > b ? a : b; }
+static inline hsep_real hsep_largest(hsep_lanes a) { return a; }
+#endif
+
 /* Vectors that hold four numbers. */
 #define HSEP_OF_FOUR (4 / HSEP_LANES)
 
