@@ -54,9 +54,9 @@ HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
-/* Do a part of a step, its residuals, half of its factor, its predictor or its corrector; P as in hsep_interior_begin. Returns
- * whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and 2 n^2 after it, and about
- * 900 operations and 8 divisions a sample of the plan in all. */
+/* Do a part of a step, its residuals, half of its factor, its predictor or its corrector; P as in hsep_interior_begin.
+ * Returns whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and 2 n^2 after it, and
+ * about 900 operations and 8 divisions a sample of the plan in all. */
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif
