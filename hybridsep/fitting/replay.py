@@ -183,8 +183,9 @@ class Replay:
 
         One of each recording, NaN where a measurement is missing; all samples, or the ``tested`` ones.
         """
-        errors, found = self._compared - self._predictions[0], []
-        for one, span in zip(self.recordings, self._spans, strict=True):
+        errors, found, end = self._compared - self._predictions[0], [], 0
+        for one in self.recordings:
+            span = slice(end, end := end + len(one.x))
             rows = np.stack((delayed(one.x_d, self.delay), self._compared[span], errors[span]))
             x_d, x, e = rows[:, self._judged[span]] if tested else rows
             found.append((x_d, x, e))
@@ -217,12 +218,6 @@ class Replay:
             "n_windows": verdict.n_windows,
             "verdict": str(verdict),
         }
-
-    @cached_property
-    def _spans(self) -> list[slice]:
-        """Places of the recordings' samples among all."""
-        ends = np.cumsum([len(one.x) for one in self.recordings]).tolist()
-        return [slice(end - len(one.x), end) for one, end in zip(self.recordings, ends, strict=True)]
 
     @cached_property
     def _place(self) -> Indices:

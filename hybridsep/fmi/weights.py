@@ -18,7 +18,6 @@ import numpy as np
 
 from ..base.errors import StateError
 from ..base.settings import PredictorSettings
-from ..base.signals import Array
 from ..base.state import numbers_of, with_numbers
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
@@ -95,15 +94,12 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     numbers, *factors = np.split(np.frombuffer(body, "<f8", offset=start), ends[:-1])
     if not all(np.isfinite(one).all() for one in (numbers, *factors)):
         raise StateError(_DAMAGED)
-    regressions = tuple(_regression(one, size) for one, size in zip(factors, sizes, strict=True))
-    predictor.take_over(*with_numbers(like, numbers), regressions)
-
-
-def _regression(numbers: Array, size: int) -> RidgeRegression:
-    """Return the regression of its number of rows and its upper triangle, by rows, of ``size`` rows."""
-    factor = np.zeros((size, size), order="F")
-    factor[np.triu_indices(size)] = numbers[1:]
-    return RidgeRegression(factor, float(numbers[0]))
+    regressions = []
+    for one, size in zip(factors, sizes, strict=True):
+        factor = np.zeros((size, size), order="F")
+        factor[np.triu_indices(size)] = one[1:]
+        regressions.append(RidgeRegression(factor, float(one[0])))
+    predictor.take_over(*with_numbers(like, numbers), tuple(regressions))
 
 
 def _learned(predictor: HybridPredictor) -> tuple[Any, Uncertainty]:

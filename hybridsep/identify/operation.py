@@ -72,7 +72,8 @@ def identify_operation(
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
     findings = []
-    if _is_weak(fit, segments, T_s):
+    residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.known] for s in segments])
+    if _spread(segments) < _WEAK * float(np.std(residual)):
         fit = fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
         spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
         findings.append(
@@ -131,12 +132,6 @@ def _as_known(value: float, std: float) -> str:
     """Return a figure with the decimals of the two leading digits of its standard deviation, seven at most."""
     decimals = 1 - math.floor(math.log10(std)) if 0.0 < std < math.inf else 7
     return f"{value:.{min(max(decimals, 0), 7)}f}"
-
-
-def _is_weak(fit: Fit, segments: Sequence[Segment], T_s: float) -> bool:
-    """Return whether the commanded motion is hardly larger than what no model explains."""
-    residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.known] for s in segments])
-    return _spread(segments) < _WEAK * float(np.std(residual))
 
 
 def _spread(segments: Sequence[Segment]) -> float:

@@ -16,12 +16,13 @@ _DEAD_TIME_MAX = 0.25  # longest dead time that is tried, s, and at most a quart
 
 def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:
     """Return the fit of a structure over poles and dead time; ``known`` fits of simpler ones give the starts."""
-    longest = min(_DEAD_TIME_MAX / T_s, max(segment.stop for segment in segments) / 4)
-    limit = int(2 * longest)
+    n = max(segment.stop for segment in segments)
+    limit, slowest = int(2 * min(_DEAD_TIME_MAX / T_s, n / 4)), DECAY_MIN / (T_s * n)
     cache: dict[int, Fit] = {}
     rate = _bandwidth(segments, T_s, known)
     starts = _starts(structure, known, T_s, rate)
-    slowest = _slowest(structure, rate, T_s, segments)
+    if structure.order > 1:
+        slowest = max(slowest, SLOWEST * rate)
 
     def at(halves: int) -> Fit:
         if halves not in cache:
@@ -30,8 +31,10 @@ def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, kno
             cache[halves] = fit_structure(segments, T_s, structure, Delay(halves), tried, slowest)
         return cache[halves]
 
-    first = min(limit, _first_delay(structure, known))
-    return _minimum(at, first, limit)
+    # The dead time of the best simpler fit of at least the same kind
+    simpler = [fit for other, fit in known.items() if 0 < other.order <= structure.order]
+    first = min(simpler, key=lambda fit: fit.rms).delay.halves if simpler else 0
+    return _minimum(at, min(limit, first), limit)
 
 
 def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit) -> Fit:
@@ -81,18 +84,6 @@ def _minimum(at: Callable[[int], Fit], first: int, limit: int) -> Fit:
             step //= 2
         else:
             return best
-
-
-def _first_delay(structure: Structure, known: Mapping[Structure, Fit]) -> int:
-    """Return where the search begins: the dead time of the best simpler fit of at least the same kind."""
-    simpler = [fit for other, fit in known.items() if 0 < other.order <= structure.order]
-    return min(simpler, key=lambda fit: fit.rms).delay.halves if simpler else 0
-
-
-def _slowest(structure: Structure, rate: float, T_s: float, segments: Sequence[Segment]) -> float:
-    """Return the lower bound of the natural frequencies, rad/s, for that bandwidth."""
-    recorded = DECAY_MIN / (T_s * max(segment.stop for segment in segments))
-    return recorded if structure.order <= 1 else max(recorded, SLOWEST * rate)
 
 
 def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, rate: float) -> list[Array]:

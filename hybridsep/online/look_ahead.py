@@ -23,7 +23,6 @@ from ..base.settings import samples_before
 from ..base.signals import Array, check_position
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
-from ..predict.window import Prediction
 from .monitor import Monitor
 
 
@@ -59,11 +58,6 @@ class PublishedWindow:
         """Return the window of a drive at rest at ``start``, m, without a prediction."""
         rest = np.full(Np, start)
         return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
-
-    @classmethod
-    def of_prediction(cls, x_d: Array, prediction: Prediction) -> "PublishedWindow":
-        """Return the window of unmodified commands; SignalError if its prediction diverges."""
-        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, prediction.x_h_std, 0, prediction.n_warm_up)
 
 
 class WindowPlanner(Protocol):
@@ -115,7 +109,8 @@ class _Unmodified:
         """Predict the next window under the load, but for the lead-in; SignalError if the prediction diverges."""
         if self._at_rest:
             return PublishedWindow.at_rest(float(x_d[0]), self.preview)
-        return PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d + load))
+        found = self.predictor.predict(x_d + load)
+        return PublishedWindow(x_d, x_d, found.x_pb, found.x_h, found.x_h_std, 0, found.n_warm_up)
 
     def update(self, x: Array) -> None:
         """Learn from the positions measured over a predicted window, ``(Np,)``, m."""
