@@ -182,15 +182,6 @@ def test_native_fmus_equal_the_library_and_keep_the_drives_limits(fmus: BuiltFmu
 
 
 @pytest.mark.slow
-def test_a_shifted_start(fmus: BuiltFmus, runs: dict[ControllerType, Run]) -> None:
-    pair = fmus("SepCompensator"), fmus("FeedDrive")
-    moved, short = cosimulate(*pair, R[:600] + 0.1), runs[COMPENSATOR]
-    np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(moved.t, short.t, rtol=0, atol=1e-12)
-    assert (moved.Np, moved.T_s, len(moved.t)) == (50, 1e-3, 600)
-
-
-@pytest.mark.slow
 def test_summary_is_what_the_signals_say(runs: dict[ControllerType, Run]) -> None:
     short = runs[COMPENSATOR]
     summary, change = short.summary(), 1e6 * (short.x_dm - short.x_d)

@@ -10,6 +10,7 @@ from places import EMPS
 
 from benchmarks.fit import errors_of
 from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest, replayed_run
@@ -32,10 +33,6 @@ def log(n: int = 1010) -> tuple[Array, Array]:
     x_d = 0.1 + 0.01 * np.sin(9 * t) ** 3
     x = 0.1 + 0.0098 * np.sin(9 * (t - 0.004)) ** 3 + 1e-5 * np.tanh(50 * np.cos(9 * t))
     return x_d, x
-
-
-def rms(error: Array) -> float:
-    return float(np.sqrt(np.mean(error**2)))
 
 
 @pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/data/emps beside the repository")

@@ -8,6 +8,7 @@ from averaged_cases import FRICTION, PERIOD, TS, averaged, averaged_model, cycle
 from predictor_cases import MODEL
 
 from hybridsep.base.errors import ParameterError
+from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.averaging.constants import CONSTANTS
@@ -16,10 +17,6 @@ from hybridsep.predict.averaging.model import AveragedForecast
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-7  # m
-
-
-def rms(error: Array) -> float:
-    return float(np.sqrt(np.mean(error**2)))
 
 
 def with_friction(n: int, noise: float = NOISE) -> tuple[Array, Array, Array]:

@@ -8,6 +8,7 @@ from averaged_cases import PERIOD, TS, averaged, averaged_model, change_learned,
 from random_drives.generator import SEED, Recipe
 from random_drives.simulation import simulate
 
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.averaging.constants import CONSTANTS
@@ -24,10 +25,6 @@ from hybridsep.predict.averaging.stacking import Stack
 from hybridsep.predict.predictor import HybridPredictor
 
 NOISE = 1e-6  # m
-
-
-def rms(error: Array) -> float:
-    return float(np.sqrt(np.mean(error**2)))
 
 
 def learned(x_d: Array, e: Array) -> HybridPredictor:

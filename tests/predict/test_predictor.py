@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from predictor_cases import MODEL, replay, small_signals, trained
 from properties import examples
 
+from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -20,10 +20,6 @@ NUMERATOR, DENOMINATOR = np.array([staircase.C, staircase.K]), np.array([stairca
 
 
 PAPER: dict[str, Any] = {"T_s": 1e-3, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
-
-
-def rms(error: Array) -> float:
-    return float(np.sqrt(np.mean(error**2)))
 
 
 class TestStaircase:

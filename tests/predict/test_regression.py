@@ -13,7 +13,6 @@ from properties import examples
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.base.state import arrays_of, restored
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
@@ -84,17 +83,6 @@ def test_weights_cannot_be_written() -> None:
         with pytest.raises(ValueError, match="read-only"):
             regression.weights[0] = 1.0
         regression = regression.update(*problem(5, 3))
-
-
-def test_state_restores_bit_for_bit() -> None:
-    rows, target = problem(60, 7)
-    first = RidgeRegression.init(7, 1e-4).update(rows[:30], target[:30])
-    like = RidgeRegression.init(7, 1.0)
-    copy = restored(like, arrays_of(first))
-    regression, copy = (one.update(rows[30:], target[30:]) for one in (first, copy))
-    np.testing.assert_array_equal(copy.weights, regression.weights)
-    np.testing.assert_array_equal(copy.factor, regression.factor)
-    assert copy.n_rows == 60
 
 
 @pytest.mark.slow

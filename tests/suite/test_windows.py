@@ -6,13 +6,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import oracle
 import pytest
 from driving import SHORT, closed_loop, initialise, replay
 from library_models import library_compensator
 from library_stream import start_values
 from numpy.typing import NDArray
-from staircase_data import TS, C, K, M
+from staircase_data import TS
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_adapters, on_all
 
@@ -81,23 +80,6 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker) -> No
     np.testing.assert_allclose(shown["x_pb"][100 : 100 + n], x_pb, rtol=0, atol=tolerance)
     np.testing.assert_allclose(shown["x_h"][100 : 100 + n], x_h, rtol=0, atol=tolerance)
     np.testing.assert_array_equal(shown["hybrid_active"][100 : 100 + n] == 1.0, active)
-
-
-@cache
-def directly_solved(n: int) -> Array:
-    """Return the prediction of the staircase by the oracle, which solves each batch from all its rows."""
-    loop = closed_loop(PREDICTOR, n, {})
-    numerator, denominator = np.array([C / M, K / M]), np.array([1.0, C / M, K / M])
-    settings: dict[str, Any] = {"T_s": TS, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
-    return np.array(oracle.run(numerator, denominator, loop.r[:-100], loop.x[100:], **settings).x_h)
-
-
-@pytest.mark.slow
-@on_all((PREDICTOR,))
-def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
-    shown = shown_by(new_stream, 4001, {})
-    tolerance = 1e-12 if new_stream.implementation == LIBRARY else 1e-11
-    assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(4001))) < tolerance
 
 
 @pytest.mark.slow
