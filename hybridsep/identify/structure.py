@@ -21,6 +21,8 @@ FASTEST = 0.25
 """Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
 not resolve a mode, and its replay is refused."""
 
+_UNDERFLOW = 700.0  # time constants in which numbers fall to the least that are normal
+
 DECAY_MIN = 5.0  # time constants of a pole within the recording, at least; a slower one cannot be told from drift
 
 
@@ -185,10 +187,13 @@ def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Ar
 
 def free_responses(sections: Sequence[Section], n: int) -> Array:
     """Return the responses to initial states without a command, ``(n, order)``."""
-    impulse = np.eye(1, n)[0]
-    columns = [
-        lfilter(np.eye(1, len(section.b), i)[0], section.denominator, impulse)
-        for section in sections
-        for i in range(len(section.b))
-    ]
-    return np.column_stack(columns) if columns else np.empty((n, 0))
+    columns, i = np.zeros((n, sum(len(section.b) for section in sections))), 0
+    for section in sections:
+        slowest = float(np.abs(np.linalg.eigvals(section.A)).max())
+        # Numbers that underflow take many times as long
+        m = min(n, round(_UNDERFLOW / max(1.0 - slowest, 1.0 / n)))
+        response = lfilter([1.0], section.denominator, np.eye(1, m)[0])
+        for late in range(len(section.b)):
+            columns[late:m, i] = response[: m - late]
+            i += 1
+    return columns
