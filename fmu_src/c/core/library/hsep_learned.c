@@ -189,8 +189,8 @@ hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters,
 {
     hsep_residual_model *model = hsep_predictor_model(predictor);
     const hsep_int n_learned = hsep_residual_n_learned(model);
-    const hsep_learned_head head = {
-        HSEP_LEARNED_MAGIC, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
+    hsep_learned_head head = {{0}, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
+    memcpy(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic);
     size_t numbers = (size_t)head.n_learned + 1;
     for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
         numbers += 1 + (size_t)hsep_triangle(hsep_residual_n_features(model, i) + 1);
