@@ -258,6 +258,8 @@ _STEP = 5
 and of two masses, and five times the error, from pass to pass, at the reversals of a drive whose friction is most of
 it. In windows of 50 two steps leave twice the error of three on the stage's Y axis, warm."""
 
+_FIRST_STEPS = 4  # of the solver, for the first of several Newton steps: the next one goes on from where it ends
+
 _LENGTHS = (1.0, 0.3)  # lengths of a step that are tried, relative to the way to the minimum
 
 _LEAST_GAIN = 1e-9
@@ -306,21 +308,29 @@ class AveragedPlanner:
     ) -> PlannedPoint:
         """Return the plan behind Newton steps, as long as they lower the cost; parameters as of :meth:`step`."""
         n = max(1, n_pinned * self._basis.spacing // _STEP)
-        for reach in _REACHES[1:2] if n == 1 else _REACHES[:n]:
-            before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed, reach)
+        for i, reach in enumerate(_REACHES[1:2] if n == 1 else _REACHES[:n]):
+            tolerance = TOLERANCE._replace(steps=_FIRST_STEPS) if i == 0 and n > 1 else TOLERANCE
+            before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed, reach, tolerance)
             if start is before:
                 break
         return start
 
     def step(
-        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array, reach: float
+        self,
+        start: PlannedPoint,
+        previous_plan: Array,
+        bounds: Bounds,
+        n_pinned: int,
+        passed: Array,
+        reach: float,
+        tolerance: Tolerance = TOLERANCE,
     ) -> PlannedPoint:
         """Return the plan behind a Newton step; the start itself, if none is better.
 
         ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
         of the last plan, the decided ones first; they are feasible; ``n_pinned``: coefficients that the plan does not
         change; ``passed``: (preview, n_free): free splines filtered by ``G_pb``; ``reach``: of friction's slope, as
-        of :meth:`PlanModel.slope`.
+        of :meth:`PlanModel.slope`; ``tolerance``: of the solver.
         """
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         decided, at = np.split(start.coefficients, [N_DECIDED])
@@ -329,7 +339,7 @@ class AveragedPlanner:
         target = self._basis.weight * (self._x_d - start.x_h) + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
         cost = PlanCost.regular(P, v, n_pinned)
-        found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=TOLERANCE)
+        found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
         if found is None:
             return start
         ends = (np.concatenate((decided, at + length * (found.x - at))) for length in _LENGTHS)

@@ -186,10 +186,18 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
     self->spline = end;
 }
 
-/* Begin to solve a programme, of the physics model's plan or of the Newton step; return whether it has a plan. */
-static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Steps of the solver for a Newton step. */
+static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_int step)
+{
+    return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
+}
+
+/* Begin to solve a programme in so many steps, of the physics model's plan or of the Newton step; return whether it has
+ * a plan. */
+static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
 {
     hsep_tolerance tolerance = averaged_planner_tolerance;
+    tolerance.steps = steps;
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
 #endif
@@ -341,12 +349,13 @@ static hsep_real averaged_planner_left(
     }
     if (self->place == 0 && self->follows) {
         hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
-                           work->solve + (hsep_real)averaged_planner_tolerance.steps * parts +
-                           2.0 * HSEP_AVERAGED_TRIES * work->predict;
+                           work->solve + 2.0 * HSEP_AVERAGED_TRIES * work->predict;
         for (hsep_int j = pinned; j < self->n; j += HSEP_PHYSICS_ABREAST) {
             newton += hsep_linearised_work(linearised, task->model, j * spacing);
         }
-        left += (hsep_real)self->n_steps * newton;
+        for (hsep_int i = 0; i < self->n_steps; i++) {
+            left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
+        }
     }
     return left;
 }
@@ -398,7 +407,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         }
         if (self->planned) {
             AVERAGED_PLANNER_YIELD(5, work.solve);
-            self->planned = (hsep_int)averaged_planner_solve(self, task);
+            self->planned = (hsep_int)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
             while (self->solving) {
                 AVERAGED_PLANNER_YIELD(6, work.step);
                 self->solving = !hsep_planner_advance(planner);
@@ -435,7 +444,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 break;
             }
             AVERAGED_PLANNER_YIELD(11, work.solve);
-            if (!averaged_planner_solve(self, task)) {
+            if (!averaged_planner_solve(self, task, averaged_planner_steps(self, self->steps))) {
                 break;
             }
             while (self->solving) {
