@@ -75,6 +75,21 @@ static void averaged_planner_predict(
     }
 }
 
+/* Commands of a plan, and its first samples; and then half of all, or what is left. */
+static void averaged_planner_begin_to_predict(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+{
+    self->samples = 0;
+    averaged_planner_predict(self, task, c, (self->late + self->preview) / HSEP_AVERAGED_AT_FIRST, 0);
+}
+
+static void averaged_planner_predict_half(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+{
+    const hsep_int all = self->late + self->preview, left = all - self->samples;
+    averaged_planner_predict(self, task, c, left < all / 2 ? left : all / 2, 0);
+}
+
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
 static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
 {
@@ -452,23 +467,25 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 self->solving = !hsep_planner_advance(planner);
             }
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
-                self->samples = 0;
                 AVERAGED_PLANNER_YIELD(13, work.predict);
-                averaged_planner_predict(self, task, c, all / HSEP_AVERAGED_AT_FIRST, 0);
-                AVERAGED_PLANNER_YIELD(14, work.predict);
-                averaged_planner_predict(self, task, c, all - self->samples, 0);
+                averaged_planner_begin_to_predict(self, task, c);
+                while (self->samples < all) {
+                    AVERAGED_PLANNER_YIELD(14, 0.5 * work.predict);
+                    averaged_planner_predict_half(self, task, c);
+                }
                 averaged_planner_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
         self->left = averaged_planner_left(self, task, &work);
-        self->samples = 0;
         if (self->judges) {
             AVERAGED_PLANNER_YIELD(15, work.predict);
-            averaged_planner_predict(self, task, of_physics, all / HSEP_AVERAGED_AT_FIRST, 0);
-            AVERAGED_PLANNER_YIELD(16, work.predict);
-            averaged_planner_predict(self, task, of_physics, all - self->samples, 0);
+            averaged_planner_begin_to_predict(self, task, of_physics);
+            while (self->samples < all) {
+                AVERAGED_PLANNER_YIELD(16, 0.5 * work.predict);
+                averaged_planner_predict_half(self, task, of_physics);
+            }
             averaged_planner_compare(self, task);
         }
 

@@ -318,18 +318,18 @@ static int interior_residuals(
     return 0;
 }
 
-/* The first or the second half of the factor of P + A' W A; return whether there is none. Work, not rows, is halved. */
+/* A part of the factor of P + A' W A, 0 to 2; return whether there is none. Work, not rows, is divided. */
 static int interior_factor(
-    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[], int second)
+    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[],
+    hsep_int part)
 {
-    const hsep_int half = a->n / 6 / HSEP_CHOLESKY_PANEL * HSEP_CHOLESKY_PANEL;
-    if (second) {
-        return !hsep_cholesky_rows(a->factor, a->n, half, a->n, NULL);
+    const hsep_int panel = HSEP_CHOLESKY_PANEL, ends[] = {0, a->n / 12 / panel * panel, a->n / 4 / panel * panel, a->n};
+    if (part == 0) {
+        memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
+        slacks_weigh(&a->slacks);
+        hsep_splines_gram(splines, a->slacks.rows, self->first, a->factor, a->slacks.work);
     }
-    memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
-    slacks_weigh(&a->slacks);
-    hsep_splines_gram(splines, a->slacks.rows, self->first, a->factor, a->slacks.work);
-    return !hsep_cholesky_rows(a->factor, a->n, 0, half, NULL);
+    return !hsep_cholesky_rows(a->factor, a->n, ends[part], ends[part + 1], NULL);
 }
 
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
@@ -337,12 +337,12 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     const interior_arrays a = interior_open(self, splines);
     const hsep_int part = self->part;
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
-    if (part < 3) {
-        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part == 2);
+    if (part < 4) {
+        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part - 1);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    if (part == 3) {
+    if (part == 4) {
         const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
         slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
         return 0;

@@ -20,13 +20,13 @@ typedef struct {
     hsep_int steps;          /* at most */
 } hsep_tolerance;
 
-#define HSEP_INTERIOR_PARTS 5 /* of a step */
+#define HSEP_INTERIOR_PARTS 6 /* of a step */
 
 typedef struct {
     hsep_tolerance tolerance;
     hsep_int first;   /* the splines before it are fixed; x is (n - first,) */
     hsep_int steps;   /* begun for this plan */
-    hsep_int part;    /* of the last one that comes next: residuals, 1 and 2 the factor, predictor, corrector */
+    hsep_int part;    /* of the last one that comes next: residuals, 1 to 3 the factor, predictor, corrector */
     hsep_real mu;     /* m2, of its beginning */
     hsep_real cost;   /* m2, scale of the cost per bound */
     hsep_real rho;    /* 1/m2, proximal regularisation of the multipliers */
@@ -54,9 +54,9 @@ HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
     const hsep_tolerance *tolerance);
 
-/* Do a part of a step, its residuals, half of its factor, its predictor or its corrector; P as in hsep_interior_begin.
- * Returns whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and 2 n^2 after it, and
- * about 900 operations and 8 divisions a sample of the plan in all. */
+/* Do a part of a step: its residuals, a third of its factor, its predictor or its corrector. P: as in
+ * hsep_interior_begin. Returns whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and
+ * 2 n^2 after it, and about 900 operations and 8 divisions a sample of the plan in all. */
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif
