@@ -3,16 +3,17 @@
  * header | values, hsep_instance_n_values doubles | the model's state, of hsep_model_size
  *
  * Numbers are in the machine's own representation; a serialised block of another byte order is refused, as is one of
- * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a), and one of FMI 3.0 whose
+ * another FMU (GUID), another version, another length or with a single bit changed (CRC-32), and one of FMI 3.0 whose
  * windows have another Np.
  */
 #include "hsep_calls.h"
 
 #include "hsep_check.h"
+#include "hsep_crc.h"
 
 #include <string.h>
 
-#define SAVED_VERSION 32U /* changes whenever the layout of any state does */
+#define SAVED_VERSION 33U /* changes whenever the layout of any state does */
 #define SAVED_BYTE_ORDER 0x01020304U
 #define SAVED_MAGIC "HSEPFMI2"
 
@@ -187,23 +188,13 @@ HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, v
     return HSEP_OK;
 }
 
-/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991). */
-static uint64_t saved_hash(const void *bytes, size_t size)
-{
-    const unsigned char *byte = bytes;
-    uint64_t hash = UINT64_C(0xCBF29CE484222325);
-    for (size_t i = 0; i < size; i++) {
-        hash = (hash ^ byte[i]) * UINT64_C(0x100000001B3);
-    }
-    return hash;
-}
-
 /* The checksum of a block. */
 static uint64_t saved_checksum(const hsep_saved *saved)
 {
     saved_header header = saved->header;
     header.checksum = 0;
-    return saved_hash(&header, sizeof header) ^ saved_hash(saved->values, (size_t)header.size - sizeof header);
+    return ((uint64_t)hsep_crc(&header, sizeof header) << 32) +
+           hsep_crc(saved->values, (size_t)header.size - sizeof header);
 }
 
 HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size)
