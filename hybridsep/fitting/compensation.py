@@ -350,14 +350,13 @@ class Stretch:
         def error_of(settings: CompensatorSettings) -> ErrorSize:
             return ErrorSize.of(self.expected(settings, Np).compensated)
 
-        now, wanted, effects = error_of(own), own, {}
+        now, wanted, effects, advised = error_of(own), own, {}, {}
         for entry in _CHANGED[: 2 if own.change_max is None else 3]:
-            errors = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
-            if errors[2.0].rms < (1.0 - _GAIN) * now.rms:
+            name = DRIVE_LIMIT_ENTRIES[entry].name
+            effects[name] = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
+            if effects[name][2.0].rms < (1.0 - _GAIN) * now.rms:
                 wanted = _scaled(wanted, entry, 2.0)
-            effects[DRIVE_LIMIT_ENTRIES[entry].name] = errors
-        before, after = own.to_fmi(), wanted.to_fmi()
-        advised = {name: float(after[name]) for name in effects if after[name] != before[name]}
+                advised[name] = float(wanted.to_fmi()[name])
         advised_error = error_of(wanted) if advised else now
         gains = advised_error.rms < (1.0 - _GAIN) * now.rms
         return LimitCosts(effects, advised if gains else {}, advised_error)
