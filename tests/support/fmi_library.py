@@ -3,6 +3,7 @@
 import ctypes
 import math
 import struct
+import zlib
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_size_t, c_uint, c_void_p, create_string_buffer
 from pathlib import Path
@@ -302,11 +303,4 @@ def repair_checksum(block: bytearray) -> None:
         return
     place = slice(CHECKSUM_PLACE, CHECKSUM_PLACE + 8)
     block[place] = bytes(8)
-    block[place] = struct.pack("<Q", _fnv(block[:HEADER_SIZE]) ^ _fnv(block[HEADER_SIZE:]))
-
-
-def _fnv(content: bytes | bytearray) -> int:
-    result = 14695981039346656037
-    for byte in content:
-        result = (result ^ byte) * 1099511628211 & 0xFFFFFFFFFFFFFFFF
-    return result
+    block[place] = struct.pack("<2I", zlib.crc32(block[HEADER_SIZE:]), zlib.crc32(block[:HEADER_SIZE]))
