@@ -18,6 +18,8 @@ from typing import Any, ClassVar, TypeVar
 from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
+_SPLINES = 120  # largest length of a plan that goes on behind the preview, in spacings: its solver's work is their cube
+
 PLAN_END = 3  # samples without change at the end of a compensator's plan, so that the third difference is zero after it
 
 _SettingsType = TypeVar("_SettingsType", bound="Settings")
@@ -275,7 +277,7 @@ class CompensatorSettings(Settings):
     is compensated with at most half of ``change_max``.
     """
 
-    OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max", "horizon")
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max", "following_error_max")
 
     preview: int | None = whole(
@@ -314,16 +316,25 @@ class CompensatorSettings(Settings):
         *(1.0, 0.0, 1e4, "s", "time without a measurement after which the command's change fades; 0: never"),
         nonzero=1e-5,
     )
+    horizon: int | None = whole(
+        *(0, 0, 2000, "samples of a plan: behind the preview the command is taken to go on at its last velocity"),
+        unless_given=None,
+    )
 
     def window(self, look_ahead: int) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
 
-        It is a multiple of ``spacing``, and at least 20, or a quarter of a short preview: a controller plans in half of
+        It is a multiple of ``spacing``, and at least 20, or a third of a short preview: a controller plans in half of
         it, and 20 lags fit into it, with which what is learned serves a predictor with a longer window, too.
         """
-        preview, spacing = self.preview or look_ahead, self.spacing or max(1, round((self.preview or look_ahead) / 100))
+        preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead)
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
-        return spacing * min(most, math.ceil(max(min(20, preview / 4), preview / 10) / spacing))
+        return spacing * min(most, math.ceil(max(min(20, preview / 3), preview / 10) / spacing))
+
+    def _spacing(self, look_ahead: int) -> int:
+        """Return a hundredth of a plan, or a twentieth of a preview that is much shorter."""
+        preview = self.preview or look_ahead
+        return max(1, min(round(max(preview, look_ahead) / 100), preview // 20))
 
     def for_window(self, Np: int, look_ahead: int) -> "CompensatorSettings":
         """Return these settings for windows of ``Np`` samples, defaults filled in.
@@ -341,7 +352,9 @@ class CompensatorSettings(Settings):
         """
         spacing, preview = self.spacing, self.preview
         if spacing is None:
-            most = max(1, round((preview or look_ahead) / 100))
+            most = self._spacing(look_ahead)
+            if preview is not None:
+                most = max(1, min(most, (preview - Np - PLAN_END) // 4))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
         if preview is None:  # enough after a window that is longer than a tenth of it, too
             preview = max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END)
@@ -354,7 +367,10 @@ class CompensatorSettings(Settings):
             problems.append(f"preview must be ≥ Np + 4·spacing + {PLAN_END} = {least}, got {preview}")
         if problems:
             raise ParameterError("; ".join(problems))
-        return replace(self, spacing=spacing, preview=preview)
+        # Behind the window, and what the next one leaves as it is, a stop has to fit into the preview
+        fits = preview >= Np + Np // 2 + 5 * spacing + PLAN_END
+        horizon = min(look_ahead, _SPLINES * spacing) if self.horizon is None else self.horizon
+        return replace(self, spacing=spacing, preview=preview, horizon=max(preview, horizon if fits else 0))
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:

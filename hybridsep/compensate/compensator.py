@@ -9,7 +9,8 @@ samples only the splines that begin in the first window are applied, then the ne
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
 Every spline ends within its plan, so a plan returns to ``x_d`` at its end, where its error counts least, and its
 remainder keeps the limits. The next plan starts from that remainder: there is always a feasible plan, and where no
-other can be computed the remainder is followed.
+other can be computed the remainder is followed. Where the preview is shorter than the drive needs, plans go on behind
+it, and what is carried out of them has a stop within the limits (:mod:`~hybridsep.compensate.stop`).
 """
 
 from collections.abc import Sequence
@@ -31,6 +32,7 @@ from ..predict.predictor import HybridPredictor
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis
+from .stop import Stop
 
 RECOMMENDED = PredictorSettings(averaging=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
 """Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
@@ -63,7 +65,7 @@ class SepCompensator:
         without averaging.
     """
 
-    _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_delta_before", "_x_d_before")
+    _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
@@ -74,14 +76,16 @@ class SepCompensator:
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead)
         assert settings.preview is not None
         assert settings.spacing is not None
-        self.preview, self.spacing = settings.preview, settings.spacing
-        self._basis = SplineBasis(self.preview, self.spacing, Np)
+        assert settings.horizon is not None
+        self.preview, self.spacing, self.horizon = settings.preview, settings.spacing, settings.horizon
+        self._basis = SplineBasis(self.horizon, self.spacing, Np)
         bounds = self._bounds(settings)
         self._planning: Planning
         if predictor.settings.averaging:
             self._planning = AveragedPlanning(self._basis, bounds, settings, Np)
         else:
             self._planning = PaperPlanning(self._basis, bounds, settings, Np)
+        self._stop = self._stop_within(bounds)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
@@ -107,6 +111,7 @@ class SepCompensator:
         )
         # Coefficients of the remainder of the last plan; last values of δ and of x_d
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
+        self._last_stop = np.zeros(0 if self._stop is None else self._stop.n)
         self._delta_before = np.zeros(3)
         self._x_d_before = np.full(max(3, predictor.settings.n_late), np.nan)
         self._pending: PendingPlan | None = None
@@ -142,7 +147,9 @@ class SepCompensator:
         if changed != self.settings:
             self.settings = changed
             self.monitor.error_max = changed.following_error_max
-            self._planning.adopt(self._bounds(changed), changed)
+            bounds = self._bounds(changed)
+            self._planning.adopt(bounds, changed)
+            self._stop = self._stop_within(bounds)
 
     @property
     def T_s(self) -> float:
@@ -213,15 +220,22 @@ class SepCompensator:
             predictor.rest_at(float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        preview = Preview(command, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan)
+        more = np.arange(1, self.horizon - self.preview + 1)
+        path = np.concatenate((command, command[-1] + (command[-1] - command[-2]) * more))
+        loads = np.concatenate((loads, np.full(len(more), loads[-1])))
+        preview = Preview(path, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan)
         fades = self.monitor.is_tripped or self.monitor.is_lost
         compensate = SepState.OFF if fades else self.compensate
         chosen = self._planning.choose(predictor, preview, compensate)
-        delta = (self._basis.values @ chosen.coefficients)[:Np]
+        coefficients, stop = chosen.coefficients, self._last_stop
+        if self._stop is not None:
+            limits = self._planning.bounds.hard(command, self._x_d_before[-3:], self._delta_before)
+            coefficients, stop = self._stop.carried_out(coefficients, stop, *limits)
+        delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm + loads[:Np], path=command, scales=chosen.scales)
+        prediction = predictor.predict(x_dm + loads[:Np], path=path, scales=chosen.scales)
         now = command[:Np].copy()
-        self._pending = PendingPlan(chosen.coefficients, delta, now, chosen.state, chosen.runs_away)
+        self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, chosen.runs_away)
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
         return PublishedWindow(
@@ -256,6 +270,7 @@ class SepCompensator:
         self.monitor, monitor.n_taken = monitor, 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
+        self._last_stop = np.concatenate((pending.stop[kept:], np.repeat(pending.stop[-1:], kept)))
         self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
         self._x_d_before = x_d[-len(self._x_d_before) :]
         self._state_before = pending.state
@@ -266,6 +281,11 @@ class SepCompensator:
         return DriveBounds(
             self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
+
+    def _stop_within(self, bounds: DriveBounds) -> Stop | None:
+        if self.horizon <= self.preview:
+            return None
+        return Stop(self._basis, bounds, self.preview, self.predictor.Np, self._planning.n_pinned)
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
@@ -291,7 +311,9 @@ class SepCompensator:
             compensator = cls(predictor, CompensatorSettings.from_table(meta["settings"]))
             compensator.predictor = kept  # the constructor has restarted the other one
             nothing = np.zeros(compensator.predictor.Np)
-            pending = PendingPlan(compensator._previous_plan, nothing, nothing, SepState.OFF, False)
+            pending = PendingPlan(
+                compensator._previous_plan, nothing, nothing, compensator._last_stop, SepState.OFF, False
+            )
             like = compensator._saved(), pending if meta["is_planned"] else ()
             (*saved, compensator._planning.paused, compensator._planning.pause), found = restored(like, arrays)
             for name, value in zip(cls._SAVED, saved, strict=True):

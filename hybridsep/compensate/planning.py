@@ -33,6 +33,7 @@ class PendingPlan:
     # (Np,), m: change of the command, and commanded position
     delta: Array
     x_d: Array
+    stop: Array  # (n,), m: coefficients of its stop, where the plan is longer than the preview
     state: SepState  # model of the plan
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
 
@@ -41,7 +42,7 @@ class PendingPlan:
 class Preview:
     """Commands to plan, and what the plan goes on from."""
 
-    # (preview,), m: commanded positions, and what the drive's load adds to the command of its model
+    # (horizon,), m: commanded positions, and what the drive's load adds to the command of its model
     command: Array
     load: Array
     # (3,), m: last commanded positions before, and last changes of them
@@ -83,7 +84,7 @@ class Planning(ABC):
         assert settings.preview is not None
         assert settings.spacing is not None
         self.basis, self.bounds, self.settings = basis, bounds, settings
-        self.preview, self.spacing = settings.preview, settings.spacing
+        self.preview, self.spacing = basis.preview, settings.spacing
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (preview,): of the errors of a plan; without it all count alike

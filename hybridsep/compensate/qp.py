@@ -137,7 +137,7 @@ def _step_length(s: Array, ds: Array) -> float:
     return float(min(1.0, np.min(-s[shrinking] / ds[shrinking], initial=1.0)))
 
 
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 """Tolerance for rounding, as a share of a limit: bounds are tightened by it; rows that change by less do not bind."""
 
 _INTERIOR = 1e-10
@@ -168,7 +168,7 @@ class Bounds:
         """Return the largest feasible step length, 0 … 1, from feasible coefficients ``start`` towards ``c``."""
         here, step = self.rows @ start, self.rows @ (c - start)
         margin = np.where(step > 0, self.high - here, here - self.low)
-        beyond = np.abs(step) > np.maximum(margin, _ROUNDING)
+        beyond = np.abs(step) > np.maximum(margin, ROUNDING)
         return float(np.min(margin[beyond] / np.abs(step[beyond]), initial=1.0))
 
 
@@ -196,10 +196,22 @@ class DriveBounds:
             self._scales += list(enumerate(bounds, start=1))
         if change_max is not None:
             self._scales.append((0, change_max))
-        extended = np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values))
-        parts = [np.diff(extended, order, axis=0)[3 - order :] / bound for order, bound in self._scales]
-        self._all = np.concatenate(parts) if parts else np.zeros((0, basis.values.shape[1]))
+        self._all = self.rows_of(basis.values)
         self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
+
+    def rows_of(self, values: Array) -> Array:
+        """Return the rows of splines with such values, ``(n, m)``, in limits: ``(number of limits · n, m)``."""
+        extended = np.concatenate((np.zeros((3, values.shape[1])), values))
+        parts = [np.diff(extended, order, axis=0)[3 - order :] / bound for order, bound in self._scales]
+        return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
+
+    def shares(self, spacing: int) -> tuple[float, float, float]:
+        """Return the squares of what differences of coefficients, of orders 1 to 3, take of the limits, 1/m2."""
+        bounds = dict(self._scales)
+        if 1 not in bounds:
+            return 1.0, 1.0, 1.0
+        of = [1.0 / (float(spacing) ** order * bounds[order]) for order in (1, 2, 3)]
+        return of[0] * of[0], of[1] * of[1], of[2] * of[2]
 
     def bounds(
         self,
@@ -220,6 +232,19 @@ class DriveBounds:
         ``no_reversal`` forbids it: the plan's model follows the friction; ``change``: share of ``change_max`` that
         bounds ``|δ|``.
         """
+        low, high = self._hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
+        taken = self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
+        at_rest = self._free @ previous_plan[N_DECIDED:]
+        low, high = np.minimum(low - taken, at_rest - _INTERIOR), np.maximum(high - taken, at_rest + _INTERIOR)
+        return Bounds(rows=self._free, low=low, high=high)
+
+    def hard(self, x_d: Array, x_d_before: Array, delta_before: Array) -> tuple[Array, Array]:
+        """Return what the limits leave to the rows of any change, beginning with the decided coefficients'."""
+        return self._hard(x_d, x_d_before, delta_before, may_turn=True, change=1.0)
+
+    def _hard(
+        self, x_d: Array, x_d_before: Array, delta_before: Array, *, may_turn: bool, change: float
+    ) -> tuple[Array, Array]:
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
         command = np.concatenate((x_d_before, x_d))
         # Their sum would be rounded to what a position is, which is much coarser than a third difference of a change
@@ -228,9 +253,7 @@ class DriveBounds:
             for order, bound in self._scales
         ]
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
-        offset = offset + self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
-        at_rest = self._free @ previous_plan[N_DECIDED:]
-        most = np.repeat([(1.0 - _ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
+        most = np.repeat([(1.0 - ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
         own = np.concatenate((np.zeros(0), *(self._own(x_d, x_d_before, *scale) for scale in self._scales)))
         least, most = np.minimum(own, 0.0) - most, np.maximum(own, 0.0) + most
         if self._no_reversal and not may_turn:
@@ -239,8 +262,7 @@ class DriveBounds:
                 if order == 1:
                     least[i * n : (i + 1) * n][steps > _MOVES] = 0.0
                     most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
-        low, high = np.minimum(least - offset, at_rest - _INTERIOR), np.maximum(most - offset, at_rest + _INTERIOR)
-        return Bounds(rows=self._free, low=low, high=high)
+        return least - offset, most - offset
 
     def _own(self, x_d: Array, before: Array, order: int, bound: float) -> Array:
         """Return differences of ``x_d``, of an order ≥ 1, in limits, near those that exceed it; 0 elsewhere."""

@@ -75,6 +75,13 @@ class SplineBasis:
         # Differences over the plan; the three samples before it enter by `before`
         self.third: Array = np.diff(extended, 3, axis=0)
 
+    def shifted(self, preview: int) -> Array:
+        """Return all splines that act in a preview, which goes on behind it: a matrix ``(preview, 3 + n)``."""
+        width, spacing = 4 * self.spacing, self.spacing
+        spline = _padded(self._spline[:width], preview + width)
+        tails = [spline[i * spacing : preview + i * spacing] for i in (3, 2, 1)]
+        return np.column_stack((*tails, _shifts(spline[:preview], -(-preview // spacing), spacing)))
+
     def delta(self, coefficients: Array) -> Array:
         """Return the change of the command over the plan, ``(preview,)``, m."""
         return np.asarray(self.values @ coefficients)

@@ -369,8 +369,8 @@ class Stretch:
         for preview in sorted({*(one for one in sizes if least <= one <= len(self.x_d)), chosen, needed}):
             settings, Np = own, known.Np
             if preview != own.preview:
-                settings = replace(settings, preview=preview, spacing=None)
-                settings = settings.for_window(Np := settings.window(preview), preview)
+                settings = replace(settings, preview=preview, spacing=None, horizon=None)
+                settings = settings.for_window(Np := settings.window(needed), needed)
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             tried.append(Ahead(preview, rms(found.compensated), bound))

@@ -364,10 +364,10 @@ def fit(
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    if ahead is None:
-        ahead = model.look_ahead(T_s, default.input_hold)
+    needed = model.look_ahead(T_s, default.input_hold)
+    ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
-    most = CompensatorSettings().window(ahead)
+    most = CompensatorSettings(preview=ahead).window(needed)
     if look_ahead is not None and p and max(p) > most:
         raise ParameterError(
             f"p must be at most {most}, the samples in a window of a compensator that looks {look_ahead:g} s ahead, "
@@ -456,13 +456,15 @@ def _machine(
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
     if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
-        given = CompensatorSettings(preview=look_ahead)
-        given = given.for_window(Np := given.window(look_ahead), look_ahead)
+        given, needed = CompensatorSettings(preview=look_ahead), model.look_ahead(settings.T_s, settings.input_hold)
+        given = given.for_window(Np := given.window(needed), needed)
         assert given.spacing is not None
         if settings.p > Np:
             Np = -(-settings.p // given.spacing) * given.spacing
-            given = replace(given, preview=None).for_window(Np, look_ahead)
+            given = replace(given, preview=None, horizon=None).for_window(Np, look_ahead)
         numbers = {"Np": Np, "preview": given.preview, "spacing": given.spacing}
+        if given.horizon != given.preview:
+            numbers["horizon"] = given.horizon
         compensation["compensator"] = numbers
 
     def made(more: Mapping[str, Any]) -> Machine:

@@ -127,7 +127,7 @@ def test_all_problems_at_once() -> None:
 def test_a_preview_that_does_not_fit_the_window_is_refused(
     Np: int, preview: int, spacing: int, n_problems: int
 ) -> None:
-    settings = CompensatorSettings(preview=preview, spacing=spacing)
+    settings = CompensatorSettings(preview=preview, spacing=spacing, horizon=preview)
     predictor = HybridPredictor(
         ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False, Np=Np, p=1, q=0)
     )
@@ -137,6 +137,18 @@ def test_a_preview_that_does_not_fit_the_window_is_refused(
     with pytest.raises(ParameterError) as caught:
         SepCompensator(predictor, settings)
     assert len(str(caught.value).split("; ")) == n_problems
+
+
+@pytest.mark.parametrize(("Np", "preview", "spacing", "given", "horizon"), [
+    (20, 60, None, None, 240), (20, 60, 2, None, 240), (20, 60, 2, 100, 100), (20, 60, 2, 0, 60), (20, 42, 2, None, 42),
+    (20, 43, 2, None, 240), (20, 400, None, None, 400), (20, None, None, None, 345),
+])  # fmt: skip
+def test_a_plan_goes_on_behind_a_preview_that_is_shorter_than_the_drive_needs(
+    Np: int, preview: int | None, spacing: int | None, given: int | None, horizon: int
+) -> None:
+    # at most 120 spacings, and only where a stop fits into the preview: 20 + 10 + 5·2 + 3 = 43
+    settings = CompensatorSettings(preview=preview, spacing=spacing, horizon=given).for_window(Np, 345)
+    assert settings.horizon == horizon
 
 
 @pytest.mark.parametrize(
@@ -183,7 +195,9 @@ def test_every_error_is_of_this_library() -> None:
 def test_settings_and_an_fmus_values_are_the_same() -> None:
     predictor = PredictorSettings(averaging=False, Np=60, p=7, q=2, lam=1e-9, T_s=2e-3, t_init=0.0, input_hold="foh")
     limits = Limits(0.2, 3.0, 40.0)
-    compensator = CompensatorSettings(preview=90, spacing=3, limits=limits, no_reversal=False, compensate="physics")
+    compensator = CompensatorSettings(
+        preview=90, spacing=3, limits=limits, no_reversal=False, compensate="physics", horizon=120
+    )
     values = {**predictor.to_fmi(), **compensator.to_fmi()}
     assert values.keys() == {*PredictorSettings.fmi_parameters(), *CompensatorSettings.fmi_parameters()}
     assert (values["input_hold"], values["compensate"], values["v_max"]) == (1, 1, 0.2)

@@ -54,8 +54,10 @@ def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) ->
     compensator = SepCompensator(machine.new_predictor(machine.compensator_predictor), settings)
     run = cosimulate(compensator, StageDrive(SERVO, f=0.0, kappa=0.0, T_s=T_S), MOVES)
     left = {one.preview: one.left for one in found.tried}
-    assert left[100] == pytest.approx(rms(run.error), rel=0.02)
-    assert left[25] > 0.7 * found.off
+    # of 0.2 % that plans beyond the preview leave; windows begin at other samples of the moves in the loop
+    assert left[100] == pytest.approx(rms(run.error), rel=0.05)
+    assert left[100] < 0.01 * found.off
+    assert left[25] > 0.2 * found.off
     assert left[400] < 0.02 * found.off
 
 

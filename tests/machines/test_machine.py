@@ -149,7 +149,8 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
         paper = {"averaging": False, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
-        assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=change_max)
+        expected = CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=change_max, horizon=200)
+        assert compensator.settings == expected
         assert machine.new_predictor().Np == 100
 
 
@@ -158,7 +159,8 @@ COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk
 
 
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
-    expected = CompensatorSettings(limits=Limits(0.2, 8.0, 900.0), change_max=1e-3, preview=PREVIEW, spacing=2).to_fmi()
+    limits = Limits(0.2, 8.0, 900.0)
+    expected = CompensatorSettings(limits=limits, change_max=1e-3, preview=PREVIEW, spacing=2, horizon=PREVIEW).to_fmi()
     expected |= {**PredictorSettings(Np=20, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
     assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
@@ -168,7 +170,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     given |= {"no_reversal": False}
     found = machine.fmi_compensator_parameters()
     assert {name: found[name] for name in given} == given
-    changes = replace(machine.compensator_settings, preview=90, change_max=None, compensate="physics")
+    changes = replace(machine.compensator_settings, preview=90, horizon=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
     settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1)
     assert compensator.predictor.settings == settings
@@ -201,7 +203,7 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
     [
         ("", (PREVIEW, 2, 20, 20)),
         ("preview = 300", (300, 3, 30, 20)),
-        ("preview = 60", (60, 1, 15, 15)),
+        ("preview = 60", (60, 2, 20, 20)),
         ("preview = 8", (8, 1, 1, 1)),
         ("Np = 50", (PREVIEW, 2, 50, 20)),
         ("Np = 1900\nspacing = 20", (2000, 20, 1900, 20)),

@@ -34,6 +34,10 @@ BEST = PAPER | {"Np": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
 """The paper's model, and the settings of a compensator that are best for it."""
 
 
+LONGER: dict[str, Value] = {"Np": 20, "p": 10, "preview": 60, "horizon": 200}
+"""Plans longer than the preview."""
+
+
 def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], tolerance: float, **how: Any) -> Loop:
     """Replay a closed loop of the library, whose outputs must be the same, and return it."""
     loop, stream = closed_loop(new_stream.model, n, values, **how), new_stream()
@@ -183,6 +187,10 @@ def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_strea
         {"measurement_delay": 250, "p": 10},  # and than a plan
         {"measurement_delay": 12, "Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77},
         {"measurement_delay": 3, "Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0},
+        LONGER,
+        LONGER | TIGHT,  # few plans have a stop
+        LONGER | {"measurement_delay": 5, "compensate": 1},
+        LONGER | PAPER | TIGHT | {"Np": 20, "p": 10},
     ],
     ids=named,
 )

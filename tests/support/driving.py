@@ -19,7 +19,7 @@ T_S = 1e-3  # s
 
 SHORT: dict[str, dict[str, Value]] = {
     PREDICTOR: {"Np": 20, "p": 6, "q": 2, "t_init": 0.05},
-    COMPENSATOR: {"Np": 20, "p": 6, "q": 2, "t_init": 0.05, "preview": 60},
+    COMPENSATOR: {"Np": 20, "p": 6, "q": 2, "t_init": 0.05, "preview": 60, "horizon": 0},
 }
 """Windows short enough for many of them."""
 

@@ -351,6 +351,7 @@ static hsep_real averaged_planner_left(
     const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
+    left += hsep_planner_carrying(task->planner);
     if (self->judges) {
         left += 2.0 * work->predict; /* of the physics model's plan */
     }
@@ -487,6 +488,12 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 averaged_planner_predict_half(self, task, of_physics);
             }
             averaged_planner_compare(self, task);
+        }
+
+        /* What of it may be carried out */
+        if (hsep_planner_carrying(planner) > 0.0) {
+            AVERAGED_PLANNER_YIELD(19, hsep_planner_carrying(planner));
+            hsep_planner_carry_out(planner, task->x_d);
         }
 
         /* The window under the plan, and its variances */

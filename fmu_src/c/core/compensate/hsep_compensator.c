@@ -11,17 +11,17 @@ static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_real preview = (hsep_real)predictor->preview;
+    const hsep_real preview = (hsep_real)predictor->preview, horizon = (hsep_real)predictor->horizon;
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
     self->loads = hsep_take(&end, preview);
-    self->load = hsep_take(&end, preview);
-    self->trial_x = hsep_take(&end, preview + (hsep_real)predictor->settings.q);
-    self->trial_e = hsep_take(&end, preview + (hsep_real)predictor->settings.p);
-    self->target = hsep_take(&end, preview);
-    self->spline_pb = hsep_take(&end, preview);
+    self->load = hsep_take(&end, horizon);
+    self->trial_x = hsep_take(&end, horizon + (hsep_real)predictor->settings.q);
+    self->trial_e = hsep_take(&end, horizon + (hsep_real)predictor->settings.p);
+    self->target = hsep_take(&end, horizon);
+    self->spline_pb = hsep_take(&end, horizon);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
@@ -58,13 +58,19 @@ HSEP_API void hsep_compensator_block_init(
     memcpy(
         spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
         (size_t)width * sizeof(hsep_real));
-    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
+    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
     if (self->averaged) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
         hsep_averaged_planner_init(
             hsep_compensator_averaged(self), &model, &parameters->planner, start, hsep_compensator_planner(self),
             spline);
     }
+}
+
+/* Samples of a plan. */
+static hsep_int compensator_horizon(const hsep_compensator *self)
+{
+    return hsep_planner_splines((const hsep_planner *)hsep_at_const(self, self->planner))->preview;
 }
 
 static hsep_averaged_task compensator_task(hsep_compensator *self)
@@ -87,47 +93,47 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
-    const hsep_int preview = predictor->preview, Np = predictor->Np;
+    const hsep_int horizon = compensator_horizon(self), Np = predictor->Np;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *c = hsep_at_const(planner, planner->c);
     const hsep_real *load = hsep_at(self, self->load);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
-    for (hsep_int k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < horizon; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
         const hsep_real command = x_d[k] - predictor->start + decided + load[k];
-        hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
-        target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
+        hsep_physics_forced_response(trial, &command, &x[horizon - 1 - k], 1);
+        target[k] = x_d[k] - predictor->start - x[horizon - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
         const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 1);
-        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
-        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
-        hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-        for (hsep_int k = 0; k < preview; k++) {
-            target[k] -= e[preview - 1 - k];
+        memcpy(x + horizon, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
+        memcpy(e + horizon, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
+        hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
+        for (hsep_int k = 0; k < horizon; k++) {
+            target[k] -= e[horizon - 1 - k];
         }
     }
 }
 
-/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (horizon,), in place of a
  * trial. */
 static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
-    const hsep_int preview = predictor->preview;
+    const hsep_int horizon = compensator_horizon(self);
     const hsep_real *spline_pb = hsep_at(self, self->spline_pb);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    for (hsep_int k = 0; k < preview; k++) {
-        x[preview - 1 - k] = spline_pb[k];
+    for (hsep_int k = 0; k < horizon; k++) {
+        x[horizon - 1 - k] = spline_pb[k];
     }
-    memset(x + preview, 0, (size_t)recursion.q * sizeof(hsep_real));
-    memset(e + preview, 0, (size_t)recursion.p * sizeof(hsep_real));
-    hsep_recursion_run(&recursion, x, e, preview, 0, preview);
-    for (hsep_int k = 0; k < preview; k++) {
-        x[k] = spline_pb[k] + e[preview - 1 - k];
+    memset(x + horizon, 0, (size_t)recursion.q * sizeof(hsep_real));
+    memset(e + horizon, 0, (size_t)recursion.p * sizeof(hsep_real));
+    hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
+    for (hsep_int k = 0; k < horizon; k++) {
+        x[k] = spline_pb[k] + e[horizon - 1 - k];
     }
     return x;
 }
@@ -208,6 +214,9 @@ static void compensator_solve(hsep_compensator *self)
         const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         for (hsep_int part = 0; !done && part < due; part++) {
             done = hsep_planner_advance(hsep_compensator_planner(self));
+        }
+        if (done) {
+            hsep_planner_carry_out(hsep_compensator_planner(self), hsep_at_const(predictor, predictor->x_d));
         }
     }
     if (done) {
@@ -295,10 +304,18 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_predictor_begin(predictor);
+    hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    const hsep_int last = predictor->preview - 1;
+    for (hsep_int k = predictor->preview; k < compensator_horizon(self); k++) { /* it goes on at its last velocity */
+        x_d[k] = x_d[last] + (x_d[last] - x_d[last - 1]) * (hsep_real)(k - last);
+    }
     if (self->averaged) {
         compensator_plan_averaged(self);
     }
     const int solving = self->averaged || compensator_plan(self);
+    if (!solving) {
+        hsep_planner_carry_out(planner, x_d);
+    }
     compensator_publish(self, solving ? compensator_pinned(self) : predictor->Np);
     if (predictor->n_published < predictor->Np) {
         compensator_solve(self);
@@ -341,6 +358,9 @@ static void compensator_begin_loads(hsep_compensator *self)
     hsep_real *load = hsep_at(self, self->load);
     memcpy(load, loads + oldest, (size_t)newest * sizeof(hsep_real));
     memcpy(load + newest, loads, (size_t)oldest * sizeof(hsep_real));
+    for (hsep_int k = predictor->preview; k < compensator_horizon(self); k++) {
+        load[k] = load[k - 1];
+    }
 }
 
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)

@@ -33,7 +33,7 @@
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
-    hsep_planner_parameters planner;     /* Np and preview as the predictor's */
+    hsep_planner_parameters planner;     /* Np, preview and horizon as the predictor's */
     hsep_sep_state compensate;
     hsep_int n_lost;     /* samples without a measurement after which the change fades; 0: never */
     hsep_real error_max; /* m, largest following error; 0: none */
@@ -59,12 +59,12 @@ struct hsep_compensator {
     /* Offsets in words from the beginning of the struct */
     hsep_int x_dm;      /* (Np,) m, the window: modified commands */
     hsep_int loads;     /* (preview,) m, ring of the loads that came last, */
-    hsep_int load;      /* (preview,) m, and those of the window and of what follows it: the drive moves as by so much
+    hsep_int load;      /* (horizon,) m, and those of the window and of what follows it: the drive moves as by so much
                            more command */
-    hsep_int trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
-    hsep_int trial_e;   /* (preview + p,) m, its residuals */
-    hsep_int target;    /* (preview,) m */
-    hsep_int spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
+    hsep_int trial_x;   /* (horizon + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
+    hsep_int trial_e;   /* (horizon + p,) m, its residuals */
+    hsep_int target;    /* (horizon,) m */
+    hsep_int spline_pb; /* (horizon,) m/m, a spline filtered by the physics model */
     hsep_int trial;     /* the physics model of a trial */
     hsep_int planner, predictor;
     hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */

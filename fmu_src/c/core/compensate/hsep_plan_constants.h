@@ -40,6 +40,12 @@
 #define HSEP_PLANNING_FASTER 1.25
 #define HSEP_PLANNING_UNPROVEN 0.5
 #define HSEP_PLANNING_PINNED_AVERAGED 24
+
+/* hybridsep/compensate/stop.py */
+#define HSEP_STOP_TRIES 8
+#define HSEP_STOP_SHORTER 0.8
+#define HSEP_STOP_FADE 10.0
+#define HSEP_STOP_STILL 1e-12
 /* clang-format on */
 
 #endif

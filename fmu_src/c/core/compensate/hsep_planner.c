@@ -15,6 +15,12 @@ HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameter
     return (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
 }
 
+/* Splines that are carried out before the next plan: those of a window, and what that plan leaves as it is. */
+static hsep_int planner_shared(const hsep_planner_parameters *parameters)
+{
+    return parameters->Np / parameters->spacing + hsep_planner_n_pinned(parameters);
+}
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
 {
@@ -34,6 +40,10 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     self->factor = hsep_take(&end, hsep_triangle(n));
     self->splines = hsep_take_block(&end, hsep_splines_size(parameters->preview, parameters->spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
+    self->stop =
+        parameters->known < parameters->preview
+            ? hsep_take_block(&end, hsep_stop_size(parameters->known, parameters->spacing, planner_shared(parameters)))
+            : 0;
     return end * sizeof(hsep_real);
 }
 
@@ -52,43 +62,16 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     }
     hsep_splines_init(
         (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
+    if (self->stop > 0) {
+        hsep_stop_init(
+            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), parameters->known,
+            planner_shared(parameters));
+    }
 }
 
 HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
 {
     return self->n_pinned * hsep_planner_splines(self)->spacing;
-}
-
-/* Rows of x_d, in shares, where one within the length of a spline exceeds its limit; 0 elsewhere. */
-static void planner_own(hsep_planner *self, const hsep_real x_d[])
-{
-    const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int preview = splines->preview, near = 4 * splines->spacing;
-    hsep_real *own = hsep_at(self, self->own), now[HSEP_ORDERS] = {0.0};
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(now, self->x_d_before[i]);
-    }
-    for (hsep_int k = 0; k < preview; k++) {
-        hsep_differ(now, x_d[k]);
-        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            own[order * preview + k] = now[order] * splines->share[order];
-        }
-    }
-    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-        hsep_real *row = own + order * preview;
-        hsep_int done = 0;
-        for (hsep_int k = 0; k < preview; k++) {
-            if (hsep_fabs(row[k]) > HSEP_QP_EXCEEDED) {
-                for (; done + near < k; done++) {
-                    row[done] = 0.0;
-                }
-                done = k + near + 1;
-            }
-        }
-        for (; done < preview; done++) {
-            row[done] = 0.0;
-        }
-    }
 }
 
 HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
@@ -98,7 +81,7 @@ HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
     hsep_real path[HSEP_ORDERS] = {0.0}, change[HSEP_ORDERS] = {0.0};
-    planner_own(self, x_d);
+    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, hsep_at(self, self->own));
     for (int i = 0; i < 3; i++) {
         hsep_differ(path, self->x_d_before[i]);
         hsep_differ(change, self->delta_before[i]);
@@ -393,6 +376,21 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     return 1;
 }
 
+HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
+{
+    const hsep_stop *stop = (const hsep_stop *)hsep_at_const(self, self->stop);
+    return self->stop > 0 ? HSEP_STOP_WORK * (hsep_real)stop->preview : 0.0;
+}
+
+HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
+{
+    if (self->stop > 0) {
+        const hsep_stop_task task = {.x_d = x_d, .x_d_before = self->x_d_before, .delta_before = self->delta_before};
+        hsep_stop_carry_out(
+            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), &task, hsep_at(self, self->c));
+    }
+}
+
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
@@ -408,5 +406,8 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
     const hsep_int kept = self->Np / splines->spacing, n = HSEP_N_DECIDED + splines->n;
     for (hsep_int i = 0; i < n; i++) {
         c[i] = i + kept < n ? c[i + kept] : 0.0;
+    }
+    if (self->stop > 0) {
+        hsep_stop_next((hsep_stop *)hsep_at(self, self->stop), kept);
     }
 }

@@ -16,10 +16,12 @@
 #include "hsep_layout.h"
 #include "hsep_real.h"
 #include "hsep_splines.h"
+#include "hsep_stop.h"
 
 typedef struct {
     hsep_int Np;                  /* samples of a window */
     hsep_int preview;             /* samples of a plan, at least Np + 4 spacing + 3 */
+    hsep_int known;               /* samples of it whose commands are known; behind them x_d goes on as it may not */
     hsep_int spacing;             /* samples between knots, a divisor of Np */
     hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
@@ -43,9 +45,10 @@ typedef struct {
     hsep_int P;      /* triangle of n rows */
     hsep_int factor; /* triangle of n rows */
     hsep_int splines, interior;
+    hsep_int stop; /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 20);
+HSEP_ASSERT_WORDS(hsep_planner, 21);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -122,6 +125,13 @@ HSEP_API int hsep_planner_advance(hsep_planner *self);
  * at the bound of the change. */
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
+
+/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known (hsep_stop.h). x_d: as for
+ * hsep_planner_open. */
+HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
+
+/* What that costs, in multiply-adds; 0 where plans end with what is known. */
+HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);

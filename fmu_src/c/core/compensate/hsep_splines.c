@@ -1,5 +1,6 @@
 #include "hsep_splines.h"
 
+#include "hsep_math.h"
 #include "hsep_vector.h"
 
 #include <string.h>
@@ -117,6 +118,37 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
         const hsep_real share = self->share[order];
         for (hsep_int k = 0; k < preview; k++) {
             row[k] *= share;
+        }
+    }
+}
+
+HSEP_API void hsep_splines_exceeded(
+    const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[])
+{
+    const hsep_int near = 4 * self->spacing;
+    hsep_real now[HSEP_ORDERS] = {0.0};
+    for (int i = 0; i < 3; i++) {
+        hsep_differ(now, before[i]);
+    }
+    for (hsep_int k = 0; k < count; k++) {
+        hsep_differ(now, x_d[k]);
+        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+            rows[order * count + k] = now[order] * self->share[order];
+        }
+    }
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        hsep_real *row = rows + order * count;
+        hsep_int done = 0;
+        for (hsep_int k = 0; k < count; k++) {
+            if (hsep_fabs(row[k]) > HSEP_QP_EXCEEDED) {
+                for (; done + near < k; done++) {
+                    row[done] = 0.0;
+                }
+                done = k + near + 1;
+            }
+        }
+        for (; done < count; done++) {
+            row[done] = 0.0;
         }
     }
 }

@@ -57,6 +57,11 @@ HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
 HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[]);
 
+/* Rows of orders 1 to 3 of x_d, (count,) m, where one within the length of a spline exceeds its limit, 0 elsewhere; 4
+ * count rows. before: (3,) m, the commands before it. */
+HSEP_API void hsep_splines_exceeded(
+    const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[]);
+
 /* g, (n - first,), += A' rows: the transpose of hsep_splines_rows, whose matrix is A. The rows are
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);

@@ -94,6 +94,7 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
         .settings = *settings,
         .averaging = parameters->averaging,
         .preview = settings->Np,
+        .horizon = settings->Np,
         /* The warm-up counts from the end of the first fill. */
         .n_init = (hsep_real)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
         .planned = 0,
@@ -106,7 +107,12 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     const hsep_compensator_settings *settings = &parameters->compensator;
     const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
     hsep_compensator_parameters derived = {.predictor = hsep_predictor_derive(parameters)};
+    const hsep_int Np = parameters->predictor.Np;
+    /* Behind the window, and what the next one leaves as it is, a stop has to fit into the preview. */
+    const int fits = settings->preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
+    const hsep_int horizon = fits && settings->horizon > settings->preview ? settings->horizon : settings->preview;
     derived.predictor.preview = settings->preview;
+    derived.predictor.horizon = horizon;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
     derived.predictor.n_init =
@@ -114,7 +120,8 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     derived.predictor.planned = 1;
     derived.planner = (hsep_planner_parameters){
         .Np = parameters->predictor.Np,
-        .preview = settings->preview,
+        .preview = horizon,
+        .known = settings->preview,
         .spacing = settings->spacing,
         .jerk_weight = settings->jerk_weight,
         .limit =

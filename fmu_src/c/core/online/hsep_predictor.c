@@ -12,7 +12,7 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .averaging = &parameters->averaging,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .n = parameters->preview + hsep_late(&parameters->settings),
+        .n = parameters->horizon + hsep_late(&parameters->settings),
         .planned = parameters->planned};
 }
 
@@ -26,6 +26,7 @@ static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
+    const hsep_real horizon = (hsep_real)parameters->horizon;
     const hsep_real late = (hsep_real)hsep_late(&parameters->settings), n = Np + late;
     const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
     hsep_real end = HSEP_WORDS(hsep_predictor);
@@ -39,7 +40,7 @@ static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_pa
     self->q = parameters->settings.q;
     self->n_init = parameters->n_init;
     self->ahead = hsep_take(&end, preview);
-    self->x_d = predictor_take(&end, late, preview);
+    self->x_d = predictor_take(&end, late, horizon);
     self->x_pb = predictor_take(&end, late, Np);
     self->x_h = predictor_take(&end, late, Np);
     self->x_hold = predictor_take(&end, late, Np);

@@ -37,7 +37,8 @@
 typedef struct {
     hsep_predictor_settings settings;
     hsep_averaging_settings averaging;
-    hsep_int preview;       /* samples from r(k) to the drive, which are predicted, >= Np; Np alone */
+    hsep_int preview;       /* samples from r(k) to the drive, >= Np; Np alone */
+    hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; Np alone */
     hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
     hsep_int n_modes;       /* >= 1 */
@@ -62,7 +63,7 @@ struct hsep_predictor {
     hsep_int divergence; /* hsep_divergence of the first window that diverged; latched */
     /* Offsets in words from the beginning of the struct */
     hsep_int ahead;    /* (preview,) m, ring of the commands that came last */
-    hsep_int x_d;      /* (preview,) m, commands of the window and what follows it */
+    hsep_int x_d;      /* (horizon,) m, commands of the window and what follows it; a compensator extends them */
     hsep_int x_pb;     /* (Np,) m, the window: physics-based predictions, */
     hsep_int x_h;      /* (Np,) m, hybrid predictions, */
     hsep_int x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
