@@ -12,6 +12,7 @@ the rival is a finite impulse response with friction's sign, fitted to the same 
 import argparse
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -122,11 +123,12 @@ def part() -> Array:
     return np.asarray(np.radians(np.concatenate(pieces)))
 
 
-def fitted(Np: int, duration: float) -> tuple[Machine, HybridPredictor, FirInverse]:
+def fitted(Np: int, duration: float, look_ahead: float | None = None) -> tuple[Machine, HybridPredictor, FirInverse]:
     """Return what ``hybridsep.fit`` makes of a log of the program, and the rival."""
     x_d = program(0, duration)
     x = np.array([shown(0, one) for one in simulate(BeltAxis(), x_d, T_S).tolist()])
-    found = fit(x_d, x, T_s=T_S, unit="rad", Np=Np, name="belt", v_max=V_MAX, a_max=A_MAX, j_max=J_MAX)
+    how: dict[str, Any] = {"v_max": V_MAX, "a_max": A_MAX, "j_max": J_MAX, "look_ahead": look_ahead}
+    found = fit(x_d, x, T_s=T_S, unit="rad", Np=Np, name="belt", **how)
     rival = FirInverse.fitted([(x_d, x)], Np)
     assert rival is not None
     return found.machine, found.predictor(), rival
@@ -137,8 +139,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--Np", type=int, default=60, help="samples of the look-ahead")
     parser.add_argument("--log", type=float, default=60.0, metavar="S", help="duration of the log that fit gets")
+    parser.add_argument("--look-ahead", type=float, metavar="S", help="that the compensator has, too")
     options = parser.parse_args(arguments)
-    machine, trained, rival = fitted(options.Np, options.log)
+    machine, trained, rival = fitted(options.Np, options.log, options.look_ahead)
     r = program(1, 20.0)
 
     def run(compensate: str, predictor: HybridPredictor | None = None) -> Array:
