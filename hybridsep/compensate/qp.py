@@ -206,12 +206,12 @@ class DriveBounds:
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
 
     def shares(self, spacing: int) -> tuple[float, float, float]:
-        """Return the squares of what differences of coefficients, of orders 1 to 3, take of the limits, 1/m2."""
+        """Return what differences of coefficients, of orders 1 to 3, take of the limits, 1/m."""
         bounds = dict(self._scales)
         if 1 not in bounds:
             return 1.0, 1.0, 1.0
-        of = [1.0 / (float(spacing) ** order * bounds[order]) for order in (1, 2, 3)]
-        return of[0] * of[0], of[1] * of[1], of[2] * of[2]
+        one, two, three = (1.0 / (float(spacing) ** order * bounds[order]) for order in (1, 2, 3))
+        return one, two, three
 
     def bounds(
         self,

@@ -37,49 +37,15 @@ class Stop:
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, preview: int, Np: int, n_pinned: int) -> None:
         self.preview, self.spacing, self._horizon = preview, basis.spacing, basis.preview
         self.n_shared = Np // basis.spacing + n_pinned
-        self._n_free = (preview - PLAN_END) // basis.spacing - 2  # from there on all coefficients are alike
         self.rows = bounds.rows_of(basis.shifted(preview))
-        self._gains = self._optimal(bounds.shares(basis.spacing))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
-
-    def _optimal(self, weights: tuple[float, float, float]) -> list[tuple[float, float]]:
-        """Return the gains with which the first two differences of coefficients make the next one.
-
-        They minimise the sum of squares of the differences of orders 1 to 3, in limits, by a backward Riccati
-        recursion (R. E. Kalman, Bol. Soc. Mat. Mex. 5 (1960)) from a change that is constant.
-        """
-        one, two, three = weights
-        p11, p12, p22 = two + 2.0 * three, three, three  # of the first difference behind the last spline: it is 0
-        gains = []
-        for _ in range(self._n_free - self.n_shared):
-            both = p12 + p22
-            total = one + two + three + p11 + p12 + both
-            g1, g2 = (two + three + both) / total, three / total
-            gains.append((g1, g2))
-            # The cost of differences x, y before: u = g1 x + g2 y, then u − x, then u − x − y
-            h1 = g1 - 1.0
-            p11, p12, p22 = (
-                one * g1 * g1 + (two + three) * h1 * h1 + p11 * g1 * g1 + 2.0 * p12 * g1 * h1 + p22 * h1 * h1,
-                one * g1 * g2
-                + two * h1 * g2
-                + three * h1 * (g2 - 1.0)
-                + p11 * g1 * g2
-                + p12 * (g1 * g2 + h1 * g2)
-                + p22 * h1 * g2,
-                one * g2 * g2 + two * g2 * g2 + three * (g2 - 1.0) ** 2 + (p11 + 2.0 * p12 + p22) * g2 * g2,
-            )
-        return gains[::-1]
-
-    def _stopping(self, shared: Array) -> Array:
-        """Return the coefficients of a stop behind decided and shared ones, m."""
-        c = [*shared.tolist()]
-        first = c[-1] - c[-2]
-        second = first - (c[-2] - c[-3])
-        for g1, g2 in self._gains:
-            first, before = g1 * first + g2 * second, first
-            second = first - before
-            c.append(c[-1] + first)
-        return np.array(c + [c[-1]] * (self.n - len(c)))
+        shared, last = N_DECIDED + self.n_shared, N_DECIDED + (preview - PLAN_END) // basis.spacing - 2
+        held = np.eye(last)[np.minimum(np.arange(self.n + 3), last - 1)]  # from the last one on all are alike
+        # The least sum of squares of the differences of orders 1 to 3, in limits, behind what is shared
+        weights = enumerate(bounds.shares(basis.spacing), start=1)
+        least = np.concatenate([share * np.diff(held, order, axis=0)[shared - order :] for order, share in weights])
+        tail = -np.linalg.lstsq(least[:, shared:], least[:, :shared], rcond=None)[0]
+        self._stopping: Array = held[: self.n] @ np.concatenate((np.eye(shared), tail))
 
     def carried_out(self, plan: Array, old: Array, low: Array, high: Array) -> tuple[Array, Array]:
         """Return what of a plan may be carried out, and its stop: coefficients, m, the decided ones first.
@@ -88,8 +54,8 @@ class Stop:
         over the known preview.
         """
         n = N_DECIDED + self.n_shared
-        now = self._stopping(plan[:n])
-        of_old, own = self.rows @ old, self.rows @ (old - self._stopping(old[:n]))
+        now = self._stopping @ plan[:n]
+        of_old, own = self.rows @ old, self.rows @ (old - self._stopping @ old[:n])
         low, high = np.minimum(low, of_old) - ROUNDING, np.maximum(high, of_old) + ROUNDING
         start, way = of_old - own, self.rows @ now - (of_old - own)
         length = 1.0
@@ -101,7 +67,7 @@ class Stop:
         else:
             length, share = 0.0, 1.0
         shared = old[:n] + length * (plan[:n] - old[:n])
-        stop = self._stopping(shared) + share * (old - self._stopping(old[:n]))
+        stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
         return (plan if length == 1.0 else self._fading(shared, len(plan))), stop
 
     def _fading(self, shared: Array, n: int) -> Array:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hybridsep.base.settings import Limits
+from hybridsep.base.signals import Array
 from hybridsep.compensate.qp import DriveBounds
 from hybridsep.compensate.splines import N_DECIDED, SplineBasis
 from hybridsep.compensate.stop import Stop
@@ -28,17 +29,19 @@ def test_a_stop_takes_the_least_of_the_limits(limits: Limits | None) -> None:
     _, found = stop.carried_out(plan, np.zeros(stop.n), *bounds.hard(np.zeros(PREVIEW), REST, REST))
     if limits is not None:  # the plan may be too fast, and is shortened
         shared = found[:n]
-    # Squares of the differences, in limits, of what follows the shared coefficients and then is constant
-    free = np.zeros((len(found) + 3, last - n))
-    free[n:last] = np.eye(last - n)
-    free[last:] = free[last - 1]
-    fixed = np.concatenate((shared, np.zeros(len(free) - n)))
-    rows, right = [], []
-    for order, weight in enumerate(bounds.shares(SPACING), start=1):
-        rows.append(np.sqrt(weight) * np.diff(free, order, axis=0)[n - order :])
-        right.append(-np.sqrt(weight) * np.diff(fixed, order)[n - order :])
-    best = np.linalg.lstsq(np.concatenate(rows), np.concatenate(right), rcond=None)[0]
-    np.testing.assert_allclose(found[n:last], best, rtol=0, atol=1e-9 * np.max(np.abs(best)))
+
+    def cost(c: Array) -> float:
+        """Return the sum of squares of the differences, in limits, behind the shared coefficients."""
+        shares = enumerate(bounds.shares(SPACING), start=1)
+        held = np.concatenate((c, np.full(3, c[-1])))
+        return float(sum(share**2 * np.sum(np.diff(held, order)[n - order :] ** 2) for order, share in shares))
+
+    np.testing.assert_array_equal(found[:n], shared)
+    for j in range(n, last):
+        for step in (-1e-3, 1e-3):
+            other = found.copy()
+            other[j : last if j < last - 1 else None] += step * np.ptp(found)
+            assert cost(other) > cost(found)
     assert np.all(found[last:] == found[last - 1])
 
 
