@@ -84,10 +84,10 @@ class Planning(ABC):
         assert settings.preview is not None
         assert settings.spacing is not None
         self.basis, self.bounds, self.settings = basis, bounds, settings
-        self.preview, self.spacing = basis.preview, settings.spacing
+        self.horizon, self.spacing = basis.preview, settings.spacing
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
-        self.weight: Array | None = None  # (preview,): of the errors of a plan; without it all count alike
+        self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
 
     def restart(self, T_s: float) -> None:
         """Begin another run, with a sampling interval in s: nothing is paused."""
@@ -154,7 +154,7 @@ class PaperPlanning(Planning):
             return ChosenPlan(SepState.OFF, preview.previous_plan, None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
-            operator = predictor.operator(self.preview)  # Eq. (3)
+            operator = predictor.operator(self.horizon)  # Eq. (3)
         for state in candidates:
             hybrid = state is SepState.HYBRID
             g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
@@ -256,7 +256,7 @@ class AveragedPlanning(Planning):
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
-        g, free = predictor.physics_operator(self.preview)
+        g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
         physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), TOLERANCE)
@@ -271,7 +271,7 @@ class AveragedPlanning(Planning):
                 bounds = self.limits(preview, may_turn=True, change=change)
                 hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
-                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.preview)
+                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.horizon)
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:

@@ -232,19 +232,16 @@ class DriveBounds:
         ``no_reversal`` forbids it: the plan's model follows the friction; ``change``: share of ``change_max`` that
         bounds ``|δ|``.
         """
-        low, high = self._hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
+        low, high = self.hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
         taken = self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
         at_rest = self._free @ previous_plan[N_DECIDED:]
         low, high = np.minimum(low - taken, at_rest - _INTERIOR), np.maximum(high - taken, at_rest + _INTERIOR)
         return Bounds(rows=self._free, low=low, high=high)
 
-    def hard(self, x_d: Array, x_d_before: Array, delta_before: Array) -> tuple[Array, Array]:
-        """Return what the limits leave to the rows of any change, beginning with the decided coefficients'."""
-        return self._hard(x_d, x_d_before, delta_before, may_turn=True, change=1.0)
-
-    def _hard(
-        self, x_d: Array, x_d_before: Array, delta_before: Array, *, may_turn: bool, change: float
+    def hard(
+        self, x_d: Array, x_d_before: Array, delta_before: Array, *, may_turn: bool = True, change: float = 1.0
     ) -> tuple[Array, Array]:
+        """Return the least and the largest rows of a change within the limits, the decided coefficients' included."""
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
         command = np.concatenate((x_d_before, x_d))
         # Their sum would be rounded to what a position is, which is much coarser than a third difference of a change

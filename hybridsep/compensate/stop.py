@@ -28,14 +28,14 @@ _STILL = 1e-12
 
 
 class Stop:
-    """Stop of the last plan, and what takes plans to theirs.
+    """Stops of plans, and how far plans have one.
 
     ``basis``, ``bounds``: of the plans; ``preview``: samples of the command that are known; ``Np``: of a window;
     ``n_pinned``: coefficients that the next plan leaves as they are.
     """
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, preview: int, Np: int, n_pinned: int) -> None:
-        self.preview, self.spacing, self._horizon = preview, basis.spacing, basis.preview
+        self.spacing, self._horizon = basis.spacing, basis.preview
         self.n_shared = Np // basis.spacing + n_pinned
         self.rows = bounds.rows_of(basis.shifted(preview))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
