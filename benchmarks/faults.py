@@ -10,15 +10,17 @@ ms. A trip of a sound loop is false if its error is below the largest one withou
 
 import argparse
 import math
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count, islice
+from pathlib import Path
 
 import numpy as np
 from two_mass.axis import Axis
 from two_mass.generator import Recipe
-from two_mass.loop import CHANGE, CONDITIONS, closed_loop, settings_of
 from two_mass.plant import TwoMassDrive
 
+from benchmarks.two_mass_loops import CHANGE, CONDITIONS, closed_loop, compensator_fmu, settings_of
 from hybridsep.base.metrics import largest, rms
 from hybridsep.base.signals import Array
 from hybridsep.online.look_ahead import SepState
@@ -76,7 +78,9 @@ def judged(recipe: Recipe, name: str, monitored: bool) -> tuple[float, float, fl
 
     assert compensator.change_max is not None
     allowed = MARGIN * compensator.change_max / 2 if monitored else 0.0
-    loop = closed_loop(recipe, axis, "hybrid", sensor, following_error_max=allowed)
+    with tempfile.TemporaryDirectory() as folder:
+        fmu = compensator_fmu(recipe, Path(folder))
+        loop = closed_loop(fmu, recipe, axis, "hybrid", sensor, following_error_max=allowed)
     off = (x_d - TwoMassDrive(axis, float(x_d[0])).run(x_d))[first:]
     error, tripped = (x_d - loop.x)[first:], np.flatnonzero(loop.state[first:] == SepState.TRIPPED)
     moved = int(np.argmax(np.abs(x_d[first:] - x_d[first]) > allowed))

@@ -17,14 +17,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from two_mass.axis import Axis
 from two_mass.generator import SEED, Recipe
-from two_mass.loop import settings_of
 from two_mass.plant import TwoMassDrive
 
 from benchmarks.averaging import with_friction_on
 from benchmarks.compensation.loops import noise_seed
 from benchmarks.learning_control import learned_commands
+from benchmarks.two_mass_loops import settings_of
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
@@ -65,27 +64,6 @@ class Part:
         return np.array([self.rounded(0, x_meas) for x_meas in noisy.tolist()])
 
 
-class TwoMassPlant:
-    """A drive of two masses as a plant of the library."""
-
-    def __init__(self, axis: Axis) -> None:
-        self._axis = axis
-        self.reset()
-
-    def reset(self, start: float = 0.0) -> None:
-        """Reset the drive to rest at ``start``, m."""
-        self._drive = TwoMassDrive(self._axis, start)
-
-    def step(self, x_d: float, h: float) -> None:
-        """Advance by a sampling interval with the command ``x_d``, m."""
-        self._drive.step(x_d)
-
-    @property
-    def x(self) -> float:
-        """True position, m."""
-        return self._drive.x
-
-
 def parts() -> Iterator[Part]:
     """Yield the parts."""
     yield of_machine("staircase", load_machine("spring_mass_damper"), staircase())
@@ -95,7 +73,7 @@ def parts() -> Iterator[Part]:
     recipes = (Recipe.draw(index, SEED) for index in range(100))
     for recipe in [one for one in recipes if one.axis.play and one.axis.T_s >= 1e-3][:4]:
         planned, compensator, x_d = settings_of(recipe)
-        name, plant = f"two masses {recipe.index}, {recipe.kind}", TwoMassPlant(recipe.axis)
+        name, plant = f"two masses {recipe.index}, {recipe.kind}", TwoMassDrive(recipe.axis)
         steps = recipe.encoder.noise_std, recipe.encoder.quantum
         yield Part(name, recipe.model, plant, planned, planned, compensator, x_d, *steps)
 

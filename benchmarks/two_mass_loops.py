@@ -8,23 +8,181 @@ with weights that were learned from a run without compensation.
 """
 
 import argparse
+import math
 import os
-from collections.abc import Iterator, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import pairwise
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
+from scipy.optimize import brentq
+from two_mass.axis import Axis, LinearLoop
 from two_mass.generator import SEED, Recipe
-from two_mass.loop import CONDITIONS, SOUND, closed_loop, settings_of
 from two_mass.plant import TwoMassDrive
 
+from hybridsep.base.errors import HybridSepError
 from hybridsep.base.metrics import largest, peak_derivatives, rms
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.cosim.loop import Sensor, cosimulate
+from hybridsep.cosim.run import Run
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fmi.weights import weights_file
+from hybridsep.fmi.archive import build_here
+from hybridsep.identify.model import machine_of
 from hybridsep.predict.predictor import HybridPredictor
+
+DURATION = 2.5  # longest run, s
+KNOTS, SETTLING = 0.002, 0.15  # time between the knots of a plan, and time of a preview beyond the window, s
+SPARE = (2.0, 3.0, 5.0)  # limits of velocity, acceleration and jerk relative to the trajectory's
+
+
+def settings_of(recipe: Recipe) -> tuple[PredictorSettings, CompensatorSettings, Array]:
+    """Return the settings of a drive's compensator, and its trajectory, ``(n,)``, m, of at most :data:`DURATION`.
+
+    The drive's limits leave something to the trajectory's, and the change of the command may be twice the servo error.
+    """
+    T_s, Np = recipe.axis.T_s, recipe.settings.Np
+    spacing = max(1, round(KNOTS / T_s))
+    Np = spacing * max(1, round(Np / spacing))
+    x_d = recipe.x_d[: round(DURATION / T_s)]
+    error = x_d - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)
+    velocity, acceleration, jerk = (spare * peak for spare, peak in zip(SPARE, peak_derivatives(x_d, T_s), strict=True))
+    return (
+        replace(recipe.settings, Np=Np, p=min(50, Np)),
+        CompensatorSettings(
+            preview=Np + max(Np, 4 * spacing + 3, round(SETTLING / T_s)),
+            spacing=spacing,
+            limits=Limits(velocity=velocity, acceleration=acceleration, jerk=jerk),
+            change_max=2 * largest(error),
+        ),
+        x_d,
+    )
+
+
+def compensator_fmu(recipe: Recipe, folder: Path, weights: Path | None = None) -> Path:
+    """Build the compensator of a drive's physics model, with what a saved predictor has learned."""
+    predictor, compensator, _ = settings_of(recipe)
+    assert compensator.limits is not None
+    sizes = {name: getattr(compensator, name) for name in ("preview", "spacing")}
+    machine = machine_of(
+        *(recipe.model, predictor.input_hold, predictor.T_s, "two_mass", f"Drive of two masses {recipe.index}"),
+        compensator={"Np": predictor.Np, "p": predictor.p, **sizes},
+        drive_limits={**asdict(compensator.limits), "change_max": compensator.change_max},
+    )
+    return build_here(machine, "SepCompensator", folder, weights=weights)
+
+
+def closed_loop(
+    fmu: Path,
+    recipe: Recipe,
+    axis: Axis,
+    compensate: str,
+    sensor: Sensor = lambda _k, x: x,
+    **more: float,
+) -> Run:
+    """Return a run of a drive, which may be another one than the recipe's, behind its compensator.
+
+    ``compensate``: {"off", "physics", "hybrid"}; ``sensor``: returns what is measured in the place of a measurement;
+    ``**more``: parameters of the FMU besides.
+    """
+    predictor, compensator, x_d = settings_of(recipe)
+    assert compensator.limits is not None
+    late, noise, quantum = compensator.preview or 0, recipe.noise.tolist(), recipe.encoder.quantum
+
+    def measured(k: int, x: float) -> float:
+        return sensor(k, quantum * round((x + noise[(k + late) % len(x_d)]) / quantum))
+
+    values = {**predictor.to_fmi(), **compensator.to_fmi(), **compensator.limits.to_fmi(), **more}
+    values |= {"compensate": PARAMETERS["compensate"].to_fmi(compensate), "horizon": 0}  # plans end with the preview
+    drive = TwoMassDrive(replace(axis, change_at=axis.change_at + late))
+    return cosimulate(fmu, drive, x_d, controller_values=values, sensor=measured)
+
+
+SATURATED = 0.6  # motor force beyond friction, relative to that which the trajectory needs
+RINGING = 0.015  # damping ratio of the mode that begins to ring
+CHANGE = 0.4  # part of a run after which the plant changes or the measurement fails
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is not as it should be."""
+
+    # returns the drive under it, from the sound one and the trajectory, (n,), m
+    axis: Callable[[Axis, Array], Axis] = lambda axis, _: axis
+    # called as ``fault(k, first, end, x_meas, held)`` while the measurement fails; returns what is measured
+    fault: Callable[[float], float] | None = None
+    duration: float = 0.0  # s: of the fault
+
+    def sensor(self, x_d: Array, T_s: float) -> Sensor:
+        """Return the sensor of a run over a trajectory, (n,), m; it fails while the axis moves."""
+        fault = self.fault
+        if fault is None:
+            return lambda _k, x: x
+        n = round(self.duration / T_s)
+        first = _in_motion(x_d, n)
+        last = float(x_d[0])
+
+        def sensed(k: int, x_meas: float) -> float:
+            nonlocal last
+            if first <= k < first + n:
+                return fault(last)
+            last = x_meas
+            return x_meas
+
+        return sensed
+
+
+def _in_motion(x_d: Array, n: int) -> int:
+    """Return the first sample after :data:`CHANGE` of a run from which the axis goes half as far as it ever does."""
+    first = round(CHANGE * len(x_d))
+    distance = np.abs(x_d[first + n :] - x_d[first : len(x_d) - n])
+    return first + int(np.argmax(distance >= distance.max() / 2))
+
+
+def _saturated(axis: Axis, x_d: Array) -> Axis:
+    acceleration = float(np.abs(np.diff(x_d, 2)).max()) / axis.T_s**2
+    heaviest = 1.0 + max(0.0, axis.changed.added)
+    return replace(axis, force_max=SATURATED * acceleration * heaviest + axis.motor.coulomb + axis.bearing.coulomb)
+
+
+def _ringing(axis: Axis, x_d: Array) -> Axis:
+    return replace(axis, changed=_with_less_damping(axis.changed), change_at=round(CHANGE * len(x_d)))
+
+
+def _with_less_damping(loop: LinearLoop) -> LinearLoop:
+    """Return a loop with less damping of belt or screw, down to a tenth; where that does not ring, with what makes it.
+
+    A higher velocity gain, which leaves the following error as it is, or else a longer lag of the motor's force.
+    """
+
+    def changed(name: str, log_factor: float) -> LinearLoop:
+        start = loop if name == "damping" else replace(loop, damping=0.1 * loop.damping)
+        return replace(start, **{name: math.exp(log_factor) * getattr(start, name)})
+
+    for name, end in (("damping", math.log(0.1)), ("k_p", 4.0), ("tau", 10.0)):
+        factors = np.linspace(0.0, end, 81).tolist()
+        for low, high in pairwise(factors):
+            if changed(name, high).least_damping <= RINGING:
+                return changed(name, brentq(lambda x, name=name: changed(name, x).least_damping - RINGING, low, high))
+    raise ValueError(f"nothing makes {loop} ring")
+
+
+SOUND = "sound"
+
+CONDITIONS: dict[str, Condition] = {
+    SOUND: Condition(),
+    "motor saturated at 0.6": Condition(axis=_saturated),
+    "begins to ring": Condition(axis=_ringing),
+    "encoder held 50 ms": Condition(fault=lambda held: held, duration=0.05),
+    "encoder held 500 ms": Condition(fault=lambda held: held, duration=0.5),
+    "encoder zero 50 ms": Condition(fault=lambda _: 0.0, duration=0.05),
+    "missing 100 ms": Condition(fault=lambda _: math.nan, duration=0.1),
+}
 
 KEPT = 1e-7  # share by which a limit may be exceeded: third differences of positions round
 
@@ -71,19 +229,27 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
         error = (x_d - x)[: len(x_d) - late]
         return (rms(error), largest(error)) if np.isfinite(error).all() else (np.inf, np.inf)
 
+    folder = tempfile.TemporaryDirectory()
+    fmus = {False: compensator_fmu(recipe, Path(folder.name))}
     found = []
     for name, condition in CONDITIONS.items():
         if only not in name:
             continue
         axis, sensor = condition.axis(recipe.axis, x_d), condition.sensor(x_d, T_s)
         x = TwoMassDrive(axis, start).run(x_d)
-        weights = _learned(recipe, x_d, x) if name == SOUND else None
+        if name == SOUND:
+            weights = _learned(recipe, x_d, x, Path(folder.name, "learned.state"))
+            fmus[True] = compensator_fmu(recipe, Path(folder.name, "warm"), weights)
         physics = (np.inf, np.inf)
         for run, (compensate, warm) in RUNS.items():
-            if warm and weights is None:
+            if warm and name != SOUND:
                 continue
-            loop = closed_loop(recipe, axis, compensate, sensor, weights if warm else None)
-            sent = loop.x_dm[np.isfinite(loop.x_dm)]
+            try:
+                loop = closed_loop(fmus[warm], recipe, axis, compensate, sensor)
+            except HybridSepError:  # it refused to go on
+                found.append(Result(name, run, index, errors(x), physics, (np.inf, np.inf), np.inf))
+                continue
+            sent = loop.x_dm
             excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), limits, strict=True)]
             excess.append(largest(sent - x_d[: len(sent)]) / compensator.change_max - 1)
             physics = errors(loop.x) if run == "physics" else physics
@@ -91,13 +257,14 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
     return found
 
 
-def _learned(recipe: Recipe, x_d: Array, x: Array) -> bytes:
-    """Return the weights that a run without compensation leaves."""
+def _learned(recipe: Recipe, x_d: Array, x: Array, path: Path) -> Path:
+    """Save what a run without compensation leaves."""
     settings, _, _ = settings_of(recipe)
     predictor = HybridPredictor(recipe.model, settings, start=float(x_d[0]))
     quantum, n = recipe.encoder.quantum, len(x_d) // settings.Np * settings.Np  # whole windows
     backtest(predictor, x_d[:n], quantum * np.round((x[:n] + recipe.noise[:n]) / quantum))
-    return weights_file(predictor)
+    predictor.save(path)
+    return path
 
 
 def rows(found: Sequence[Result]) -> Iterator[str]:

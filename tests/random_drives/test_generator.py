@@ -1,6 +1,7 @@
 """Random drives of both generators: fixed by seed and index, replayed by the C core as by the library, compensated."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -9,8 +10,8 @@ from random_drives import generator as modal
 from random_drives.replay import core_replay, library_replay
 from random_drives.simulation import simulate
 from two_mass import generator as two_mass
-from two_mass.loop import closed_loop, settings_of
 
+from benchmarks.two_mass_loops import closed_loop, compensator_fmu, settings_of
 from hybridsep.base.metrics import rms
 
 
@@ -55,9 +56,10 @@ def test_the_c_core_replays_as_the_library() -> None:
 
 
 @pytest.mark.slow
-def test_the_hybrid_follows_better_than_physics() -> None:
+def test_the_hybrid_follows_better_than_physics(tmp_path: Path) -> None:
     drawn = two_mass.Recipe.draw(1, two_mass.SEED)  # at 250 Hz
     recipe = replace(drawn, x_d=drawn.x_d[:400], noise=drawn.noise[:400])
     x_d = settings_of(recipe)[2]
-    physics, hybrid = (closed_loop(recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid"))
+    fmu = compensator_fmu(recipe, tmp_path)
+    physics, hybrid = (closed_loop(fmu, recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid"))
     assert rms(x_d - hybrid.x) < 0.7 * rms(x_d - physics.x)

@@ -24,7 +24,7 @@ typedef struct {
     double coulomb, stribeck, v_stribeck, bristle, micro_damping;
 } lugre;
 
-/* Mirrored by plant.py. */
+/* Mirrored by plant.py, number by number. */
 typedef struct {
     linear_loop loop[2]; /* before and after the change */
     lugre friction[2];   /* of motor and load */
