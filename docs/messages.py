@@ -131,12 +131,12 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "stuck samples": Explanation(
         "The measured position stands still while its command goes on: the axis sticks, or the sensor was held.",
-        "Look at the picture. An axis that sticks needs none.",
+        "Look at the positions in the report. An axis that sticks needs none.",
     ),
     "clipped": Explanation(
         "The same, at one end of the measured range: the recorder's range may end there, or friction or load stops the "
         "axis.",
-        "Look at the picture. Record with a larger range where it was the recorder.",
+        "Look at the positions in the report. Record with a larger range where it was the recorder.",
     ),
     "late": Explanation(
         "The measured position is more than 0.1 s behind its command, drive, dead time and recorder together.",

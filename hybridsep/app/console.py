@@ -143,7 +143,7 @@ def print_json(result: Any) -> None:
 
 
 def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
-    """Print what files hold: names, units, samples, rates, and what is read without a word.
+    """Print what files hold: names, units, and what is read without a word.
 
     LogError if a file cannot be read.
     """
@@ -156,11 +156,9 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
         print_json(found)
         return
     for path, listed in found.items():
-        table = Table("channel", "unit", "samples", "interval [s]", "read as", title=path, box=box.SIMPLE)
+        table = Table("channel", "unit", "read as", title=path, box=box.SIMPLE)
         for one in listed:
-            n = "" if one.n_samples is None else str(one.n_samples)
-            interval = "" if one.interval is None else f"{one.interval:.9g}"
-            table.add_row(one.name, one.unit, n, interval, roles.get(one.role, one.role.replace("_", " ")))
+            table.add_row(one.name, one.unit, roles.get(one.role, one.role.replace("_", " ")))
         console.print(table)
         missing = [role for role in ("x_d", "x") if role not in {one.role for one in listed}]
         if missing and not all(one.role for one in listed):

@@ -62,7 +62,7 @@ def fit(
     reading: ReadingOptions,
     list_channels: Annotated[
         bool,
-        typer.Option("--list-channels", help="Print what the log holds, with units and rates, and do nothing else."),
+        typer.Option("--list-channels", help="Print what the log holds, with units, and do nothing else."),
     ] = False,
     force: ForceOption = False,
     as_json: JsonOption = False,

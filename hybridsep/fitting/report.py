@@ -279,7 +279,7 @@ def write_moves(report: Report, judged: Judged, in_position: float) -> None:
 
 
 def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> None:
-    """Write how the logs were read, and what their checks, by the log's name, noted, with its pictures."""
+    """Write how the logs were read, and what their checks noted, by the log's name, above both positions over time."""
     report.heading("What the checks of the log noted")
     remarks = [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks]
     report.bullets(remarks)
@@ -287,19 +287,15 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
         report.paragraph(
             f"Nothing{' else' if remarks else ''}: time axis, samples, signs, scales and motion are plausible."
         )
-    for name, found in findings.items():
-        rows = [[one.name, one.plain.partition(": ")[2]] for one in found]
-        if rows:
-            report.table([name, "note"], rows, words=1)
-        for finding in found:
-            picture = finding.picture
-            lines = [
-                Line(label, x, y, colour)
-                for (label, (x, y)), colour in zip(
-                    picture.lines.items(), (_COMMAND, PHYSICS, HYBRID, HOLD), strict=False
-                )
-            ]
-            report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
+    for log in (one for one in logs if findings.get(one.path.name)):
+        rows = [[one.name, one.plain.partition(": ")[2]] for one in findings[log.path.name]]
+        report.table([log.path.name, "note"], rows, words=1)
+        (factor, unit), positions = log.shown.position, {"commanded": log.x_d, "measured": log.x_meas}
+        lines = [
+            Line(name, log.t - log.t[0], factor * x, colour)
+            for (name, x), colour in zip(positions.items(), (_COMMAND, PHYSICS), strict=True)
+        ]
+        report.chart(Chart("time [s]", (f"position [{unit}]",), lines, "As recorded."))
 
 
 def write_use(report: Report, fmu: str, T_s: float, Np: int, log: Log) -> None:

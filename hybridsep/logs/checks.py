@@ -9,7 +9,7 @@ thousand, simulated and recorded, reached. What is noted changes nothing.
 import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,23 +60,12 @@ motion that repeat the one before, from which they are noted."""
 
 
 @dataclass(frozen=True)
-class _Picture:
-    """Data of a picture that shows a finding."""
-
-    title: str
-    x_label: str  # both with units
-    y_label: str
-    lines: Mapping[str, tuple[Array, Array]]  # name → abscissa and ordinate, (n,) each
-
-
-@dataclass(frozen=True)
 class Finding:
     """What is wrong with a log, or worth knowing of it."""
 
     name: str  # a key of ``FINDINGS`` of ``docs/messages.py``
     words: str  # what it is, by how much, and what to do
     evidence: Mapping[str, float]  # the statistic, by name; SI units
-    picture: _Picture = field(repr=False)
     refused: bool = False  # whether the columns do not mean what they were read for; otherwise it is a note
     options: tuple[tuple[str, str], ...] = ()  # options that put it right, one of them, each with what it means
 
@@ -139,7 +128,6 @@ def check(log: Log) -> tuple[Finding, ...]:
 
 def _hopeless(log: Log) -> Iterator[Finding]:
     """Find a log that has no command or no motion, too few samples, or one column for both."""
-    picture = _over_time(log, "Command and measurement")
     n, n_known = len(log.t), int(np.isfinite(log.x_meas).sum())
     still = [name for name, x in (("commanded", log.x_d), ("measured", log.x_meas)) if _travel(x) == 0.0]
     if still:
@@ -148,16 +136,16 @@ def _hopeless(log: Log) -> Iterator[Finding]:
             "shows neither its model nor its errors; record it while it moves over the travel that is used, or name "
             "other columns (--x_d NAME, --x NAME)"
         )
-        yield Finding("no motion", words, {"n": float(n)}, picture, refused=True)
+        yield Finding("no motion", words, {"n": float(n)}, refused=True)
     elif n_known < _SAMPLES_MIN:
         words = f"{n_known} samples are measured, at least {_SAMPLES_MIN} are needed; record half a minute"
-        yield Finding("too short", words, {"n": float(n_known)}, picture, refused=True)
+        yield Finding("too short", words, {"n": float(n_known)}, refused=True)
     elif np.array_equal(log.x_d, log.x_meas):
         words = (
             "the measured position is the commanded one in every sample: one column is read for both, or the axis was "
             "simulated; name the measured position's column (--x NAME)"
         )
-        yield Finding("same column", words, {"n": float(n)}, picture, refused=True)
+        yield Finding("same column", words, {"n": float(n)}, refused=True)
 
 
 def _unit(log: Log) -> Iterator[Finding]:
@@ -178,7 +166,7 @@ def _unit(log: Log) -> Iterator[Finding]:
         "the positions are rather in mm, µm (--unit um) or, of a rotary axis, deg"
     )
     evidence = {"travel": travel, "acceleration": usual}
-    yield Finding("unit", words, evidence, _over_time(log, "Positions as read"), refused=True, options=UNIT_OPTIONS)
+    yield Finding("unit", words, evidence, refused=True, options=UNIT_OPTIONS)
 
 
 class _Following(NamedTuple):
@@ -226,7 +214,6 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
     ``x_d`` and ``x``, ``(n,)``, are the liveliest samples, NaN where missing, and ``given`` how x follows x_d there.
     """
     known = np.isfinite(x)
-    picture = _over_time(log, "Command and measurement")
     evidence = given._asdict()
     filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])
     exchanged = following(filled, np.where(known, x_d, np.nan))
@@ -242,17 +229,17 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
         if noise[1] > _NOISIER * noise[0]:  # then x is the measured one
             options = (*options, (f"--delay {-round(exchanged.lag) - 1}", "if x was recorded too early"))
         evidence = {**evidence, "left_exchanged": exchanged.left, "lag_exchanged": exchanged.lag}
-        yield Finding("columns swapped", words, evidence, picture, refused=True, options=options)
+        yield Finding("columns swapped", words, evidence, refused=True, options=options)
         return
     other = _other_meaning(x_d, x, filled, given) if given.left > _POOR else ""
     if other:
-        yield Finding(other, _MEANINGS[other], evidence, picture, refused=True)
+        yield Finding(other, _MEANINGS[other], evidence, refused=True)
     elif given.left > _LOOSE:
         words = (
             f"the measured position hardly follows the command ({100 * given.left:.3g} % of its variance is left): is "
             "it another axis (--x NAME)?"
         )
-        yield Finding("hardly follows", words, evidence, picture, refused=True)
+        yield Finding("hardly follows", words, evidence, refused=True)
     elif given.left < _POOR and (
         max(given.gain, given.gain_at_one) < _GAINS[0] or min(given.gain, given.gain_at_one) > _GAINS[1]
     ):
@@ -261,7 +248,7 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
             f"the measured position moves {gain:.4g} times as far as the commanded one{_as_units(gain)}: state the "
             "unit of each column in its name, such as 'x [mm]', or name another column (--x NAME)"
         )
-        yield Finding("scale", words, evidence, picture, refused=True)
+        yield Finding("scale", words, evidence, refused=True)
 
 
 _MEANINGS = {
@@ -336,7 +323,7 @@ def _note_start(log: Log) -> Iterator[Finding]:
             "first samples"
         )
         evidence = {"velocity": float(steps[0]) / log.T_s, "largest": float(steps.max()) / log.T_s}
-        yield Finding("start in motion", words, evidence, _over_time(log, "Start"))
+        yield Finding("start in motion", words, evidence)
 
 
 def _note_missing(log: Log) -> Iterator[Finding]:
@@ -346,7 +333,7 @@ def _note_missing(log: Log) -> Iterator[Finding]:
             f"{len(missing)} of {len(log.t)} measured positions {'are' if len(missing) > 1 else 'is'} missing, the "
             f"first is sample {missing[0] + 1}: they are left out"
         )
-        yield Finding("missing samples", words, {"n": float(len(missing))}, _over_time(log, "Missing"))
+        yield Finding("missing samples", words, {"n": float(len(missing))})
 
 
 def _note_rate(log: Log) -> Iterator[Finding]:
@@ -358,22 +345,19 @@ def _note_rate(log: Log) -> Iterator[Finding]:
             f"{len(where)} of {len(steps)} intervals differ from {log.T_s:.6g} s, by up to {100 * largest:.3g} %; the "
             "rows are taken as if they were even"
         )
-        t = log.t - log.t[0]
-        picture = _Picture("Intervals", "time [s]", "interval [ms]", {"interval": (t[1:], 1e3 * steps)})
         options = (("--resample", "at even times, linearly between samples"),)
-        yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, picture, options=options)
+        yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, options=options)
 
 
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
-    picture = _over_time(log, "Command and measurement")
     if found.lag * log.T_s > _LATE and found.lag < 1.5 * found.lag_of_one:  # noise spreads a mixture over lags
         words = (
             f"the measured position lags its command by {found.lag:.3g} samples ({found.lag * log.T_s:.3g} s), drive, "
             "dead time and recorder together"
         )
         options = (("--delay N", "where the recorder is known to be N samples late"),)
-        yield Finding("late", words, {"lag": found.lag * log.T_s}, picture, options=options)
+        yield Finding("late", words, {"lag": found.lag * log.T_s}, options=options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - found.lag_of_one, 0)]
     offset = float(np.nanmedian(error))
     spread = float(np.nanmedian(np.abs(error - offset)))
@@ -382,7 +366,7 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
             f"the measured position is {log.shown.words(offset, '+.4g')} away from its command throughout, "
             f"{abs(offset) / _travel(x_d):.2g} of the travel, while the error varies by {log.shown.words(spread)}"
         )
-        yield Finding("offset", words, {"offset": offset, "spread": spread}, picture)
+        yield Finding("offset", words, {"offset": offset, "spread": spread})
 
 
 def _note_outliers(log: Log) -> Iterator[Finding]:
@@ -397,7 +381,7 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
                 "blank in the file it counts as missing"
             )
             evidence = {"n": float(len(wrong)), "largest": height}
-            yield Finding("outliers", words, evidence, _over_time(log, "Outliers"))
+            yield Finding("outliers", words, evidence)
 
 
 def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
@@ -421,7 +405,7 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
             f"{100 * share:.3g} % of the measured positions repeat the one before in fast motion: they are renewed "
             f"every {fast.sum() / max((fast & ~same).sum(), 1):.2g} samples in the mean"
         )
-        yield Finding("repeated samples", words, {"share": share}, _over_time(log, "Repeated samples"))
+        yield Finding("repeated samples", words, {"share": share})
     edges = np.flatnonzero(~np.concatenate(([False], same, [False])))  # a run is from edge to edge
     moved = (np.maximum.reduceat(x_d, edges[:-1]) - np.minimum.reduceat(x_d, edges[:-1])) / _travel(x_d)
     longest = int(np.argmax(moved))
@@ -439,7 +423,7 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
             else "the sensor was held, or the axis sticks"
         )
         evidence = {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])}
-        yield Finding(name, words, evidence, _over_time(log, name.capitalize()))
+        yield Finding(name, words, evidence)
 
 
 _NOTES = (_note_missing, _note_rate, _note_outliers, _note_start)
@@ -461,11 +445,3 @@ def _liveliest(log: Log) -> slice:
             if way[last] - way[first] > most:
                 best, most = slice(start + first, start + last + 1), float(way[last] - way[first])
     return best
-
-
-def _over_time(log: Log, title: str) -> _Picture:
-    """Return the picture of both positions over time."""
-    t = log.t - log.t[0]
-    factor, unit = log.shown.position
-    lines = {name: (t, factor * x) for name, x in (("commanded", log.x_d), ("measured", log.x_meas))}
-    return _Picture(title, "time [s]", f"position [{unit}]", lines)

@@ -222,44 +222,22 @@ class _Channel:
     """Column of a file, as it is listed."""
 
     name: str
-    unit: str = ""  # as the file states it, or the format's convention; empty if there is none
-    role: str = ""  # what it is read as without a word of the user's, ``"t"``, ``"x_d"``, ``"x"`` or a signal
-    n_samples: int | None = None  # number of its times, where it has times
-    interval: float | None = None  # their mean interval, s
+    unit: str  # as the file states it, or the format's convention; empty if there is none
+    role: str  # what it is read as without a word of the user's, ``"t"``, ``"x_d"``, ``"x"`` or a signal
 
 
 def channels(source: Source) -> list[_Channel]:
-    """Return a file's columns with their units, roles, samples and intervals, as far as they can be told."""
+    """Return a file's columns with their units and roles, as far as they can be told."""
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
         pair = _positions(source, {}, None)[0]
         roles.update((name, what) for what, name in signals_of(source.names, pair["x"] or "").items())
         roles.update((name, role) for role, name in pair.items())
     with suppress(LogError):
-        roles[
-            source.times.get(next((name for name, role in roles.items() if role == "x_d"), None) or "")
-            or _name(source, "t", None)
-            or _only_clock(source)
-        ] = "t"
-    t = next((name for name, role in roles.items() if role == "t"), None)
-    extents = {clock: _extent(source, clock) for clock in {*source.times.values(), t} if clock is not None}
+        x_d = next((name for name, role in roles.items() if role == "x_d"), None)
+        roles[source.times.get(x_d or "") or _name(source, "t", None) or _only_clock(source)] = "t"
     units = {**source.assumed_units, **source.units}
-    found = []
-    for name in source.names:
-        clock = name if name in extents else source.times.get(name) or t or ""
-        n, interval = extents.get(clock, (None, None))
-        found.append(_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, ""), n, interval))
-    return found
-
-
-def _extent(source: Source, clock: str) -> tuple[int | None, float | None]:
-    """Return the number of times of a column, and their mean interval, s; None if they are not numbers."""
-    try:
-        factor = _time(source, clock).unit.factor
-        (t,) = source.read([clock]).columns
-    except LogError:
-        return None, None
-    return len(t), factor * float(t[-1] - t[0]) / (len(t) - 1) if len(t) > 1 else None
+    return [_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, "")) for name in source.names]
 
 
 # Rates of their own

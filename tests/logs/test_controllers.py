@@ -48,9 +48,9 @@ def test_a_trace(tmp_path: Path) -> None:
     assert log.remarks == ("axis 7 of 7, 3 is read; axis='…' (--axis) chooses another",)
     np.testing.assert_allclose(read_log(path, axis="3").x_d, 2e-3 * X_D, rtol=1e-15)
     assert read_log(path, unit="deg").unit == "rad"
-    listed = {one.name: (one.n_samples, one.interval, one.role) for one in channels(open_source(path))}
-    assert listed["measPos1|7"] == (200, 2e-3, "")
-    assert listed["nckServoDataActPos2ndEnc64|7"] == (400, 1e-3, "x")
+    listed = {one.name: one.role for one in channels(open_source(path))}
+    assert (listed["measPos1|7"], listed["nckServoDataActPos2ndEnc64|7"]) == ("", "x")
+    assert len(open_source(path).read(["measPos1|7"]).columns[0]) == 200  # every 2 ms
     with pytest.raises(LogError, match=r"axis 'X1' is missing; there are 7, 3"):
         read_log(path, axis="X1")
 
@@ -110,8 +110,6 @@ def test_kinds_of_exports(tmp_path: Path, mark: str, full: bool, shared: bool) -
     np.testing.assert_allclose(log.x_meas, 1e-3 * X, rtol=1e-15)
     np.testing.assert_allclose(log.t, T, rtol=1e-15, atol=1e-15)
     assert log.file_unit == "mm"
-    listed = {one.name: (one.interval, one.unit) for one in channels(open_source(tmp_path / "log"))}
-    assert listed["x"] == (1e-3, "mm")
 
 
 def test_channels_of_one_name(tmp_path: Path) -> None:
