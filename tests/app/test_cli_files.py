@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from command_line import Run, write_log
+from library_models import trained_state
 from log_files import write
 
 from hybridsep.app.console import written_before
@@ -146,6 +147,7 @@ def test_names_that_cannot_be_written_are_refused_before_the_work(
 
 DIGITS = "9" * 4000
 UNITS = "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'"
+USERS = "--weights is for one HybridPredictor or SepCompensator, this would build"
 REFUSED = [
     ("backtest {log} -m robot", "error: no machine 'robot'"),
     ("backtest {log} {m} --set predictor.p=200", "p must be 1 … Np = 100, got 200"),
@@ -191,6 +193,31 @@ REFUSED = [
     ("cosim --set predictor=1", "predictor must be a table, got 1"),
     ("cosim --set predictor.p", "an entry is set as in predictor.p=20, got 'predictor.p'"),
     ("cosim --set plant.seed=1 --plant p.fmu", "is for an FMU that is built here; leave out --plant"),
+    ("cosim als25010_x --path part.ngc", "two machines and a path belong together, got 1:"),
+    ("cosim als25010_x als25010_y", "got 2 and none"),
+    ("cosim als25010_x als25010_y --path part.ngc -m emps --compensate off", "are for one axis"),
+    ("cosim als25010_x emps --path part.ngc", "machine emps has no [plant]"),
+    ("cosim als25010_x als25010_y --path part.ngc --figure part.ngc", "--figure must end in .png"),
+    ("build --weights {trained}", f"{USERS} HybridPredictor, SepCompensator; name one"),
+    ("build FeedDrive --weights {trained}", f"{USERS} none"),
+    ("build HybridPredictor --weights no.state", "cannot read or write no.state: No such file"),
+    ("build -m emps --weights {trained}", "HybridPredictor.state was not trained for machine emps: it has "),
+    ("build FeedDrive --trajectory x.csv", "--trajectory is for one ReferenceTrajectory, this would build none"),
+    ("build --flavour python --target host", "--target is for native FMUs; with --flavour python leave it"),
+    ("build --for plc", "--for must be twincat, got plc"),
+    ("build --for twincat --flavour python", "--for twincat is for native FMUs"),
+    ("build ReferenceTrajectory --for twincat", "ReferenceTrajectory plays files"),
+    ("system -m emps", "machine emps has no [plant], which hybridsep fit writes"),
+    ("system --out axis.zip", "--out must end in .ssp"),
+    ("system --compensate best", "--compensate must be one of off, physics, hybrid, got 'best'"),
+    ("system --ssp 3", "the version of SSP must be one of 1, 2, got '3'"),
+    ("system --trajectory nothing.csv", "nothing.csv"),
+    ("header emps", "; add them, or write a predictor's"),
+    ("hal emps", "emps has no [drive_limits], which a compensator must keep"),
+    ("hal als25010_x als25010_x", "each axis must have a name of its own"),
+    ("hal als25010_x als25010_y --weights {trained}", "--weights belong to one axis"),
+    ("hal als25010_x --out x,y", "at which loadrt takes axes= apart"),
+    ("hal als25010_x --out a$b", "at which loadrt takes axes= apart"),
     ("fit {log} --p 5,lots", "--p must be whole numbers with commas, got '5,lots'"),
     ("fit {log} --Np 20 --p 50", "p must be 1 … Np = 20, got 50"),
     ("fit {log} --out {folder} --name no-name", "name (--name) must be"),
@@ -217,6 +244,7 @@ def test_arguments_are_checked_before_any_work(
     for place in ("fmi.archive.build_fmu", "fitting.replay.backtest", "cosim.loop.cosimulate"):
         monkeypatch.setattr(f"hybridsep.{place}", work)
     names = {"log": log, "folder": folder, "fmu": fmus("HybridPredictorPy"), "m": f"-m {MACHINE}"}
+    names["trained"] = trained_state("HybridPredictor")
     said = refusal(hybridsep, *command.format(**names).split())
     assert message in said
     assert len(said.replace(str(tmp_path), "")) < 1000

@@ -197,19 +197,3 @@ def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     assert (status, out.split()[0]) == (0, str(path)), err
     structure = content(path)["SystemStructure.ssd"].decode()
     assert 'startElement="compensator" startConnector="x_dm" endElement="drive" endConnector="x_d"' in structure
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--machine", "emps"), "machine emps has no [plant], which hybridsep fit writes"),
-        (("--out", "axis.zip"), "--out must end in .ssp"),
-        (("--compensate", "best"), "--compensate must be one of off, physics, hybrid, got 'best'"),
-        (("--ssp", "3"), "the version of SSP must be one of 1, 2, got '3'"),
-        (("--trajectory", "nothing.csv"), "nothing.csv"),
-    ],
-)
-def test_what_makes_no_system_is_refused(hybridsep: Run, arguments: tuple[str, ...], message: str) -> None:
-    status, _, error = hybridsep("system", *arguments)
-    assert status == 2
-    assert message in " ".join(error.split())

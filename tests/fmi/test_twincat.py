@@ -67,18 +67,6 @@ def test_weights_are_compiled_in(hybridsep: Run, tmp_path: Path) -> None:
     assert "hsep_embedded_weights" in header.read_text(encoding="utf-8")
 
 
-def test_what_does_not_fit_is_refused(hybridsep: Run, tmp_path: Path) -> None:
-    for arguments, said in (
-        (("--for", "plc"), "--for must be twincat, got plc"),
-        (("--for", "twincat", "--flavour", "python"), "--for twincat is for native FMUs"),
-        (("ReferenceTrajectory", "--for", "twincat"), "ReferenceTrajectory plays files"),
-    ):
-        status, _, error = hybridsep("build", *arguments, "-m", "spring_mass_damper", "--out", tmp_path / "out")
-        assert status != 0
-        assert said in " ".join(error.split())
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["SepCompensator", "HybridPredictorFmi3"])
 def test_a_compiler_for_windows_takes_the_sources(fmus: BuiltFmus, model: str, tmp_path: Path) -> None:

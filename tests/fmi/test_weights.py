@@ -166,28 +166,3 @@ def test_build_takes_a_trajectory(hybridsep: Run, tmp_path: Path) -> None:
             source.step(k * 1e-3, 1e-3)
             played.append(source.get("r"))
     np.testing.assert_allclose(played, [*command, *[command[-1]] * 6], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            ("--weights", "TRAINED"),
-            "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor, SepCompensator",
-        ),
-        (
-            ("FeedDrive", "--weights", "TRAINED"),
-            "--weights is for one HybridPredictor or SepCompensator, this would build none",
-        ),
-        (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
-        (("-m", "emps", "--weights", "TRAINED"), "HybridPredictor.state was not trained for machine emps: it has "),
-        (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
-        (("--flavour", "python", "--target", "host"), "--target is for native FMUs; with --flavour python leave it"),
-    ],
-)
-def test_build_says_what_it_cannot_use(
-    arguments: tuple[str, ...], message: str, hybridsep: Run, tmp_path: Path, trained: Path
-) -> None:
-    given = [str(trained) if argument == "TRAINED" else argument for argument in arguments]
-    status, _, error = hybridsep("build", *given, "--out", tmp_path)
-    assert (status, message in " ".join(error.split())) == (2, True), error

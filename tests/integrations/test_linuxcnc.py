@@ -72,29 +72,15 @@ def test_an_axis_starts_with_what_was_learned(hybridsep: Run, tmp_path: Path) ->
     status, out, _ = hybridsep("hal", AXES[0], "--out", tmp_path, "--force")
     assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
     assert not (tmp_path / "x" / "weights.bin").exists()
-    status, _, err = hybridsep("hal", *AXES, *given)
-    assert (status, "--weights belong to one axis" in err) == (2, True)
 
 
-@pytest.mark.parametrize(
-    ("machines", "letters", "folder", "options", "said"),
-    [
-        (["emps"], 1, "out", [], "emps has no [drive_limits], which a compensator must keep"),
-        ([], 1, "my axes", [], "at which loadrt takes axes= apart"),
-        ([], 1, "x,y", [], "at which loadrt takes axes= apart"),
-        ([], 1, "a$b", [], "at which loadrt takes axes= apart"),
-        ([], 32, "out", [], "at most 31 letters"),
-        ([], 22, "out", ["--predictor"], "at most 21 letters"),
-        ([AXES[0], AXES[0]], 1, "out", [], "each axis must have a name of its own"),
-    ],
-)
-def test_what_loads_in_no_linuxcnc_is_refused(
-    hybridsep: Run, tmp_path: Path, machines: list[str], letters: int, folder: str, options: list[str], said: str
-) -> None:
-    given: list[object] = [*machines] or [axis(tmp_path, ('name = "x"', f'name = "{"n" * letters}"'))]
-    status, _, err = hybridsep("hal", *given, "--out", tmp_path / folder, *options)
-    assert (status, said in " ".join(err.split())) == (2, True), err
-    assert not (tmp_path / folder).exists()
+@pytest.mark.parametrize(("letters", "options"), [(32, []), (22, ["--predictor"])])
+def test_a_name_too_long_for_hal_is_refused(hybridsep: Run, tmp_path: Path, letters: int, options: list[str]) -> None:
+    """Other refusals: tests/app/test_cli_files.py."""
+    given = axis(tmp_path, ('name = "x"', f'name = "{"n" * letters}"'))
+    status, _, err = hybridsep("hal", given, "--out", tmp_path / "out", *options)
+    assert (status, f"at most {letters - 1} letters" in err) == (2, True), err
+    assert not (tmp_path / "out").exists()
 
 
 def can_run() -> str:
