@@ -25,7 +25,6 @@ STANDSTILL = 1e-3  # commanded motion of a sample, relative to the largest, belo
 _UNSTABLE = 3.0
 """Largest change of the prediction, relative to the largest residual, from which on the model counts as unstable."""
 
-_LITTLE_MOTION = 0.1  # share of samples in motion below which there is too little of it to learn from
 _N_EARLY = 10  # windows that count as the beginning of a run
 
 _N_THIRDS = 3
@@ -43,7 +42,7 @@ class Verdict:
     ratios: tuple[float, ...]
     worse: tuple[tuple[str, ...], ...]  # places where it is worse than each peer
     judged: tuple[str, ...]  # places with enough samples
-    causes: tuple[str, ...]  # what explains it where it is worse, as far as the run shows
+    cause: str  # what explains that it is worse, as far as the run shows
     # number of measurements that were not learned, as they were missing or not plausible; of missing ones; and of all
     n_rejected: int
     n_missing: int
@@ -59,7 +58,7 @@ class Verdict:
             else f"{_comparison(value, peer)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(self.peers, self.ratios, self.worse, strict=True)
         ]
-        lines += [f"Why: {cause}" for cause in self.causes]
+        lines += [f"Why: {self.cause}"] if self.cause else []
         if self.n_windows < WINDOWS_ENOUGH:
             lines.append(f"Judged by {counted(self.n_windows)} only")
         if self.n_rejected:
@@ -116,7 +115,7 @@ def judge(
         ratios,
         tuple(_worse(h, peer, places) for peer in peers),
         tuple(places),
-        tuple(_causes(ratios[: len(_PEERS)], change, largest, float(counts[1].sum()) / max(total, 1.0), later)),
+        _cause(ratios[: len(_PEERS)], change, largest, later),
         n_rejected,
         min(lost if n_missing is None else n_missing, n_rejected),
         int(total) + lost,
@@ -137,29 +136,20 @@ def _worse(h: Array, peer: Array, places: Mapping[str, tuple[int, int]]) -> tupl
     return tuple(name for name, pair in sums.items() if _ratio(*pair) > 1.0 + ALIKE)
 
 
-def _causes(ratios: Sequence[float], change: float, largest: float, moving: float, later: Array | None) -> list[str]:
+def _cause(ratios: Sequence[float], change: float, largest: float, later: Array | None) -> str:
     """Return what explains a hybrid that is worse than some of :data:`_PEERS`.
 
-    ``change`` is the largest of the prediction and ``largest`` the largest residual, m, ``moving`` the share of samples
-    in motion, ``later`` the sums of squares after the beginning of a long run.
+    ``change`` is the largest of the prediction and ``largest`` the largest residual, m, ``later`` the sums of squares
+    after the beginning of a long run.
     """
     if change > _UNSTABLE * largest > 0.0:
-        return [
+        return (
             f"the prediction is unstable: it leaves the physics model by {change / largest:.2g} × the largest residual"
-        ]
+        )
     peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
-    if not peers:
-        return []
-    causes = []
-    if moving < _LITTLE_MOTION:
-        causes.append(f"hardly any motion, in {100 * moving:.2g} % of these samples")
-    if later is not None and all(_ratio(later[-1], later[peer]) <= 1.0 + ALIKE for peer in peers):
-        causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")
-    elif ratios[0] <= 1.0 + ALIKE and not causes:
-        causes.append("the residual changes so slowly that its last value predicts it better than the motion does")
-    elif not causes:
-        causes.append("the residual does not repeat with the motion")
-    return causes
+    if peers and later is not None and all(_ratio(later[-1], later[peer]) <= 1.0 + ALIKE for peer in peers):
+        return f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet"
+    return ""
 
 
 def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:

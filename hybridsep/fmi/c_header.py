@@ -193,15 +193,14 @@ _EMBEDDED = ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeo
 
 def _weights(content: bytes | None) -> str:
     """Return the definition of the weights' bytes; empty if there are none."""
-    if not content:
-        return ""
-    rows = [", ".join(map(str, content[i : i + 32])) for i in range(0, len(content), 32)]
-    text = ",\n    ".join(rows)
-    return f"""/* What was learned before, weights.bin: no file is needed for a warm start. */
-static const unsigned char hsep_embedded_weights[{len(content)}] = {{
-    {text}}};
+    said = "/* What was learned before, weights.bin: no file is needed for a warm start. */\n"
+    return f"{said}{c_bytes('hsep_embedded_weights', content)}\n\n" if content else ""
 
-"""
+
+def c_bytes(name: str, content: bytes) -> str:
+    """Return the definition of an array with these bytes."""
+    text = ",\n    ".join(", ".join(map(str, content[i : i + 32])) for i in range(0, len(content), 32))
+    return f"static const unsigned char {name}[{len(content)}] = {{\n    {text}}};"
 
 
 def _row(variable: Variable, name: str) -> str:

@@ -11,7 +11,6 @@ Beckhoff's TE1420, Target for FMI, puts an FMU's sources into a project of Visua
 there stands in an XML file of the form of its ``CustomFMU.xml``, which it finds in its folder of program data.
 """
 
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,7 +19,7 @@ from ..base.errors import ParameterError
 from ..base.files import atomic_open_text, data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
-from .c_header import TABLE_FILE, c_sources, kind_header, table_file
+from .c_header import TABLE_FILE, c_bytes, c_sources, kind_header, table_file
 from .pages import filled
 from .spec import content_guid, table_of
 from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
@@ -98,31 +97,22 @@ def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" 
         name=name,
         kind="compensator" if compensates else "predictor",
         modes="\n".join(modes),
-        weights="\n".join(_weights(name, trained)),
+        weights=_weights(name, trained),
         settings="\n".join(settings),
         n_modes=len(modes),
     )
 
 
-def _weights(name: str, trained: "HybridPredictor | None") -> list[str]:
+def _weights(name: str, trained: "HybridPredictor | None") -> str:
     """Return the lines that declare the weights: none, or the content of a weights file."""
+    size = f"static const size_t {name}_weights_size ="
     if trained is None:
-        return [
-            "/* Nothing was learned before: it starts cold. */",
-            f"static const void *const {name}_weights = NULL;",
-            f"static const size_t {name}_weights_size = 0;",
-        ]
+        none = f"static const void *const {name}_weights = NULL;"
+        return f"/* Nothing was learned before: it starts cold. */\n{none}\n{size} 0;"
     from .weights import weights_file
 
-    content = weights_file(trained)
-    numbers = textwrap.wrap(", ".join(map(str, content)), 112)
-    return [
-        "/* What an earlier run has learned. */",
-        f"static const unsigned char {name}_weights[] = {{",
-        *(f"    {line}" for line in numbers),
-        "};",
-        f"static const size_t {name}_weights_size = sizeof {name}_weights;",
-    ]
+    content = c_bytes(f"{name}_weights", weights_file(trained))
+    return f"/* What an earlier run has learned. */\n{content}\n{size} sizeof {name}_weights;"
 
 
 CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"
