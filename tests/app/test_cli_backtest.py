@@ -12,7 +12,6 @@ from staircase_data import commanded, measured
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.files import data_folder
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.evaluate.peers import Piece, predict_peers
 
 MACHINE = ("-m", "spring_mass_damper")
 
@@ -69,26 +68,6 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, *predictor(p=20))
     assert status == 2
     assert "my.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
-    assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
-    assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
-
-
-def test_arx_models_stand_beside_hold(hybridsep: Run, tmp_path: Path) -> None:
-    n, Np = 800, 100
-    x_d, x, log = commanded()[:n], measured(0)[:n], write_log(tmp_path / "log.csv", n=n)
-    command = ("backtest", log, *MACHINE, *predictor(Np=Np, p=20, t_init=0.2))
-    figures = json.loads(hybridsep(*command, "--json")[1])
-    status, out, err = hybridsep(*command)
-    assert status == 0, err
-    assert "prediction by RMS [µm] 95 % below largest × physics" in " ".join(out.split())
-    found = predict_peers([Piece(x_d, x, 0, 0)], Np)
-    for peer, lags in zip(found, (20, 40), strict=True):
-        errors = x - peer.predictions[0]
-        rms = 1e6 * np.sqrt(np.mean(errors**2))
-        assert 1e6 * figures["judged"]["peers"][f"ARX{lags} (refitted)"] == pytest.approx(rms, rel=1e-6)
-        assert f"{rms:.4g}" in out
-        ratio = figures["rms_h_um"] / rms
-        assert f"than ARX{lags} (refitted): {ratio:.3g} × its RMS error" in figures["verdict"]
 
 
 @pytest.mark.slow

@@ -83,25 +83,6 @@ def test_what_a_parameter_cannot_be(name: str, value: object, message: str) -> N
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"p": 120}, "p must be 1 … Np = 100, got 120; lower p or raise Np"),
-        ({"q": 100}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
-        (
-            {"Np": 4, "p": 5, "q": 4},
-            "p must be 1 … Np = 4, got 5; lower p or raise Np; q must be 0 … Np − 1 = 3, got 4; lower q or raise Np",
-        ),
-    ],
-)
-def test_lags_longer_than_the_window(change: dict[str, Any], message: str) -> None:
-    for fits in ({}, {"Np": 1, "p": 1, "q": 0}, {"Np": 100, "p": np.int64(100), "q": 99.0}):
-        PredictorSettings(**{**GOOD, **fits})
-    with pytest.raises(ParameterError) as caught:
-        PredictorSettings(**{**GOOD, **change})
-    assert str(caught.value) == message
-
-
-@pytest.mark.parametrize(
     ("name", "text"),
     [
         ("lambda", "ridge penalty on the weights of the residual model [m2], 1e-40 … 1e+12"),

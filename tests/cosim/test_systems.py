@@ -11,7 +11,6 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from command_line import Run
 from importers import exists_here
 
 from hybridsep import FmuInstance, load_machine, staircase
@@ -187,13 +186,3 @@ print("ends", *observer.last_real_values(drive, [places["x"], places["x_meas"]])
     assert ends[0][0] != ends[0][1]
     assert ends[1][0] == ends[1][1] == pytest.approx(ends[0][0], abs=1e-12)
     assert np.all(np.asarray(ends) > 1e-3)
-
-
-@pytest.mark.slow
-def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
-    path = tmp_path / "axis.ssp"
-    arguments = ("system", "--machine", "als25010_x", "--compensate", "hybrid", "--target", "host", "--out", path)
-    status, out, err = hybridsep(*arguments)
-    assert (status, out.split()[0]) == (0, str(path)), err
-    structure = content(path)["SystemStructure.ssd"].decode()
-    assert 'startElement="compensator" startConnector="x_dm" endElement="drive" endConnector="x_d"' in structure

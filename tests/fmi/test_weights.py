@@ -135,24 +135,6 @@ def test_another_number_of_modes_is_named() -> None:
 # The command line --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.release
-def test_build_takes_weights_and_targets(hybridsep: Run, tmp_path: Path) -> None:
-    predictor, trained = load_machine(MACHINE.name).new_predictor(), tmp_path / "trained.state"
-    predictor.predict(np.linspace(0, 1e-3, 50))
-    predictor.update(np.linspace(0, 1e-3, 50))
-    predictor.save(trained)
-    options = ("--weights", trained, "--target", "host", "--target", "win64", "--out", tmp_path)
-    assert hybridsep("build", "HybridPredictor", "FeedDrive", *options)[0] == 0
-    with zipfile.ZipFile(tmp_path / "HybridPredictor.fmu") as archive:
-        names = archive.namelist()
-    assert "resources/weights.bin" in names
-    platforms = {name.split("/")[1] for name in names if name.startswith("binaries/")}
-    assert "win64" in platforms
-    assert "win32" not in platforms
-    with zipfile.ZipFile(tmp_path / "FeedDrive.fmu") as archive:
-        assert "resources/weights.bin" not in archive.namelist()
-
-
 def test_build_takes_a_trajectory(hybridsep: Run, tmp_path: Path) -> None:
     command = 0.02 + 1e-4 * np.arange(20)
     rows = np.column_stack((1e-3 * np.arange(20), 1e3 * command))

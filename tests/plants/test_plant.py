@@ -163,13 +163,8 @@ def test_encoder_noise_is_normal_and_seeded() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: FeedDrive(1.0, 1.0, -1.0), r"k must be 1e-06 … 1e\+15 N/m, got -1"),
-        (lambda: StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), kappa=-0.1), "kappa must be 0 … 1000000 1/m, got -0.1"),
-        (lambda: StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), v_friction=0.0), "v_friction must be 1e-12 … 10000 m/s"),
         (lambda: FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0), r"step size must be > 0 and ≤ 100 s, got 0\.0"),
-        (lambda: FeedDrive(1.0, 1.0, 1.0).step(0.0, 1e9), r"step size must be > 0 and ≤ 100 s, got 1000000000\.0"),
         (lambda: simulate(FeedDrive(1.0, 1.0, 1.0), [], TS), "x_d must have at least one sample, got none"),
-        (lambda: FeedDrive(1.0, 1.0, 1e15), r"sqrt\(k/m\) and c/m must be at most 100000 1/s, got 3\.16228e\+07"),
         (lambda: StageDrive(ModalModel([Mode(5e4, 0.5, 1.0)])), r"2 pi f_n .* of mode\[1\] must be at most 100000 1/s"),
         (lambda: Encoder(-1.0), "noise_std must be 0 … 1 m, got -1"),
     ],
