@@ -70,7 +70,6 @@ _MODULES = {
 if not TYPE_CHECKING:  # a module's __getattr__ would hide misspelt names from type checkers
 
     def __getattr__(name: str) -> Any:
-        """Load a public name."""
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         value = getattr(import_module(f".{_MODULES[name]}", __name__), name)

@@ -166,7 +166,6 @@ def _machine_files(arguments: Sequence[str]) -> str:
 
 
 def _run() -> int:
-    """Run the command line; return its exit status."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]

@@ -87,7 +87,6 @@ def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[
 def _print_tracking(
     summary: Mapping[str, float | int], title: str, unit: str, limits: Mapping[str, Any] | None
 ) -> None:
-    """Print tracking errors, change of the command and its peaks."""
     from ..fitting.compensation import binding_words
     from ..logs.units import shown_in
 

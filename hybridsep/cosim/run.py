@@ -113,7 +113,6 @@ class Run:
     unit: str = "m"
 
     def __repr__(self) -> str:
-        """Return the main figures in one line."""
         return one_line("Run", self._figures())
 
     def _repr_html_(self) -> str:

@@ -31,13 +31,11 @@ SEEDS = 10  # noise seeds that a full demonstration's staircase is averaged over
 
 
 def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
-    """Return a machine's predictor and plant FMU, built."""
     predictor, plant = (build_here(machine, one, out) for one in ("HybridPredictor", "FeedDrive"))
     return predictor, plant
 
 
 def _staircase_case(out: Path, seeds: int, advance: Advance) -> dict[str, Any]:
-    """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
     fmus = _pair(machine, out / "fmus")

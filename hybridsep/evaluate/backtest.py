@@ -60,7 +60,6 @@ class Backtest:
         return {"n_batches": self.n_batches, **self.overall.figures(), **self.after_warm_up.figures("_after_warm_up")}
 
     def __repr__(self) -> str:
-        """Return the RMS errors in one line."""
         return one_line("Backtest", self._figures())
 
     def _repr_html_(self) -> str:

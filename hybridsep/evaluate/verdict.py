@@ -131,7 +131,6 @@ def _places(counts: Array) -> dict[str, tuple[int, int]]:
 
 
 def _worse(h: Array, peer: Array, places: Mapping[str, tuple[int, int]]) -> tuple[str, ...]:
-    """Return the places where the hybrid is worse."""
     sums = {name: (h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) for name, (axis, i) in places.items()}
     return tuple(name for name, pair in sums.items() if _ratio(*pair) > 1.0 + ALIKE)
 
@@ -170,7 +169,6 @@ def counted(n: int) -> str:
 
 
 def _ratio(own: float, other: float) -> float:
-    """Return the ratio of two RMS errors from their sums of squares."""
     return rms_ratio(math.sqrt(own), math.sqrt(other))
 
 

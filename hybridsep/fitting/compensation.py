@@ -259,7 +259,6 @@ class Tracking:
 
 
 def _words(error: ErrorSize, shown: DisplayUnits) -> str:
-    """Return RMS and largest error with their unit."""
     if math.isnan(error.rms):
         return "not known"
     return f"{shown.words(error.rms, '.4g')} (largest {shown.words(error.largest, '.4g')})"

@@ -66,8 +66,6 @@ class IdentifiedPlant:
 
 
 class _Disturbed(NamedTuple):
-    """A model and its disturbances."""
-
     model: ModalModel
     f: float
     kappa: float

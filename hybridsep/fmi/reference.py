@@ -121,7 +121,6 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
 
 
 def _drive(machine: Machine) -> tuple[Any, Encoder]:
-    """Return a machine's plant and its encoder."""
     assert machine.plant is not None  # by fmu_names
     return machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
 

@@ -120,7 +120,6 @@ def table_of(
 
 
 def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[str, float], ...]]:
-    """Return start values and modes."""
     if model in ("HybridPredictor", "SepCompensator"):
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
         return dict(values), _modes(machine.model)

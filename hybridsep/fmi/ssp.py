@@ -38,8 +38,6 @@ _NAMESPACES = {
 
 @dataclass(frozen=True)
 class _Component:
-    """An FMU of a system."""
-
     name: str
     # files below ``resources/``
     fmu: str

@@ -163,7 +163,6 @@ def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
 
 
 def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of the HybridPredictor."""
     ahead = ("x_d_ahead",)
     window = range(1, int(parameters["Np"]) + 1)
     table = [
@@ -196,7 +195,6 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
 
 
 def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
-    """Return the table of the SepCompensator."""
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
     model = ("t_init", "compensate", "averaging")

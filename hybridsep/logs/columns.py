@@ -149,7 +149,6 @@ def _only_clock(source: Source) -> str | None:
 
 
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
-    """Return the error of columns that are not there, by role."""
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
         kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
@@ -219,8 +218,6 @@ def _position(source: Source, name: str, given: str | None) -> Column:
 
 @dataclass(frozen=True)
 class _Channel:
-    """Column of a file, as it is listed."""
-
     name: str
     unit: str  # as the file states it, or the format's convention; empty if there is none
     role: str  # what it is read as without a word of the user's, ``"t"``, ``"x_d"``, ``"x"`` or a signal

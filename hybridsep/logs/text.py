@@ -51,8 +51,6 @@ _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
 
 @dataclass(frozen=True)
 class _Table:
-    """Table of a text."""
-
     names: list[str]  # column names, one empty where rows have names of their own
     units: dict[str, str]  # name → unit, from a row of units below the names
     delimiter: str | None  # between columns; None is blanks
