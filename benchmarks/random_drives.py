@@ -21,13 +21,14 @@ from multiprocessing import get_context
 import numpy as np
 from random_drives import generator as modal
 from random_drives.drive import Drive
-from random_drives.replay import PREDICTORS, Replay, Replayed, library_replay, physics_alone, replay
+from random_drives.replay import PREDICTORS, Replayed, library_replay, physics_alone
 from two_mass import generator as two_mass
 
 from benchmarks.sensor_faults import FAULTS, JITTER, OFFSET_STEP
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
+from hybridsep.evaluate.peers import Piece, predict_peers
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,66 @@ GENERATORS = {
     "modal": Generator(modal.SEED, 1000, modal.CHUNK, modal.true_positions, modal.drives_at),
     "two_mass": Generator(two_mass.SEED, 250, two_mass.CHUNK, two_mass.true_positions, two_mass.drives_at),
 }
+
+
+DIVERGED = 1.0  # largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Result of one drive."""
+
+    index: int
+    kind: str  # of the trajectory
+    # RMS errors against the measured position over the whole run, m; ``rms_h`` is infinite where the replay ended with
+    # an error
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+    largest: float  # largest error of ``x_h``, m
+    # RMS errors of the refitted ARX peers, m, if they were asked for; infinite where one diverged
+    rms_arx: tuple[float, ...] = ()
+
+    @property
+    def ratio(self) -> float:
+        """RMS relative to the physics model's."""
+        return self.rms_h / self.rms_pb
+
+    @property
+    def hold_ratio(self) -> float:
+        """RMS relative to the hold's."""
+        return self.rms_h / self.rms_hold
+
+    @property
+    def peer_ratio(self) -> float:
+        """RMS relative to the best of hold and the ARX peers, in hindsight."""
+        return self.rms_h / min(self.rms_hold, *self.rms_arx)
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the prediction left the axis."""
+        return not self.largest <= DIVERGED
+
+
+def replay(drive: Drive, predictor: str, run: Replayed = library_replay, *, peers: bool = False) -> Replay:
+    """Return the result of a predictor on a drive, with ``peers`` beside the ARX models refitted before each window."""
+    x_pb, Np = physics_alone(drive), drive.settings.Np
+    x_hold = _hold(x_pb, drive.x_meas, Np)
+    arx = predict_peers([Piece(drive.x_d, drive.x_meas, 0, 0)], Np) if peers else ()
+    try:
+        error = drive.x_meas - run(predictor, drive.model, drive.settings, drive.x_d, drive.x_meas)
+        rms_h, largest = rms(error), float(np.abs(error).max())
+    except SignalError:
+        rms_h = largest = math.inf
+    rms_pb, rms_hold = rms(drive.x_meas - x_pb), rms(drive.x_meas - x_hold)
+    rms_arx = tuple(math.inf if one.diverged else rms(drive.x_meas - one.predictions[0]) for one in arx)
+    return Replay(drive.index, drive.kind, rms_pb, rms_hold, rms_h, largest, rms_arx)
+
+
+def _hold(x_pb: Array, x_meas: Array, Np: int) -> Array:
+    """Return ``x_pb`` plus the last residual measured before each window, ``(n,)``, m."""
+    last = np.concatenate(([0.0], (x_meas - x_pb)[Np - 1 :: Np]))
+    return np.asarray(x_pb + np.repeat(last, Np)[: len(x_pb)])
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 from random_drives.generator import SEED, random_drives
-from random_drives.replay import Replay, core_outputs, replay
+from random_drives.replay import core_outputs
 
+from benchmarks.random_drives import Replay, replay
 from hybridsep.base.metrics import coverage
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
