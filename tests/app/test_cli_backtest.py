@@ -25,8 +25,10 @@ def rows_of(path: Path, keep: np.ndarray[Any, np.dtype[np.intp]], jitter: float 
 
 def test_gaps_and_jitter_are_noted(hybridsep: Run, tmp_path: Path) -> None:
     log = rows_of(tmp_path / "log.csv", np.r_[0:900, 960:3000], 2e-4)
-    status, out, err = hybridsep("backtest", log, *MACHINE, "--json")
+    page = tmp_path / "page.html"
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--json", "--report", page)
     assert status == 0, err
+    assert page.read_text(encoding="utf-8").partition("</table>")[2].count("As recorded.") == 1  # below the notes
     assert "note: 60 samples are missing in 1 gap, the longest of 0.061" in err
     assert "intervals differ from 0.0009998 s, by up to " in err
     assert json.loads(out)["n_samples"] == 2940
