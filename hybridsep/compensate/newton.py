@@ -260,6 +260,8 @@ it. In windows of 50 two steps leave twice the error of three on the stage's Y a
 
 _FIRST_STEPS = 4  # of the solver, for the first of several Newton steps: the next one goes on from where it ends
 
+PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
+
 _LENGTHS = (1.0, 0.3)  # lengths of a step that are tried, relative to the way to the minimum
 
 _LEAST_GAIN = 1e-9

@@ -20,7 +20,7 @@ from ..online.look_ahead import SepState
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
-from .newton import TOLERANCE, AveragedPlanner, PlanModel, is_better
+from .newton import PHYSICS_STEPS, TOLERANCE, AveragedPlanner, PlanModel, is_better
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
@@ -258,16 +258,19 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
+        has_learned = predictor.k >= predictor.n_init and model.has_learned
+        follows = has_learned and most is SepState.HYBRID and not self.paused
+        tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), TOLERANCE)
+        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), tolerance)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
-        if predictor.k < predictor.n_init or not model.has_learned:
+        if not has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
-            if most is SepState.HYBRID and not self.paused:
+            if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)
                 hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):

@@ -201,7 +201,12 @@ static void averaged_planner_products(hsep_averaged_planner *self, const hsep_av
     self->spline = end;
 }
 
-/* Steps of the solver for a Newton step. */
+/* Steps of the solver for the physics model's plan, and for a Newton step. */
+static hsep_int averaged_planner_physics_steps(const hsep_averaged_planner *self)
+{
+    return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : averaged_planner_tolerance.steps;
+}
+
 static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_int step)
 {
     return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
@@ -361,7 +366,7 @@ static hsep_real averaged_planner_left(
     }
     if (self->place == 0 && self->planned) {
         left += 15.0 * work->number + 4.0 * work->pairs + work->factor + work->solve +
-                (hsep_real)averaged_planner_tolerance.steps * parts;
+                (hsep_real)averaged_planner_physics_steps(self) * parts;
     }
     if (self->place == 0 && self->follows) {
         hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
@@ -423,7 +428,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         }
         if (self->planned) {
             AVERAGED_PLANNER_YIELD(5, work.solve);
-            self->planned = (hsep_int)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
+            self->planned = (hsep_int)averaged_planner_solve(self, task, averaged_planner_physics_steps(self));
             while (self->solving) {
                 AVERAGED_PLANNER_YIELD(6, work.step);
                 self->solving = !hsep_planner_advance(planner);

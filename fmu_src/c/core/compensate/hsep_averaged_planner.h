@@ -101,10 +101,10 @@ HSEP_API void hsep_averaged_planner_begin(
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
- * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 5 steps
- * of the physics model's programme; 3 Newton steps of n preview p / 2 for each expert, n^2 preview / 4, 2 predictions,
- * and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all
- * (m + 60) for each expert, and 700 all. */
+ * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
+ * of the physics model's programme, or 5 without what follows; 3 Newton steps of n preview p / 2 for each expert, n^2
+ * preview / 4, 2 predictions, and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview,
+ * a prediction all (m + 60) for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 
 #endif

@@ -37,7 +37,12 @@ static void slacks_take_rows(const slacks *self, const hsep_real *low, const hse
     hsep_real *second = to + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_int begin = self->range[order].begin, end = begin + self->range[order].count;
-        for (hsep_int r = begin; r < end; r++) {
+        hsep_int r = begin;
+        for (; r + HSEP_LANES <= end; r += HSEP_LANES, to += HSEP_LANES, second += HSEP_LANES) {
+            *hsep_lanes_at(to) = *hsep_lanes_const(low + r);
+            *hsep_lanes_at(second) = -*hsep_lanes_const(high + r);
+        }
+        for (; r < end; r++) {
             *to++ = low[r];
             *second++ = -high[r];
         }
@@ -49,9 +54,12 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
 {
     const hsep_real *high = y + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_real *rows = self->rows + self->range[order].begin;
-        for (hsep_int r = 0; r < self->range[order].count; r++) {
-            rows[r] = *y++ + sign * *high++;
+        hsep_real *rows = self->rows + self->range[order].begin, *end = rows + self->range[order].count;
+        for (; rows + HSEP_LANES <= end; rows += HSEP_LANES, y += HSEP_LANES, high += HSEP_LANES) {
+            *hsep_lanes_at(rows) = *hsep_lanes_const(y) + sign * *hsep_lanes_const(high);
+        }
+        for (; rows < end; rows++) {
+            *rows = *y++ + sign * *high++;
         }
     }
 }
@@ -189,7 +197,7 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
     }
     slacks *bounds = &a->slacks;
     bounds->rows = interior_take(block, &end, rows);
-    bounds->work = interior_take(block, &end, rows);
+    bounds->work = interior_take(block, &end, rows + 4 * HSEP_LANES_MOST);
     hsep_real **const of_bounds[8] = {&bounds->b,   &bounds->s,   &bounds->z,  &bounds->inverse,
                                       &bounds->r_c, &bounds->r_p, &bounds->ds, &bounds->dz};
     for (int i = 0; i < 8; i++) {

@@ -86,8 +86,14 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_i
         const hsep_int end = k + spacing < self->preview ? k + spacing : self->preview;
         if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
-            for (const hsep_real *at = b; k < end; k++, at++) {
-                delta[k] = ((c0 * at[0] + c1 * at[spacing]) + c2 * at[2 * spacing]) + c3 * at[3 * spacing];
+            const hsep_real *b0 = b, *b1 = b0 + spacing, *b2 = b1 + spacing, *b3 = b2 + spacing;
+            for (; k + HSEP_LANES <= end; k += HSEP_LANES) {
+                const hsep_lanes sum = c0 * *hsep_lanes_const(b0) + c1 * *hsep_lanes_const(b1);
+                *hsep_lanes_at(delta + k) = (sum + c2 * *hsep_lanes_const(b2)) + c3 * *hsep_lanes_const(b3);
+                b0 += HSEP_LANES, b1 += HSEP_LANES, b2 += HSEP_LANES, b3 += HSEP_LANES;
+            }
+            for (; k < end; k++) {
+                delta[k] = ((c0 * *b0++ + c1 * *b1++) + c2 * *b2++) + c3 * *b3++;
             }
         }
         for (hsep_int within = 0; k < end; k++, within++) { /* not all four are there */
@@ -106,17 +112,25 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     const hsep_int preview = self->preview;
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-        const hsep_real *restrict of = rows + (order - 1) * preview;
-        hsep_real *restrict to = rows + order * preview;
+        const hsep_real *of = rows + (order - 1) * preview;
+        hsep_real *to = rows + order * preview;
+        hsep_int k = 1;
         to[0] = of[0];
-        for (hsep_int k = 1; k < preview; k++) {
+        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
+            *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
+        }
+        for (; k < preview; k++) {
             to[k] = of[k] - of[k - 1];
         }
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
         const hsep_real share = self->share[order];
-        for (hsep_int k = 0; k < preview; k++) {
+        hsep_int k = 0;
+        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
+            *hsep_lanes_at(row + k) *= share;
+        }
+        for (; k < preview; k++) {
             row[k] *= share;
         }
     }
@@ -173,41 +187,38 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
     }
 }
 
-#define SPLINES_TOGETHER 8 /* splines whose products with another one are summed side by side */
-
-/* sums, (count,), count <= SPLINES_TOGETHER: products of splines i ... i + count - 1, each with the spline d behind it.
- * sorted: (4, preview). */
-static inline void splines_products(
-    const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int count, hsep_int d, hsep_real sums[])
+/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the spline d behind it. sorted:
+ * (4, preview). */
+static void splines_products(
+    const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int d, hsep_real sums[])
 {
     const hsep_int spacing = self->spacing;
-    hsep_real acc[SPLINES_TOGETHER] = {0.0};
+    hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0; /* each has a name, and so a register */
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_real *e = splines_differences(self, order);
         const hsep_int length = splines_length(self, order);
         hsep_int begin = order * self->preview; /* of a phase */
         for (hsep_int phase = 0; phase < spacing; phase++) {
             const hsep_real *weight = sorted + begin + i;
-            for (hsep_int k = phase, m = 0; k < length; k += spacing, m++) {
-                if (k < d * spacing + 1) {
-                    continue;
-                }
-                const hsep_real product = e[k] * e[k - d * spacing];
-                for (hsep_int l = 0; l < count; l++) {
-                    acc[l] += product * weight[m + l];
+            for (hsep_int k = phase; k < length; k += spacing, weight++) {
+                if (k > d * spacing) {
+                    const hsep_real product = e[k] * e[k - d * spacing];
+                    const hsep_lanes *w = hsep_lanes_const(weight);
+                    s0 += product * w[0], s1 += product * w[1], s2 += product * w[2], s3 += product * w[3];
                 }
             }
             begin += (self->preview - phase - 1) / spacing + 1;
         }
     }
-    memcpy(sums, acc, sizeof acc);
+    hsep_lanes *to = hsep_lanes_at(sums);
+    to[0] = s0, to[1] = s1, to[2] = s2, to[3] = s3;
 }
 
 HSEP_API void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[])
 {
     const hsep_int n = self->n - first;
-    hsep_real sums[SPLINES_TOGETHER], *sorted = work; /* rows of an order that are spacing apart become neighbours */
+    hsep_real sums[HSEP_SPLINES_TOGETHER], *sorted = work; /* rows that are spacing apart become neighbours */
     for (unsigned order = 0; order < HSEP_ORDERS; order++, weights += self->preview) {
         for (hsep_int phase = 0; phase < self->spacing; phase++) {
             for (hsep_int k = phase; k < self->preview; k += self->spacing) {
@@ -217,17 +228,13 @@ HSEP_API void hsep_splines_gram(
     }
     for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
         hsep_real *entry = triangle + d;
-        for (hsep_int i = 0; i + d < n; i += SPLINES_TOGETHER) {
-            const hsep_int left = n - d - i, count = left < SPLINES_TOGETHER ? left : SPLINES_TOGETHER;
-            if (count == SPLINES_TOGETHER) { /* of known length: registers */
-                splines_products(self, work, first + i, SPLINES_TOGETHER, d, sums);
-            } else {
-                splines_products(self, work, first + i, count, d, sums);
+        for (hsep_int i = 0; i + d < n; i++) {
+            const hsep_int within = i % HSEP_SPLINES_TOGETHER;
+            if (within == 0) {
+                splines_products(self, work, first + i, d, sums);
             }
-            for (hsep_int l = 0; l < count; l++) {
-                *entry += sums[l];
-                entry += n - (i + l);
-            }
+            *entry += sums[within];
+            entry += n - i;
         }
     }
 }

@@ -14,8 +14,10 @@
 #include "hsep_layout.h"
 #include "hsep_plan_constants.h"
 #include "hsep_real.h"
+#include "hsep_vector.h"
 
-#define HSEP_ORDERS 4 /* orders of difference: 0, the change itself, to 3, its jerk */
+#define HSEP_ORDERS 4                          /* orders of difference: 0, the change itself, to 3, its jerk */
+#define HSEP_SPLINES_TOGETHER (4 * HSEP_LANES) /* splines whose products with another one are summed side by side */
 
 typedef struct {
     hsep_int preview, spacing;
@@ -66,8 +68,9 @@ HSEP_API void hsep_splines_exceeded(
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
 
-/* The triangle of n - first rows += A' diag(weights) A, A being the matrix of hsep_splines_rows. work: (4 preview,).
- * Cost: 40 spacing multiply-adds for each of these splines. */
+/* The triangle of n - first rows += A' diag(weights) A, A being the matrix of hsep_splines_rows. work: (4 preview +
+ * 4 HSEP_LANES_MOST,), of which the last ones are read beside others. Cost: 40 spacing multiply-adds for each of these
+ * splines. */
 HSEP_API void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[]);
 

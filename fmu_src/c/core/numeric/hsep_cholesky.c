@@ -48,25 +48,6 @@ static int cholesky_panel(
     return 1;
 }
 
-/* Subtract from row i what the rows of a panel, count of them, leave of it; length: of row i. */
-static inline void cholesky_take(
-    hsep_real row[], hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_int count, hsep_int i, hsep_int length)
-{
-    if (count < HSEP_CHOLESKY_PANEL) {
-        for (hsep_int r = 0; r < count; r++) {
-            hsep_axpy(row, -rows[r][i - r], rows[r] + (i - r), length);
-        }
-        return;
-    }
-    hsep_real a[HSEP_CHOLESKY_PANEL];
-    const hsep_real *x[HSEP_CHOLESKY_PANEL];
-    for (hsep_int r = 0; r < HSEP_CHOLESKY_PANEL; r++) { /* of known length: registers */
-        x[r] = rows[r] + (i - r);
-        a[r] = *x[r];
-    }
-    hsep_take_eight(row, a, x, length);
-}
-
 HSEP_API int hsep_cholesky_rows(
     hsep_real triangle[], hsep_int n, hsep_int first, hsep_int last, const hsep_real least[])
 {
@@ -74,18 +55,31 @@ HSEP_API int hsep_cholesky_rows(
     for (hsep_int k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
         const hsep_int length = n - k, left = last - k;
         const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        hsep_real *rows[HSEP_CHOLESKY_PANEL];
+        hsep_real *rows[HSEP_CHOLESKY_PANEL], a[HSEP_CHOLESKY_PANEL];
+        const hsep_real *x[HSEP_CHOLESKY_PANEL]; /* what they have in the column of a row below, and behind it */
         for (hsep_int r = 0; r < count; r++) {
             rows[r] = row;
+            x[r] = row + (count - r);
             row += length - r;
         }
         if (!cholesky_panel(rows, count, length, least != NULL ? least + k : NULL)) {
             return 0;
         }
         hsep_real *y = row;
-        for (hsep_int i = count; i < length; i++) { /* what they leave of the rows below */
-            cholesky_take(y, rows, count, i, length - i);
-            y += length - i;
+        for (hsep_int below = length - count; below > 0; below--) { /* what they leave of the rows below */
+            for (hsep_int r = 0; r < count; r++) {
+                a[r] = *x[r]++;
+                *y -= a[r] * a[r];
+            }
+            y++;
+            if (count == HSEP_CHOLESKY_PANEL) {
+                hsep_take_eight(y, a, x, below - 1);
+            } else {
+                for (hsep_int r = 0; r < count; r++) {
+                    hsep_axpy(y, -a[r], x[r], below - 1);
+                }
+            }
+            y += below - 1;
         }
     }
     return 1;
