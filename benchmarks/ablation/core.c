@@ -55,7 +55,7 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 /* Return whether both runs were predicted without divergence. */
 int replay(const hsep_predictor_parameters *parameters, const replayed_run *first, const replayed_run *second)
 {
-    const size_t size = (size_t)hsep_predictor_block_size(parameters);
+    const size_t size = (size_t)hsep_predictor_lay_out(&(hsep_predictor){0}, parameters);
     hsep_predictor *trained = malloc(size), *learned = malloc(size), *predictor = malloc(size);
     int sound = trained != NULL && learned != NULL && predictor != NULL;
     if (sound) {

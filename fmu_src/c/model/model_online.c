@@ -233,7 +233,7 @@ static hsep_status online_checked(
 static hsep_status online_size(const online_parameters *derived, size_t *size, char message[])
 {
     const double before = (double)(sizeof(online_state) - sizeof(online_block));
-    return hsep_check_bytes(before + ONLINE(block_size)(derived), size, message);
+    return hsep_check_bytes(before + ONLINE(lay_out)(&(online_block){0}, derived), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])

@@ -48,8 +48,10 @@ from .stacking import Stack
 from .warm_start import WarmStartRows
 
 _AHEAD = 20
-"""The noise variances for the next solve are frozen this many samples before the window ends, half of it at most: a
-controller factors most of that solution in them."""
+"""Samples before the end of a window, half of it at most, at which the noise variances for the next solve are frozen.
+
+An approximation, for controllers: they factor most of that solution in them. For the same reason the scales of the
+command's expert are those of one sample before the window (``command_step`` and ``command_square``)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,8 +245,6 @@ class AveragedModel:
         largest = np.zeros(static.n) if outgrown else learned.largest
         command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
         if not static.is_planned and settings.Np > 1 and self.command_square > 0.0:
-            # A controller solves for the command's expert one sample before the window, as far as its commands are
-            # known.
             known = x_d[: settings.n_late + settings.Np]
             early = max(learned.largest_step, static.peak_velocity(known, window.start) * T_s)
             if early > 0.0 or step == 0.0:
@@ -368,11 +368,7 @@ def _folded(
     e: tuple[Array, Array],
     accepted: NDArray[np.bool_],
 ) -> AveragedModel:
-    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command.
-
-    Variances of the noise for the next window are taken before the last rows, the size of the command's residual
-    before the last one.
-    """
+    """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
     settings, n = state.settings, len(e[MODEL_RESIDUAL])
     early = settings.Np - min(settings.Np // 2, _AHEAD)
     forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0

@@ -81,12 +81,11 @@ typedef struct {
     const hsep_real *late_command, *late_x, *residuals;
 } hsep_averaged_task;
 
-/* Bytes of the block, counted as a number so that no size can overflow. */
-HSEP_API hsep_real
-hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
+HSEP_API hsep_real hsep_averaged_planner_lay_out(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
-/* Fill the block for a drive at rest at start, m, with the planner that solves its plans and a spline filtered by the
- * physics model, (preview,), m/m. Cost: as hsep_planner_gram. */
+/* Fill the block, which is 0, for a drive at rest at start, m, with the planner that solves its plans and a spline
+ * filtered by the physics model, (preview,), m/m. Cost: as hsep_planner_gram. */
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start, hsep_planner *plans, const hsep_real spline[]);

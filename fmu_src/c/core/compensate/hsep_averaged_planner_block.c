@@ -7,8 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real averaged_planner_lay_out(
+HSEP_API hsep_real hsep_averaged_planner_lay_out(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
@@ -36,24 +35,17 @@ static hsep_real averaged_planner_lay_out(
     self->weight = hsep_take(&end, (hsep_real)planner->preview);
     self->gram = hsep_take(&end, hsep_triangle(n));
     self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
-    self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
+    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real
-hsep_averaged_planner_size(const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    return averaged_planner_lay_out(&(hsep_averaged_planner){0}, parameters, planner);
 }
 
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start, hsep_planner *plans, const hsep_real spline[])
 {
-    memset(self, 0, (size_t)hsep_averaged_planner_size(parameters, planner));
-    (void)averaged_planner_lay_out(self, parameters, planner);
+    (void)hsep_averaged_planner_lay_out(self, parameters, planner);
     self->start = start;
     self->pause =
         (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);

@@ -7,8 +7,7 @@
 
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_real preview = (hsep_real)predictor->preview, horizon = (hsep_real)predictor->horizon;
@@ -23,25 +22,22 @@ static hsep_real compensator_lay_out(hsep_compensator *self, const hsep_compensa
     self->target = hsep_take(&end, horizon);
     self->spline_pb = hsep_take(&end, horizon);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
-    self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
-    self->predictor = hsep_take_block(&end, hsep_predictor_block_size(predictor));
-    self->averaged = predictor->averaging.averaging
-                         ? hsep_take_block(&end, hsep_averaged_planner_size(&model, &parameters->planner))
-                         : 0;
+    self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, &parameters->planner));
+    self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
+    self->averaged =
+        predictor->averaging.averaging
+            ? hsep_take_block(
+                  &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner))
+            : 0;
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_compensator_block_size(const hsep_compensator_parameters *parameters)
-{
-    return compensator_lay_out(&(hsep_compensator){0}, parameters);
 }
 
 HSEP_API void hsep_compensator_block_init(
     hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    memset(self, 0, (size_t)hsep_compensator_block_size(parameters));
-    (void)compensator_lay_out(self, parameters);
+    memset(self, 0, (size_t)hsep_compensator_lay_out(self, parameters));
+    (void)hsep_compensator_lay_out(self, parameters);
     hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
     self->compensate = self->compensate_next = (hsep_int)parameters->compensate;

@@ -29,8 +29,7 @@ static int linearised_counts(const hsep_averaged *model, hsep_int expert)
     return linearised_weight(model, expert, HSEP_MODEL_RESIDUAL) > 0.0;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)hsep_late(parameters->settings);
     const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings->p;
@@ -60,16 +59,10 @@ static hsep_real linearised_lay_out(hsep_linearised *self, const hsep_residual_p
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters)
-{
-    return linearised_lay_out(&(hsep_linearised){0}, parameters);
-}
-
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* before a change there is rest */
-    (void)linearised_lay_out(self, parameters);
+    (void)hsep_linearised_lay_out(self, parameters);
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
         settings->T_s, (hsep_hold)settings->input_hold);

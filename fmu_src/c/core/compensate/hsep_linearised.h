@@ -56,7 +56,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_linearised, 22);
 
-HSEP_API hsep_real hsep_linearised_size(const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters);
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters);
 
 /* A change of the commands that begins at sample 0 of the preview. */

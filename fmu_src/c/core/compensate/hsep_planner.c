@@ -21,8 +21,7 @@ static hsep_int planner_shared(const hsep_planner_parameters *parameters)
     return parameters->Np / parameters->spacing + hsep_planner_n_pinned(parameters);
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
 {
     const hsep_real preview = (hsep_real)parameters->preview;
     const hsep_int n = hsep_splines_count(parameters->preview, parameters->spacing);
@@ -38,24 +37,21 @@ static hsep_real planner_lay_out(hsep_planner *self, const hsep_planner_paramete
     self->third = hsep_take(&end, preview);
     self->P = hsep_take(&end, hsep_triangle(n));
     self->factor = hsep_take(&end, hsep_triangle(n));
-    self->splines = hsep_take_block(&end, hsep_splines_size(parameters->preview, parameters->spacing));
+    self->splines =
+        hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->preview, parameters->spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
     self->stop =
         parameters->known < parameters->preview
-            ? hsep_take_block(&end, hsep_stop_size(parameters->known, parameters->spacing, planner_shared(parameters)))
+            ? hsep_take_block(
+                  &end, hsep_stop_lay_out(
+                            &(hsep_stop){0}, parameters->known, parameters->spacing, planner_shared(parameters)))
             : 0;
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters)
-{
-    return planner_lay_out(&(hsep_planner){0}, parameters);
-}
-
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start)
 {
-    memset(self, 0, (size_t)hsep_planner_size(parameters));
-    (void)planner_lay_out(self, parameters);
+    (void)hsep_planner_lay_out(self, parameters);
     self->change = 1.0;
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;

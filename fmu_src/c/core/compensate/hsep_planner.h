@@ -69,8 +69,8 @@ typedef enum {
     HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns 1 */
 } hsep_plan_status;
 
-HSEP_API hsep_real hsep_planner_size(const hsep_planner_parameters *parameters);
-/* Fill the block for a drive at rest at start, m. */
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters);
+/* Fill the block, which is 0, for a drive at rest at start, m. */
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
 
 /* Splines that a bounded plan leaves as they are. */

@@ -20,8 +20,7 @@ HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
     return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
+HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
 {
     hsep_real end = HSEP_WORDS(hsep_splines);
     self->preview = preview;
@@ -34,15 +33,10 @@ static hsep_real splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int 
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing)
-{
-    return splines_lay_out(&(hsep_splines){0}, preview, spacing);
-}
-
 HSEP_API void hsep_splines_init(
     hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
 {
-    (void)splines_lay_out(self, preview, spacing);
+    (void)hsep_splines_lay_out(self, preview, spacing);
     for (hsep_int k = 0; k < 4 * spacing; k++) { /* the uniform cubic B-spline on the knots 0, 1, 2, 3, 4 */
         const hsep_real at = (hsep_real)k / (hsep_real)spacing, u = at >= 2.0 ? 4.0 - at : at; /* it is symmetric */
         hsep_at(self, self->shape)[k] = u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;

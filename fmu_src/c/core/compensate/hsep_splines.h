@@ -43,8 +43,7 @@ static inline void hsep_differ(hsep_real differences[HSEP_ORDERS], hsep_real val
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
 HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing);
 
-/* Bytes of the block, counted as a number. */
-HSEP_API hsep_real hsep_splines_size(hsep_int preview, hsep_int spacing);
+HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing);
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 HSEP_API void hsep_splines_init(
     hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS]);

@@ -4,8 +4,7 @@
 
 #include <string.h>
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real stop_lay_out(hsep_stop *self, hsep_int preview, hsep_int spacing, hsep_int shared)
+HSEP_API hsep_real hsep_stop_lay_out(hsep_stop *self, hsep_int preview, hsep_int spacing, hsep_int shared)
 {
     hsep_real end = HSEP_WORDS(hsep_stop);
     self->preview = preview;
@@ -21,11 +20,6 @@ static hsep_real stop_lay_out(hsep_stop *self, hsep_int preview, hsep_int spacin
         *of_rows[i] = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
     }
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_stop_size(hsep_int preview, hsep_int spacing, hsep_int shared)
-{
-    return stop_lay_out(&(hsep_stop){0}, preview, spacing, shared);
 }
 
 /* The gains that minimise the sum of squares of the differences of orders 1 to 3, in limits: a backward Riccati
@@ -56,8 +50,7 @@ static void stop_gains(hsep_stop *self, const hsep_splines *splines)
 
 HSEP_API void hsep_stop_init(hsep_stop *self, const hsep_splines *splines, hsep_int preview, hsep_int shared)
 {
-    memset(self, 0, (size_t)hsep_stop_size(preview, splines->spacing, shared));
-    (void)stop_lay_out(self, preview, splines->spacing, shared);
+    (void)hsep_stop_lay_out(self, preview, splines->spacing, shared);
     self->pole = hsep_exp(-HSEP_STOP_FADE * (hsep_real)splines->spacing / (hsep_real)splines->preview);
     stop_gains(self, splines);
 }

@@ -42,11 +42,10 @@ typedef struct {
     const hsep_real *delta_before; /* (3,) m, with their changes */
 } hsep_stop_task;
 
-/* Bytes of the block, counted as a number. shared: splines of a window, and those that the next plan leaves as they
- * are. */
-HSEP_API hsep_real hsep_stop_size(hsep_int preview, hsep_int spacing, hsep_int shared);
+/* shared: splines of a window, and those that the next plan leaves as they are. */
+HSEP_API hsep_real hsep_stop_lay_out(hsep_stop *self, hsep_int preview, hsep_int spacing, hsep_int shared);
 
-/* Fill the block, at rest, for plans of these splines. */
+/* Fill the block, which is 0, at rest, for plans of these splines. */
 HSEP_API void hsep_stop_init(hsep_stop *self, const hsep_splines *splines, hsep_int preview, hsep_int shared);
 
 /* Shorten a plan, (3 + n,) m, to what has a stop, and keep that. Cost: 250 operations a sample of the preview. */

@@ -9,7 +9,7 @@ HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters)
         return 0;
     }
     const hsep_compensator_parameters derived = hsep_compensator_derive(parameters);
-    return hsep_block_bytes(hsep_compensator_block_size(&derived));
+    return hsep_block_bytes(hsep_compensator_lay_out(&(hsep_compensator){0}, &derived));
 }
 
 HSEP_API hsep_began hsep_compensator_init(

@@ -9,7 +9,7 @@ HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
         return 0;
     }
     const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
-    return hsep_block_bytes(hsep_predictor_block_size(&derived));
+    return hsep_block_bytes(hsep_predictor_lay_out(&(hsep_predictor){0}, &derived));
 }
 
 HSEP_API hsep_began hsep_predictor_init(

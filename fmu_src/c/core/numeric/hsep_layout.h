@@ -4,9 +4,10 @@
  * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of
  * one size only, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  *
- * hsep_NAME_size gives the bytes of a block, counted as a number so that no size can overflow, and hsep_NAME_init fills
- * it with nothing learned; hsep_NAME_lay_out does both for a block that begins with 0. All functions of a block are
- * reentrant and allocate nothing.
+ * hsep_NAME_lay_out sets what follows from the parameters and returns the bytes of the block, counted as a number so
+ * that no size can overflow: of a struct alone, too, which asks for the size only; where others need that alone, it is
+ * hsep_NAME_size. hsep_NAME_init fills a block with nothing learned. All functions of a block are reentrant and
+ * allocate nothing.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H

@@ -22,8 +22,7 @@ static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
     return hsep_take(end, late + count) + (hsep_int)late;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
     const hsep_real horizon = (hsep_real)parameters->horizon;
@@ -50,24 +49,19 @@ static hsep_real predictor_lay_out(hsep_predictor *self, const hsep_predictor_pa
     self->past_e = hsep_take(&end, n + p);
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
-    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
-    self->model = hsep_take_block(&end, hsep_residual_size(&model));
+    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_lay_out(&(hsep_uncertainty){0}, self->Np, self->n));
+    self->model = hsep_take_block(&end, hsep_residual_lay_out(&(hsep_residual_model){0}, &model));
     if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
-        self->motion = hsep_take_block(&end, hsep_start_size(&model));
+        self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, &model));
     }
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters)
-{
-    return predictor_lay_out(&(hsep_predictor){0}, parameters);
 }
 
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
-    memset(self, 0, (size_t)hsep_predictor_block_size(parameters));
-    (void)predictor_lay_out(self, parameters);
+    memset(self, 0, (size_t)hsep_predictor_lay_out(self, parameters));
+    (void)hsep_predictor_lay_out(self, parameters);
     self->start = self->next = start;
     self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
     for (hsep_int i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */

@@ -79,7 +79,7 @@ struct hsep_predictor {
 
 HSEP_ASSERT_WORDS(hsep_predictor, 35);
 
-HSEP_API hsep_real hsep_predictor_block_size(const hsep_predictor_parameters *parameters);
+HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);

@@ -10,7 +10,7 @@ HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self)
 }
 
 /* Set what follows from the settings; return the bytes of the block. */
-static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
+HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
 {
     hsep_real end = HSEP_WORDS(hsep_paper);
     self->p = settings->p;
@@ -21,14 +21,9 @@ static hsep_real paper_lay_out(hsep_paper *self, const hsep_predictor_settings *
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings)
-{
-    return paper_lay_out(&(hsep_paper){0}, settings);
-}
-
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings)
 {
-    (void)paper_lay_out(self, settings);
+    (void)hsep_paper_lay_out(self, settings);
     hsep_regression_init(hsep_paper_regression(self), self->features, settings->lambda);
 }
 

@@ -29,7 +29,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_paper, 5);
 
-HSEP_API hsep_real hsep_paper_size(const hsep_predictor_settings *settings);
+HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings);
 /* Fill the block, which is 0. */
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
 

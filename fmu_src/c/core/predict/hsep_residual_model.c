@@ -25,27 +25,25 @@ HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
     return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_residual_model);
     self->Np = parameters->settings->Np;
     self->late = hsep_late(parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    self->paper = parameters->averaging->averaging ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
-    self->averaged = parameters->averaging->averaging ? hsep_take_block(&end, hsep_averaged_size(parameters)) : 0;
+    self->paper = parameters->averaging->averaging
+                      ? 0
+                      : hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
+    self->averaged = parameters->averaging->averaging
+                         ? hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters))
+                         : 0;
     return end * sizeof(hsep_real);
-}
-
-HSEP_API hsep_real hsep_residual_size(const hsep_residual_parameters *parameters)
-{
-    return residual_lay_out(&(hsep_residual_model){0}, parameters);
 }
 
 HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
-    (void)residual_lay_out(self, parameters);
+    (void)hsep_residual_lay_out(self, parameters);
     if (self->averaged) {
         hsep_averaged_init(hsep_residual_averaged(self), parameters, start);
     } else {

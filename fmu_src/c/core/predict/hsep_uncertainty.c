@@ -8,8 +8,7 @@
 static const hsep_real uncertainty_shares[] = {HSEP_UNCERTAINTY_SHARES};
 static const hsep_real uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_int n)
+HSEP_API hsep_real hsep_uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_uncertainty);
     self->Np = Np;
@@ -20,11 +19,6 @@ static hsep_real uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_i
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_uncertainty_size(hsep_int Np, hsep_int n)
-{
-    return uncertainty_lay_out(&(hsep_uncertainty){0}, Np, n);
-}
-
 HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real noise_std)
 {
     return noise_std > 0.0 ? hsep_fmax(lambda, noise_std * noise_std)
@@ -33,8 +27,8 @@ HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real n
 
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_int n, hsep_real variance)
 {
-    memset(self, 0, (size_t)hsep_uncertainty_size(Np, n));
-    (void)uncertainty_lay_out(self, Np, n);
+    memset(self, 0, (size_t)hsep_uncertainty_lay_out(self, Np, n));
+    (void)hsep_uncertainty_lay_out(self, Np, n);
     self->theta[0] = variance;
     memcpy(self->theta + 1, uncertainty_shares, sizeof uncertainty_shares);
     self->factor = self->ratio = 1.0;

@@ -32,7 +32,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
-HSEP_API hsep_real hsep_uncertainty_size(hsep_int Np, hsep_int n);
+HSEP_API hsep_real hsep_uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_int n);
 
 /* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
  * given standard deviation, m, or 0. */

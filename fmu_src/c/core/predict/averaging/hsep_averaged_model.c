@@ -30,12 +30,11 @@ static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expe
 static hsep_real averaged_expert_size(const hsep_averaged *self, hsep_int expert)
 {
     const hsep_expert_shape shape = averaged_shape(self, expert), other = averaged_shape(self, HSEP_ARX_COMMAND);
-    const hsep_real size = hsep_expert_size(&shape);
-    return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_size(&other)) : size;
+    const hsep_real size = hsep_expert_lay_out(&(hsep_expert){0}, &shape);
+    return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_lay_out(&(hsep_expert){0}, &other)) : size;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_averaging_settings *averaging = parameters->averaging;
@@ -65,11 +64,12 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     self->e_h = hsep_take(&end, n);
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
-    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(parameters));
+    self->disturbances = hsep_take_block(&end, hsep_disturbances_lay_out(&(hsep_disturbances){0}, parameters));
     self->command = hsep_take_block(&end, hsep_command_lay_out(&(hsep_command){0}, parameters));
     self->recall = hsep_take_block(&end, hsep_recall_lay_out(&(hsep_recall){0}, parameters));
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
-        self->evidence[i] = hsep_take_block(&end, hsep_warm_start_size(averaged_n_features(self, i)));
+        self->evidence[i] =
+            hsep_take_block(&end, hsep_warm_start_lay_out(&(hsep_warm_start){0}, averaged_n_features(self, i)));
     }
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         self->experts[i] = hsep_take_block(&end, averaged_expert_size(self, i));
@@ -77,14 +77,9 @@ static hsep_real averaged_lay_out(hsep_averaged *self, const hsep_residual_param
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_averaged_size(const hsep_residual_parameters *parameters)
-{
-    return averaged_lay_out(&(hsep_averaged){0}, parameters);
-}
-
 HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
-    (void)averaged_lay_out(self, parameters);
+    (void)hsep_averaged_lay_out(self, parameters);
     self->leading = HSEP_ARX_RESIDUAL;
     hsep_stack_init(&self->learned.stack);
     hsep_disturbances_init(hsep_averaged_disturbances(self), parameters, start);

@@ -18,8 +18,7 @@ HSEP_API void hsep_residual_scale_follow(
     self->largest_square = hsep_fmax(self->largest_square, sum / count);
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
+HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
 {
     const hsep_real window = (hsep_real)shape->n, lags = (hsep_real)shape->p;
     hsep_real end = HSEP_WORDS(hsep_expert);
@@ -39,12 +38,10 @@ static hsep_real expert_lay_out(hsep_expert *self, const hsep_expert_shape *shap
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape) { return expert_lay_out(&(hsep_expert){0}, shape); }
-
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape)
 {
-    memset(self, 0, (size_t)hsep_expert_size(shape));
-    (void)expert_lay_out(self, shape);
+    memset(self, 0, (size_t)hsep_expert_lay_out(self, shape));
+    (void)hsep_expert_lay_out(self, shape);
     hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->room);
     for (hsep_int i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =

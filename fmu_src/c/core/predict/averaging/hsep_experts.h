@@ -57,7 +57,7 @@ HSEP_ASSERT_WORDS(hsep_expert, 17);
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count);
 
-HSEP_API hsep_real hsep_expert_size(const hsep_expert_shape *shape);
+HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
 
 static inline hsep_solution *hsep_expert_solution(hsep_expert *self)

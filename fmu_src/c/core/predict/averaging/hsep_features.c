@@ -24,8 +24,7 @@ static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
     return (hsep_physics *)hsep_at(self, self->filters + i * self->filter_words);
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_int count = hsep_disturbances_count(parameters);
@@ -42,16 +41,11 @@ static hsep_real disturbances_lay_out(hsep_disturbances *self, const hsep_residu
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters)
-{
-    return disturbances_lay_out(&(hsep_disturbances){0}, parameters);
-}
-
 HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    (void)disturbances_lay_out(self, parameters);
+    (void)hsep_disturbances_lay_out(self, parameters);
     self->origin = start;
     for (hsep_int i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
         hsep_physics_init(

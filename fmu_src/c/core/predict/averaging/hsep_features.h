@@ -54,7 +54,7 @@ HSEP_ASSERT_WORDS(hsep_disturbances, 9 + 2 * sizeof(hsep_disturbed) / sizeof(hse
 HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters);
 HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters);
 
-HSEP_API hsep_real hsep_disturbances_size(const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
     hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
@@ -113,7 +113,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_command, 5);
 
-/* Set what follows from the parameters, the rest of the block being 0, at rest; return the bytes of the block. */
+/* It is all that a block of 0 needs to be at rest. */
 HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */

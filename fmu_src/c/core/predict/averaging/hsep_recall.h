@@ -34,7 +34,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
-/* Set what follows from the parameters, the rest of the block being 0, at rest; return the bytes of the block. */
+/* It is all that a block of 0 needs to be at rest. */
 HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */

@@ -7,8 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
 {
     const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
     const hsep_real Np = (hsep_real)parameters->settings->Np, n = (hsep_real)parameters->n;
@@ -28,15 +27,10 @@ static hsep_real start_lay_out(hsep_start *self, const hsep_residual_parameters 
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_start_size(const hsep_residual_parameters *parameters)
-{
-    return start_lay_out(&(hsep_start){0}, parameters);
-}
-
 HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    (void)start_lay_out(self, parameters);
+    (void)hsep_start_lay_out(self, parameters);
     hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
     const hsep_real late = (hsep_real)(settings->dead_time + (self->n - self->Np)); /* samples */
     for (hsep_int i = 0; i < parameters->n_modes; i++) {

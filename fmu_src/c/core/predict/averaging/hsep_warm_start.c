@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* Set what follows from the number of features; return the bytes of the block. */
-static hsep_real warm_start_lay_out(hsep_warm_start *self, hsep_int n)
+HSEP_API hsep_real hsep_warm_start_lay_out(hsep_warm_start *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_warm_start);
     self->of_run = hsep_take_block(&end, hsep_gram_size(n));
@@ -13,11 +13,9 @@ static hsep_real warm_start_lay_out(hsep_warm_start *self, hsep_int n)
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_warm_start_size(hsep_int n) { return warm_start_lay_out(&(hsep_warm_start){0}, n); }
-
 HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n)
 {
-    (void)warm_start_lay_out(self, n);
+    (void)hsep_warm_start_lay_out(self, n);
     hsep_gram_init(hsep_warm_start_of_run(self), n);
     hsep_gram_init(hsep_warm_start_earlier(self), n);
 }

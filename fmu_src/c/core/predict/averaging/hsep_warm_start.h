@@ -11,8 +11,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_warm_start, 2);
 
-/* Bytes of the block, counted as a number so that no size can overflow; n: features. */
-HSEP_API hsep_real hsep_warm_start_size(hsep_int n);
+/* n: features. */
+HSEP_API hsep_real hsep_warm_start_lay_out(hsep_warm_start *self, hsep_int n);
 HSEP_API void hsep_warm_start_init(hsep_warm_start *self, hsep_int n);
 
 static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self)
