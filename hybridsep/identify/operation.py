@@ -14,7 +14,7 @@ from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
 from .search import fit_near
-from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out, without_long_delay
+from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out, well_damped, without_long_delay
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
@@ -49,8 +49,8 @@ def identify_operation(
     The error of the simulated position is least over poles, zeros, gain, whole samples of dead time and the hold, for
     structures from a mere gain to three modes; offset and state at the start of each recording are estimated beside
     them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before. Where the
-    chosen one has a long dead time, and a second order with a shorter one is as good, that takes its place; the result
-    is then fitted to everything.
+    chosen one has a long dead time, or hardly any damping, and a second order with a shorter one, or with a usual one
+    and a zero, is as good, that takes its place; the result is then fitted to everything.
 
     ``recordings``: iterable of pairs ``(x_d, x)`` of (n,), m: commanded and measured positions, one pair for each
     piece without a gap, sampled alike; ``x`` is NaN where it is missing. Such samples are left out of the error, the
@@ -67,8 +67,8 @@ def identify_operation(
         raise IdentificationError(f"{part} cannot determine a model, because {reason}")
     structures = [structure for structure in STRUCTURES if structure.order <= order_max]
     candidates = compare_structures(segments, T_s, structures, progress)
-    chosen = without_long_delay(choose(candidates), segments, T_s)
-    candidates = [chosen if one.structure == chosen.structure else one for one in candidates]
+    chosen = well_damped(without_long_delay(choose(candidates), segments, T_s), segments, T_s)
+    candidates = list({one.structure: one for one in (*candidates, chosen)}.values())
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
     findings = []
@@ -172,6 +172,11 @@ def _findings(
             f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model "
             f"leaves {shown.words(fit.rms)}; friction, or a disturbance that repeats with the command, moves its modes "
             "by more than their standard deviations say; record faster motion, or give the loop's gains (cascade)"
+        )
+    if fit.structure.zeta:
+        findings.append(
+            f"{part} does not tell how the loop is damped, which follows without a lag (velocity feed-forward): a "
+            f"damping ratio of {fit.structure.zeta} is taken; give the loop's gains (cascade) if they are known"
         )
     gain = float(fit.structure.gains(fit.linear)[0].sum())
     if not fit.structure.unit_gain:

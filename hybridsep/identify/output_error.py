@@ -192,16 +192,22 @@ def fit_structure(
     ``slowest``, rad/s, bounds the natural frequencies from below; about ``rows_max`` residuals take part.
     """
     problem = _Problem(segments, T_s, structure, delay, rows_max)
-    low, high = structure.bounds(T_s, slowest)
+    (low, high), searched = structure.bounds(T_s, slowest), structure.searched
+
+    def relative_residual(found: Array, theta: Array, scale: float) -> Array:
+        theta[searched] = found
+        return problem.solve(theta)[0] / scale
+
     best: Fit | None = None
     for start in starts if structure.order else [np.empty(0)]:
         theta = np.clip(start, low + 1e-9, high - 1e-9)
         if structure.order:
             scale = float(np.sqrt(np.mean(problem.solve(theta)[0] ** 2))) or 1.0
-            theta = least_squares(
-                lambda theta, scale=scale: problem.solve(theta)[0] / scale,
-                *(theta,),
-                bounds=(low, high),
+            theta[searched] = least_squares(
+                relative_residual,
+                *(theta[searched],),
+                args=(theta, scale),
+                bounds=(low[searched], high[searched]),
                 xtol=1e-6,
                 ftol=1e-7,
                 gtol=1e-10,

@@ -51,19 +51,20 @@ def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit) -> Fit:
 def shorter_delays(segments: Sequence[Segment], T_s: float, fit: Fit) -> Iterator[Fit]:
     """Yield second orders with shorter dead times, shortest first, that the recording contradicts no more than the fit.
 
-    Only of a lag, or a second order, with a dead time longer than half of what its poles lag by. Contradicted is by the
-    likelihood ratio, of as many samples as tell as much as white ones.
+    Only of a lag, or a second order, with a dead time longer than half of what its poles lag by, less what its zero
+    leads by. Contradicted is by the likelihood ratio, of as many samples as tell as much as white ones.
     """
     structure, theta, halves = fit.structure, fit.theta, fit.delay.halves
-    if structure.zero or structure.order not in (1, 2):
+    if structure.order not in (1, 2):
         return
     lag = np.exp(-theta[-1]) if structure.lag else 2.0 * np.exp(theta[1] - theta[0])
-    if halves * T_s <= lag:
+    lead = structure.gains(fit.linear)[1][0] * np.exp(-theta[0]) if structure.zero else 0.0
+    if halves * T_s <= lag - lead:
         return
     fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
     _, n_effective = estimates(fit, fitted, T_s)
     most = fit.rms * np.sqrt(1.0 + _CONTRADICTED / n_effective)
-    second, all_late = Structure(1, unit_gain=structure.unit_gain), lag + halves * T_s / 2
+    second, all_late = Structure(1, zero=structure.zero, unit_gain=structure.unit_gain), lag + halves * T_s / 2
     for shorter in range(0, halves, -(-halves // _SHORTER)):
         starts = [np.log([2.0 * zeta / (all_late - shorter * T_s / 2), zeta]) for zeta in (0.5, 1.0)]
         found = fit_structure(segments, T_s, second, Delay(shorter), starts, fit.slowest)

@@ -1,13 +1,13 @@
 """Choice of the structure by the error on a later part of the recording that was not fitted to."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.signals import Array, Indices
 from ..model.physics import Mode
-from .output_error import Fit, Segment, motion_split, simulated
+from .output_error import Fit, Segment, fit_structure, motion_split, simulated
 from .search import fit_delay, shorter_delays
 from .structure import DECAY_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
@@ -58,7 +58,8 @@ TOLERANCE = 0.02  # relative increase of the held-out error that a simpler struc
 
 _EXCESS_MAX = 0.1
 """Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
-whose errors are alike tell little. With a shorter dead time the product of fitted and held-out error may have it."""
+whose errors are alike tell little. With a shorter dead time, or more damping, the product of fitted and held-out error
+may have it."""
 
 _GAINS_MAX = 20.0
 """Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
@@ -75,6 +76,9 @@ _CANCELLING_WORTH = 0.6
 """Ratio of the errors, geometric mean of fitted and held-out ones, at which a model with a slow part that its zeros all
 but cancel is taken: a slow part that fits friction and cables leaves 0.64 to 0.85, one that is in the drive's loops
 less."""
+
+_LIGHT, _DAMPED = 0.25, 0.5
+"""Damping ratio below which a second order is hardly damped; that of a loop whose motion does not tell it."""
 
 _GROWTH = 2  # orders above the best one that are tried before the search ends
 _LAGS = 20  # lags at which the residual's correlation is looked at: nothing is left to model where it is white
@@ -174,10 +178,31 @@ def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: floa
     split = motion_split(segments, 1.0 - HELD_OUT)
     for fit in shorter_delays(split, T_s, chosen.fit):
         error = _held_out_error(fit, split, T_s)
-        ratios = fit.rms / chosen.fit.rms * np.std(error) / np.std(chosen.held_out)
-        if not _objection(fit, split, T_s) and ratios <= 1 + _EXCESS_MAX:
-            return Candidate(fit, error - error.mean(), "")
+        shorter = Candidate(fit, error - error.mean(), "")
+        if not _objection(fit, split, T_s) and _together(shorter, chosen) <= 1 + _EXCESS_MAX:
+            return shorter
     return chosen
+
+
+def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:
+    """Return a second order with a usual damping and a zero that is as good on both parts together, or the chosen one.
+
+    A loop with velocity feed-forward follows without a lag however it is damped, so that motion that is slow beside it
+    tells its natural frequency alone. Without a zero only what is hardly damped has no lag; plans by it ring.
+    """
+    fit, structure = chosen.fit, chosen.structure
+    if structure.n_modes != 1 or structure.lag or fit.theta[1] >= np.log(_LIGHT):
+        return chosen
+    split, start = motion_split(segments, 1.0 - HELD_OUT), np.array([fit.theta[0], np.log(_DAMPED)])
+    fit = fit_structure(split, T_s, replace(structure, zero=True, zeta=_DAMPED), fit.delay, [start], fit.slowest)
+    error = _held_out_error(fit, split, T_s)
+    damped = Candidate(fit, error - error.mean(), "")
+    return chosen if _objection(fit, split, T_s) or _together(damped, chosen) > 1 + _EXCESS_MAX else damped
+
+
+def _together(candidate: Candidate, other: Candidate) -> float:
+    """Return the product of the ratios of their errors, on the fitted and on the held-out part."""
+    return float(candidate.fit.rms / other.fit.rms * np.std(candidate.held_out) / np.std(other.held_out))
 
 
 def _held_out_error(fit: Fit, split: Sequence[Segment], T_s: float) -> Array:
@@ -195,7 +220,7 @@ def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
             chosen = candidate
     for other in usable:
         s, c = other.structure, chosen.structure
-        if (s.n_modes, s.lag, s.zero) == (c.n_modes, c.lag, c.zero) and c.unit_gain and not s.unit_gain and c.order:
+        if c == replace(s, unit_gain=True) and not s.unit_gain and c.order:
             gains = s.gains(other.fit.linear)[0]
             if (
                 other.rms_held_out <= (1 + TOLERANCE) * chosen.rms_held_out

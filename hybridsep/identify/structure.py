@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..base.signals import Array
@@ -38,6 +39,12 @@ class Structure:
     lag: bool = False  # whether there is a first-order lag as well
     zero: bool = False  # whether the modes have a ``β``
     unit_gain: bool = True  # whether the static gain is 1, not estimated
+    zeta: float = 0.0  # damping ratio of its modes that is taken, not estimated; 0: none
+
+    @property
+    def searched(self) -> NDArray[np.bool_]:
+        """Which of the nonlinear parameters are searched for, ``(order,)``."""
+        return np.array([True, self.zeta == 0.0] * self.n_modes + [True] * self.lag, dtype=bool)
 
     @property
     def order(self) -> int:
@@ -52,7 +59,7 @@ class Structure:
     @property
     def n_parameters(self) -> int:
         """Number of parameters, with the dead time."""
-        return self.order + self.n_linear + 1
+        return int(self.searched.sum()) + self.n_linear + 1
 
     @property
     def name(self) -> str:
@@ -64,6 +71,7 @@ class Structure:
         else:
             form = "second order" if self.n_modes == 1 else f"{self.n_modes} modes"
             form += " with zero" if self.zero and self.n_modes == 1 else ""
+            form += f" and ζ {self.zeta}" if self.zeta else ""
             form += " and lag" if self.lag else ""
         return f"{form}, gain {'1' if self.unit_gain else 'free'}"
 

@@ -72,6 +72,40 @@ def test_an_arm_that_sags_has_poles_not_a_dead_time() -> None:
 
 
 @pytest.mark.slow
+def test_a_servo_with_feed_forward_that_friction_hides_is_no_mode_that_rings() -> None:
+    """A proportional loop around a proportional-integral one: without a zero, hardly any damping fits as well."""
+    t, f_n, zeta = T_S * np.arange(8000), 25.0, 0.5
+    omega = 2 * np.pi * f_n
+    x_d = 4e-3 * np.sin(2 * np.pi * (0.3 * t + 0.08 * t**2))
+    x, position, velocity, integral = np.zeros_like(x_d), 0.0, 0.0, 0.0
+    for k in range(1, len(x_d)):
+        forward, dt = (x_d[k] - x_d[k - 1]) / T_S, T_S / 10
+        for i in range(10):
+            late = x_d[k - 1] + forward * (i + 1) * dt - position
+            error = omega / (2 * zeta) * late + forward - velocity
+            integral += error * dt / 0.12
+            friction = 2 * zeta * omega * 0.015 * np.tanh(velocity / 1e-4)
+            velocity += dt * (2 * zeta * omega * (error + integral) - friction)
+            position += dt * velocity
+        x[k] = position
+    found = identify_operation([(x_d, x)], T_S, order_max=2)
+    assert found.structure.startswith("second order with zero and ζ 0.5")
+    mode = found.model.modes[0]
+    assert mode.f_n == pytest.approx(f_n, rel=0.4)
+    assert mode.beta == pytest.approx(2 * mode.zeta * mode.omega, rel=0.2)  # hardly a lag
+    assert any("does not tell how the loop is damped" in one for one in found.findings)
+
+
+@pytest.mark.slow
+def test_a_mode_that_rings_in_the_log_is_kept() -> None:
+    truth = ModalModel([Mode(11.0, 0.07, (22 * np.pi) ** 2, 0.0)])
+    x_d = moves(6000)
+    found = identify_operation([(x_d, measured(truth, rubbed(x_d, 20e-6), "zoh", 1e-6))], T_S, order_max=2)
+    assert found.structure.startswith("second order, gain")
+    assert value(found, "mode[1].zeta")[0] == pytest.approx(0.07, rel=0.3)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_std", [2e-5, 2e-4])
 def test_a_dead_time_that_the_log_shows_is_kept(noise_std: float) -> None:
     """With more noise the errors of a shorter one are within a tenth, which white samples contradict all the same."""
