@@ -279,7 +279,7 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
 
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
-    hsep_real begun;     /* what hsep_averaged_planner_begin has cost */
+    hsep_real begun;     /* what the sample has cost that begins the window */
     hsep_real number;    /* one of every sample of the plan */
     hsep_real commands;  /* commands of a plan, and their disturbances */
     hsep_real sample;    /* a sample of its prediction, with its variance, */
@@ -311,12 +311,13 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
     work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
                     all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
-    work.begun = 2.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
+    /* with what is learned at the end of the last window, as much as commands of a plan */
+    work.begun = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * HSEP_WORK_NUMBER * (4.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 8.0);
+    work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 7.0);
     work.factor = work.pairs * (n / 6.0 + 1.5);
-    work.solve = 4.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
-    work.step = (9.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
+    work.solve = 5.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
+    work.step = (10.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
     return work;
 }
 
