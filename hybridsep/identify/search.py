@@ -59,7 +59,7 @@ def shorter_delays(segments: Sequence[Segment], T_s: float, fit: Fit) -> Iterato
         return
     lag = np.exp(-theta[-1]) if structure.lag else 2.0 * np.exp(theta[1] - theta[0])
     lead = structure.gains(fit.linear)[1][0] * np.exp(-theta[0]) if structure.zero else 0.0
-    if halves * T_s <= lag - lead:
+    if halves * T_s <= max(lag - lead, 0.0):
         return
     fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
     _, n_effective = estimates(fit, fitted, T_s)
@@ -109,14 +109,22 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
 
 
 def _bandwidth(segments: Sequence[Segment], T_s: float, known: Mapping[Structure, Fit]) -> float:
-    """Return the bandwidth, rad/s: 1 over lag and dead time of the fitted lag, else over the servo error's delay."""
+    """Return the bandwidth, rad/s: of the fitted lag and its dead time, or of what the servo error tells if less.
+
+    The error is about ``velocity · lag + acceleration/ω²``; with velocity feed-forward there is no lag.
+    """
     lags = [fit for structure, fit in known.items() if structure.lag and not structure.n_modes]
+    used = [s for s in segments if s.stop > 1]
+    velocities = [np.gradient(s.u[: s.stop], T_s) for s in used]
+    motion = np.column_stack(
+        [
+            np.concatenate([one[s.known[: s.stop]] for one, s in zip(part, used, strict=True)])
+            for part in (velocities, [np.gradient(one, T_s) for one in velocities])
+        ]
+    )
+    error = np.concatenate([(s.u - s.y)[: s.stop][s.known[: s.stop]] for s in used])
+    tau, square = np.linalg.lstsq(motion - motion.mean(axis=0), error - error.mean(), rcond=None)[0]
     if lags:
         lag = min(lags, key=lambda fit: fit.rms)
-        return float(1.0 / (np.exp(-lag.theta[0]) + T_s * lag.delay.halves / 2))
-    used = [s for s in segments if s.stop > 1]
-    velocity = np.concatenate([np.gradient(s.u[: s.stop], T_s)[s.known[: s.stop]] for s in used])
-    error = np.concatenate([(s.u - s.y)[: s.stop][s.known[: s.stop]] for s in used])
-    power = float(velocity @ velocity)
-    tau = float(velocity @ (error - error.mean())) / power if power > 0 else 0.0
-    return 1.0 / min(max(tau, 2 * T_s), 1.0)
+        tau = np.exp(-lag.theta[0]) + T_s * lag.delay.halves / 2
+    return float(1.0 / min(max(tau, np.sqrt(max(square, 0.0)), 2 * T_s), 1.0))
