@@ -265,8 +265,13 @@ def draw(file: Path, errors: dict[str, Array]) -> None:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
-    for way in ("off", "hybrid, cold, from the gains", "the same, which remembers a pass"):
-        axes.plot(T_S * np.arange(len(errors[way])), UM * errors[way], label=way, linewidth=1)
+    shown = {
+        "off": "off",
+        "the same, which remembers a pass": "cold, from the gains",
+        "and trained by fit": "trained by fit",
+    }
+    for way, label in shown.items():
+        axes.plot(T_S * np.arange(len(errors[way])), UM * errors[way], label=label, linewidth=1)
     axes.set(xlabel="t [s]", ylabel="contour error [µm]", title=f"Xiao, Wan, Qin 2023, Table 1: pass {PASSES}")
     axes.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, -0.14), frameon=False)
     figure.savefig(file, dpi=100)
