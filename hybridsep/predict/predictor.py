@@ -347,9 +347,7 @@ class HybridPredictor:
             arrays |= {"pending_x_d": x_d, "pending_x_pb": x_pb, "pending_path": path}
             meta["pending_start"] = forecast.window.start
             if (scales := forecast.scales) is not None:  # a compensator has them from its preview
-                arrays["pending_scales"] = np.array(
-                    [scales.velocity, scales.step, scales.command_step, scales.command_square]
-                )
+                arrays["pending_scales"] = np.array([scales.velocity, scales.step])
                 arrays["pending_largest"] = scales.largest
         return pack(_KIND, meta, arrays)
 
@@ -377,8 +375,8 @@ class HybridPredictor:
             if (start := meta["pending_start"]) is not None:
                 scales = None
                 if "pending_scales" in arrays:
-                    velocity, *others = arrays["pending_scales"].tolist()
-                    scales = FeatureScales(velocity, arrays["pending_largest"], *others)
+                    velocity, step = arrays["pending_scales"].tolist()
+                    scales = FeatureScales(velocity, arrays["pending_largest"], step)
                 window = ResidualWindow(arrays["pending_x_d"], arrays["pending_x_pb"], start, arrays["pending_path"])
                 predictor.pending = predictor._with_error(predictor.residual.forecast(window, scales))
         return predictor

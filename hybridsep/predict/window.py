@@ -30,10 +30,6 @@ class FeatureScales(NamedTuple):
     velocity: float  # m/s: velocity scale of the friction features
     largest: Array  # (n_static,): largest magnitudes of the static features, so far and ahead
     step: float  # m: largest change of the command from sample to sample, so far and ahead
-    # m and m²: that change, and the largest mean square of the command's residual, that priors of the command's expert
-    # come from
-    command_step: float
-    command_square: float
 
 
 @dataclass(frozen=True)

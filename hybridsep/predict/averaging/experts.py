@@ -269,8 +269,8 @@ class Regression(Expert):
         if rows.n_rows == 0.0:
             return None
         if kind == COMMAND_RESIDUAL:
-            command, square = model.command, scales.command_square
-            p, shares, largest = command.p, command.shares, command.largest(scales.command_step or 1.0)
+            command = model.command
+            p, shares, largest = command.p, command.shares, command.largest(scales.step or 1.0)
         else:
             p, shares, largest = settings.p, model.static.shares, scales.largest
         effect = settings.effect or math.sqrt(square)

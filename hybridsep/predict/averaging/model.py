@@ -50,8 +50,7 @@ from .warm_start import WarmStartRows
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the noise variances for the next solve are frozen.
 
-An approximation, for controllers: they factor most of that solution in them. For the same reason the scales of the
-command's expert are those of one sample before the window (``command_step`` and ``command_square``)."""
+An approximation, for controllers: they factor most of that solution in them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +129,6 @@ class AveragedModel:
     evidence: tuple[WarmStartRows, WarmStartRows]
     # m²: of the regressions, variances that the penalties of the next solution come from; 0: none yet
     noise: tuple[float, ...]
-    # m²: largest mean square of the command's residual, before the last sample of the last window; 0: none yet
-    command_square: float
     leader: int  # place of the expert that led when earlier runs ended
     run: RunState
 
@@ -150,7 +147,7 @@ class AveragedModel:
         evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * command.p + 2)
         learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
         run = RunState.init(settings.p, static, command, Memory.init(settings.recall, settings.Np))
-        return cls(settings, static, command, learned, evidence, noise, 0.0, leader, run)
+        return cls(settings, static, command, learned, evidence, noise, leader, run)
 
     @property
     def leading(self) -> Regression:
@@ -210,7 +207,7 @@ class AveragedModel:
             stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
         run = RunState.init(self.settings.p, self.static, self.command, self.run.memory.restart())
-        state = replace(self, learned=learned, evidence=evidence, command_square=0.0, leader=leading.place, run=run)
+        state = replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run)
         return state.with_noise(learned)
 
     def plan_ahead(self) -> AveragedModel:
@@ -230,27 +227,19 @@ class AveragedModel:
         A compensator begins to move before its path, with a creep.
         """
         static, learned, settings = self.static, self.learned, self.settings
-        T_s = settings.T_s
         before = learned.velocity_scale
-        x_d = np.append(self.run.static.x_d, window.x_d)
-        peak = static.peak_velocity(x_d, window.start)
+        peak = static.peak_velocity(np.append(self.run.static.x_d, window.x_d), window.start)
         n_windows = self.evidence[MODEL_RESIDUAL].earlier.n_rows / settings.Np
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
-        step = max(learned.largest_step, peak * T_s)
+        step = max(learned.largest_step, peak * settings.T_s)
         if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
             peak = max(static.peak_velocity(window.raw_commands[settings.n_late :], window.start), before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
         largest = np.zeros(static.n) if outgrown else learned.largest
-        command_step, command_square = step, learned.scales[COMMAND_RESIDUAL].largest_square
-        if not static.is_planned and settings.Np > 1 and self.command_square > 0.0:
-            known = x_d[: settings.n_late + settings.Np]
-            early = max(learned.largest_step, static.peak_velocity(known, window.start) * T_s)
-            if early > 0.0 or step == 0.0:
-                command_step, command_square = early, self.command_square
         largest = np.maximum(largest, np.abs(rows).max(axis=0)) if velocity > 0.0 else np.ones(static.n)
-        return FeatureScales(velocity, largest, step, command_step, command_square)
+        return FeatureScales(velocity, largest, step)
 
     def solved(self, scales: FeatureScales) -> dict[Regression, SolvedExpert]:
         """Return the regressions that know something, with their weights."""
@@ -352,7 +341,7 @@ class AveragedModel:
 
 def _with_scales(state: AveragedModel, forecast: AveragedForecast, fastest: float) -> AveragedModel:
     """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
-    learned, (velocity, largest, step, _, _) = state.learned, forecast.scales
+    learned, (velocity, largest, step) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
     stack = learned.stack
     if velocity != learned.velocity_scale:
@@ -388,11 +377,7 @@ def _folded(
 
     state = replace(state, evidence=learned((one.discount(forgetting_factor) for one in state.evidence), slice(early)))
     state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
-    of_command, last = state.learned.scales[COMMAND_RESIDUAL], settings.Np - 1
-    if accepted[:last].any():
-        of_command = of_command.follow(e[COMMAND_RESIDUAL][:last][accepted[:last]])
-    evidence = learned(state.evidence, slice(early, n))
-    return replace(state, evidence=evidence, command_square=of_command.largest_square)
+    return replace(state, evidence=learned(state.evidence, slice(early, n)))
 
 
 def _judged_experts(

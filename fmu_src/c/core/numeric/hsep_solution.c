@@ -21,7 +21,6 @@ static hsep_real solution_lay_out(hsep_solution *self, hsep_int n_head, hsep_int
     self->left = hsep_take(&end, hsep_triangle(n_tail + 1));
     self->least = hsep_take(&end, n + 1.0);
     self->rows = hsep_take(&end, (hsep_real)room * (n + 1.0));
-    self->last = hsep_take(&end, n + 1.0);
     self->work = hsep_take(&end, HSEP_SOLUTION_ABREAST * (n + 1.0));
     self->abreast = hsep_take(&end, HSEP_SOLUTION_ABREAST * (n + 1.0));
     return end * sizeof(hsep_real);
@@ -81,7 +80,7 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
 
 HSEP_API void hsep_solution_reset(hsep_solution *self)
 {
-    self->begun = self->factored = self->waiting = self->finished = self->completed = 0;
+    self->begun = self->factored = self->waiting = self->finished = 0;
 }
 
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight)
@@ -132,10 +131,10 @@ static hsep_real solution_of_row(const hsep_solution *self, hsep_int factored)
     return all * all - 0.5 * left * left;
 }
 
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come, int tail)
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
-    const hsep_real behind = tail ? 0.0 : (hsep_real)self->n_tail + 1.0;
+    const hsep_real behind = (hsep_real)self->n_tail + 1.0;
     const hsep_real rows = (hsep_real)(self->waiting + to_come);
     return (all * all * all - behind * behind * behind) / 6.0 + rows * solution_of_row(self, self->n_head);
 }
@@ -173,7 +172,8 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
     return amount;
 }
 
-HSEP_API void hsep_solution_complete(hsep_solution *self)
+/* Take in all rows that have come, and factor the tail with its penalties. */
+static void solution_complete(hsep_solution *self)
 {
     const hsep_int n_head = self->n_head, n_tail = self->n_tail;
     const size_t size = (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real);
@@ -193,38 +193,20 @@ HSEP_API void hsep_solution_complete(hsep_solution *self)
     }
     least[n_tail] = hsep_fmax(HSEP_SOLUTION_OF_TARGET * self->square, HSEP_SOLUTION_LEAST);
     (void)hsep_cholesky_rows(tail, n_tail + 1, 0, n_tail + 1, least);
-    self->finished = self->completed = 1;
+    self->finished = 1;
 }
 
-HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
+HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
 {
     const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
-    const size_t width = (size_t)(n + 1) * sizeof(hsep_real);
-    const hsep_real *penalties = hsep_at(self, self->penalties);
+    const hsep_real *penalties = hsep_at(self, self->penalties), *row = hsep_at(self, self->factor);
     hsep_real *w = hsep_at(self, self->weights), *x = hsep_at(self, self->work);
-    hsep_real *rows = hsep_at(self, self->rows), *u = hsep_at(self, self->last);
-    if (!self->completed && apart && !self->finished && self->waiting > 0) { /* the last row becomes the only one */
-        const hsep_int last = --self->waiting;
-        hsep_solution_complete(self);
-        memmove(rows, rows + (n + 1) * last, width);
-        self->waiting = 1;
-    } else if (!self->completed) {
-        hsep_solution_complete(self);
-    }
-    self->last_square = 0.0;
-    if (self->waiting > 0) {
-        memcpy(u, rows, width);
-        hsep_cholesky_forward(hsep_at(self, self->factor), n + 1, n, u);
-        self->last_square = hsep_dot(u, u, n);
-    }
-    const int is_one = self->waiting > 0; /* R x = z + u (target - u' z) / (1 + u' u) */
-    const hsep_real innovation = is_one ? u[n] : 0.0, gain = innovation / (1.0 + self->last_square);
-    const hsep_real *row = hsep_at(self, self->factor);
-    for (hsep_int i = 0; i < n; i++) {
-        x[i] = row[n - i] + (is_one ? gain * u[i] : 0.0);
+    solution_complete(self);
+    for (hsep_int i = 0; i < n; i++) { /* R x = z */
+        x[i] = row[n - i];
         row += n + 1 - i;
     }
-    hsep_real sum = *row * *row + gain * innovation;
+    hsep_real sum = *row * *row;
     hsep_cholesky_backward(hsep_at(self, self->factor), n + 1, n, x);
     memcpy(w, x + n_head, (size_t)n_tail * sizeof(hsep_real));
     for (hsep_int i = 0; i < n_head; i++) {
@@ -233,7 +215,6 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart)
     for (hsep_int i = 0; i < n; i++) { /* sum of the squares, and of the penalties */
         sum -= penalties[i] * w[i] * w[i];
     }
-    self->completed = 0;
     return hsep_fmax(sum, 0.0);
 }
 
@@ -274,34 +255,14 @@ static void solution_forward_abreast(hsep_solution *self)
     }
 }
 
-/* Sums of u_i x_i, or of x_i x_i without u, over four rows side by side; to the bit as hsep_dot has each. */
-static void solution_dot_abreast(const hsep_real *u, const hsep_lanes x[], hsep_int m, hsep_lanes sums[HSEP_OF_FOUR])
-{
-    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++, x++) { /* each sum has a name, and so a register */
-        hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0;
-        const hsep_lanes *at = x;
-        hsep_int i = 0;
-        for (; i + 4 <= m; i += 4, at += 4 * HSEP_OF_FOUR) {
-            const hsep_lanes x0 = at[0], x1 = at[HSEP_OF_FOUR], x2 = at[2 * HSEP_OF_FOUR], x3 = at[3 * HSEP_OF_FOUR];
-            s0 += (u != NULL ? u[i] * x0 : x0 * x0);
-            s1 += (u != NULL ? u[i + 1] * x1 : x1 * x1);
-            s2 += (u != NULL ? u[i + 2] * x2 : x2 * x2);
-            s3 += (u != NULL ? u[i + 3] * x3 : x3 * x3);
-        }
-        for (; i < m; i++, at += HSEP_OF_FOUR) {
-            s0 += (u != NULL ? u[i] * *at : *at * *at);
-        }
-        sums[l] = (s0 + s1) + (s2 + s3);
-    }
-}
-
 /* The leverages of four rows side by side. */
 static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
     const hsep_int m = self->n_head + self->n_tail;
-    const hsep_real *u = hsep_at(self, self->last), square = self->last_square, *rows = hsep_at(self, self->work);
+    const hsep_real *rows = hsep_at(self, self->work);
     hsep_real *to = hsep_at(self, self->abreast);
-    hsep_lanes along[HSEP_OF_FOUR], sums[HSEP_OF_FOUR], *x = hsep_lanes_at(to);
+    const hsep_lanes *x = hsep_lanes_at(to);
+    hsep_lanes sums[HSEP_OF_FOUR];
     for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
         const hsep_real *row = rows + (m + 1) * (c < count ? c : count - 1);
         for (hsep_int i = 0; i < m; i++) {
@@ -309,45 +270,28 @@ static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep
         }
     }
     solution_forward_abreast(self);
-    if (square > 0.0) {
-        solution_dot_abreast(u, x, m, along);
-        for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-            along[l] /= square;
+    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++, x++) { /* as hsep_dot has each; a sum with a name has a register */
+        hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0;
+        const hsep_lanes *at = x;
+        hsep_int i = 0;
+        for (; i + 4 <= m; i += 4, at += 4 * HSEP_OF_FOUR) {
+            s0 += at[0] * at[0];
+            s1 += at[HSEP_OF_FOUR] * at[HSEP_OF_FOUR];
+            s2 += at[2 * HSEP_OF_FOUR] * at[2 * HSEP_OF_FOUR];
+            s3 += at[3 * HSEP_OF_FOUR] * at[3 * HSEP_OF_FOUR];
         }
-        for (hsep_int i = 0; i < m; i++) {
-            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                x[HSEP_OF_FOUR * i + l] -= along[l] * u[i];
-            }
+        for (; i < m; i++, at += HSEP_OF_FOUR) {
+            s0 += *at * *at;
         }
-    }
-    solution_dot_abreast(NULL, x, m, sums);
-    const hsep_real left = square / (1.0 + square);
-    for (hsep_int l = 0; square > 0.0 && l < HSEP_OF_FOUR; l++) {
-        sums[l] += along[l] * along[l] * left;
+        sums[l] = (s0 + s1) + (s2 + s3);
     }
     memcpy(leverages, sums, sizeof sums);
 }
 #endif
 
-/* The leverage of a row y, (m + 1,), which is used up: along u, and the rest. */
-static hsep_real solution_leverage(hsep_solution *self, hsep_real y[])
-{
-    const hsep_int m = self->n_head + self->n_tail;
-    const hsep_real *u = hsep_at(self, self->last), square = self->last_square;
-    y[m] = 0.0;
-    hsep_cholesky_forward(hsep_at(self, self->factor), m + 1, m, y);
-    if (!(square > 0.0)) {
-        return hsep_dot(y, y, m);
-    }
-    const hsep_real along = hsep_dot(u, y, m) / square;
-    hsep_axpy(y, -along, u, m);
-    const hsep_real left = square / (1.0 + square);
-    return hsep_dot(y, y, m) + along * along * left;
-}
-
 HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
-    const hsep_int width = self->n_head + self->n_tail + 1;
+    const hsep_int m = self->n_head + self->n_tail;
 #if HSEP_LANES == 2
     if (count > 1) {
         solution_leverages_abreast(self, count, leverages);
@@ -355,6 +299,9 @@ HSEP_API void hsep_solution_leverages(hsep_solution *self, hsep_int count, hsep_
     }
 #endif
     for (hsep_int c = 0; c < count; c++) {
-        leverages[c] = solution_leverage(self, hsep_at(self, self->work) + width * c);
+        hsep_real *y = hsep_at(self, self->work) + (m + 1) * c;
+        y[m] = 0.0;
+        hsep_cholesky_forward(hsep_at(self, self->factor), m + 1, m, y);
+        leverages[c] = hsep_dot(y, y, m);
     }
 }

@@ -6,9 +6,8 @@
  * less than its penalty. Penalties of the head of the features are known before the last rows are, penalties of the
  * tail are not: hsep_solution_begin takes the Gram matrix as it is, hsep_solution_advance factors the head by and by,
  * hsep_solution_row takes rows that come meanwhile, which go into what is factored by reflections, and are added to
- * the rest. What is left for hsep_solution_finish are the tail and the last row phi, which does not enter the factor:
- * with u = R'^-1 phi the triangle of all rows is that of R' (1 + u u') R, and its inverse follows from Sherman and
- * Morrison's formula (1950). The solution is the same to rounding as with all rows at once.
+ * the rest. What is left for hsep_solution_finish are the tail and the last rows. The solution is the same to rounding
+ * as with all rows at once.
  *
  * Rows of a Gram matrix have the tail first. The head is factored from its last feature to its first: where these are
  * lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
@@ -39,10 +38,8 @@ typedef struct {
     hsep_int begun;          /* whether it has */
     hsep_int factored;       /* rows of the head that are */
     hsep_int waiting;        /* rows that have come since, and are not in the factor yet */
-    hsep_int finished;       /* whether left is valid, */
-    hsep_int completed;      /* and the tail is factored with its penalties */
+    hsep_int finished;       /* whether left is valid */
     hsep_real square;        /* sum of the squares of the targets */
-    hsep_real last_square;   /* u' u of the last row */
     /* Offsets in words from the beginning of the struct */
     hsep_int penalties; /* (n_tail + n_head,) */
     hsep_int weights;   /* (n_tail + n_head,) */
@@ -50,12 +47,11 @@ typedef struct {
     hsep_int left;      /* triangle of tail and target: what the head leaves of them, without penalties */
     hsep_int least;     /* (n_head + n_tail + 1,) bounds on the pivots */
     hsep_int rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
-    hsep_int last;      /* (n_head + n_tail + 1,) u, and what the weights without the last row leave of its target */
     hsep_int work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
     hsep_int abreast;   /* the same side by side, where there are vectors */
 } hsep_solution;
 
-HSEP_ASSERT_WORDS(hsep_solution, 19);
+HSEP_ASSERT_WORDS(hsep_solution, 16);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
 HSEP_API hsep_real hsep_solution_size(hsep_int n_head, hsep_int n_tail, hsep_int room);
@@ -73,23 +69,18 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
 
 /* Multiply-adds that it takes at most until the head is factored and has taken in the rows that wait, and as many as
- * are to come; with tail until it is completed. */
-HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come, int tail);
+ * are to come. */
+HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come);
 
 /* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return
  * what is left of it; the last part may exceed it by up to 4 (n + 1)^2. With all everything is done, whatever the
  * amount. */
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
 
-/* Factor the tail, too, with all rows that have come: its penalties are known, and one row more comes at most. Cost:
- * what was left to be advanced, and n_tail^3 / 6 multiply-adds. */
-HSEP_API void hsep_solution_complete(hsep_solution *self);
-
 /* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the
- * rows about them, of which rounding leaves 1e-14 of the square of the targets. Cost: n^2 multiply-adds, and what
- * was left of hsep_solution_complete, apart for a last row that waits, if that is to stay behind the factor: it
- * costs less so, and each leverage more. May be called again with other penalties of the tail. */
-HSEP_API hsep_real hsep_solution_finish(hsep_solution *self, int apart);
+ * rows about them, of which rounding leaves 1e-14 of the square of the targets. Cost: what was left to be advanced, and
+ * n_tail^3 / 6 + n^2 / 2 multiply-adds. May be called again with other penalties of the tail. */
+HSEP_API hsep_real hsep_solution_finish(hsep_solution *self);
 
 /* phi' (R' R)^-1 phi, with all rows in R, of the first count of HSEP_SOLUTION_ABREAST rows phi, which are the block's
  * work, in that order, and are used up: the variances of w' phi relative to the variance of the noise. Cost: n^2 / 2

@@ -251,22 +251,6 @@ static void predictor_go_on(hsep_predictor *self)
     hsep_predictor_predict_std(self, first, late + last);
 }
 
-/* Solve ahead of the next window, all of whose commands but the last are known. */
-static void predictor_settle(hsep_predictor *self)
-{
-    hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
-    const hsep_real *ahead = hsep_at(self, self->ahead);
-    hsep_real before = hsep_at(self, self->x_d)[self->Np - 1], peak = 0.0;
-    if (averaged == NULL) {
-        return;
-    }
-    for (hsep_int i = 0; i + 1 < self->Np; i++) {
-        peak = hsep_fmax(peak, hsep_fabs(ahead[i] - before));
-        before = ahead[i];
-    }
-    hsep_averaged_settle(averaged, peak);
-}
-
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     const hsep_int Np = self->Np;
@@ -276,9 +260,6 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas, 1)) {
         if (self->n_published < Np) {
             predictor_go_on(self);
-        }
-        if (self->k % Np == Np - 1) {
-            predictor_settle(self);
         }
         return 0;
     }

@@ -50,20 +50,13 @@ static int averaged_scale(
     return outgrown;
 }
 
-/* Whether the scales of the command's expert are those of one sample before the window: not where nothing has moved
- * before its last command. */
-static int averaged_is_early(const hsep_averaged *self)
-{
-    return self->settled && self->early_square > 0.0 && (self->early_step > 0.0 || self->forecast_step == 0.0);
-}
-
-HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[])
+/* Prior standard deviations of the weights of an expert's features without lags, at most HSEP_AVERAGED_MOST. */
+static void averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[])
 {
     const hsep_int kind = hsep_averaged_kind_of(self, expert);
-    const int of_command = kind == HSEP_COMMAND_RESIDUAL, is_early = of_command && averaged_is_early(self);
-    const hsep_real square = is_early ? self->early_square : self->learned.scales[kind].largest_square;
-    const hsep_real most = is_early ? self->early_step : self->forecast_step, step = most > 0.0 ? most : 1.0;
-    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(square);
+    const int of_command = kind == HSEP_COMMAND_RESIDUAL;
+    const hsep_real step = self->forecast_step > 0.0 ? self->forecast_step : 1.0;
+    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(self->learned.scales[kind].largest_square);
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_expert *solved = hsep_averaged_expert(self, expert);
     for (hsep_int i = 0; i < solved->n_static; i++) {
@@ -95,11 +88,9 @@ static void averaged_solve(hsep_averaged *self, int outgrown)
             const hsep_real earlier = hsep_expert_weight(i) * hsep_warm_start_earlier(evidence)->n_rows;
             const hsep_real n_rows = hsep_warm_start_of_run(evidence)->n_rows + earlier;
             hsep_real scales[HSEP_AVERAGED_MOST];
-            hsep_averaged_priors(self, i, scales);
-            hsep_solution *solution = hsep_averaged_begun(self, i);
-            solution->completed = solution->completed && averaged_is_early(self);
-            /* apart in a predictor: a compensator has more variances to compute */
-            hsep_expert_solve(hsep_averaged_expert(self, i), n_rows, scales, self->settled != 0);
+            averaged_priors(self, i, scales);
+            (void)hsep_averaged_begun(self, i);
+            hsep_expert_solve(hsep_averaged_expert(self, i), n_rows, scales);
         }
     }
 }
@@ -230,7 +221,6 @@ HSEP_API void hsep_averaged_forecast(
     self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
     self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_VELOCITY_JUMP) : 1.0;
     averaged_solve(self, outgrown);
-    self->settled = 0;
     memset(hsep_at(self, self->stacked), 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
     averaged_recall(self, e[self->n]);
     averaged_begin(self, x_d, e + self->n);

@@ -3,6 +3,7 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -115,9 +116,8 @@ static void averaged_judge_experts(
     }
 }
 
-/* What is known of this window, whose residuals are e, so far: with early samples the next solutions are prepared, and
- * before the last one the size of the command's residual is taken. */
-static void averaged_judge_early(hsep_averaged *self, const hsep_real e[])
+/* Prepare the next solutions with what is known of this window, whose residuals are e, so far. */
+static void averaged_prepare(hsep_averaged *self, const hsep_real e[])
 {
     hsep_residual_scale scales[HSEP_N_RESIDUALS];
     hsep_expert_errors errors[HSEP_N_REGRESSIONS];
@@ -126,12 +126,7 @@ static void averaged_judge_early(hsep_averaged *self, const hsep_real e[])
     if (self->n_accepted > 0.0) {
         averaged_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
     }
-    if (self->followed == self->early) {
-        hsep_averaged_prepare_solutions(self, scales, errors);
-    }
-    if (self->followed + 1 == self->Np) {
-        self->early_square = scales[HSEP_COMMAND_RESIDUAL].largest_square;
-    }
+    hsep_averaged_prepare_solutions(self, scales, errors);
 }
 
 /* Multiply-adds as which the beginning of a solution counts. */
@@ -151,7 +146,7 @@ static hsep_real averaged_left(hsep_averaged *self, hsep_int to_come)
             const hsep_int kind = hsep_averaged_kind_of(self, i);
             const hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
             const hsep_int rows = to_come + (solution->begun ? 0 : gram->waiting);
-            sum += averaged_of_beginning(solution) + hsep_solution_left(solution, rows, kind == HSEP_COMMAND_RESIDUAL);
+            sum += averaged_of_beginning(solution) + hsep_solution_left(solution, rows);
         }
     }
     return sum;
@@ -226,8 +221,8 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
     if (accepted) {
         averaged_believe(self, k, x_pb, e, measured, fold);
     }
-    if (fold && (self->followed == self->early || self->followed + 1 == self->Np)) {
-        averaged_judge_early(self, e);
+    if (fold && self->followed == self->early) {
+        averaged_prepare(self, e);
     }
 }
 
@@ -246,49 +241,26 @@ HSEP_API void hsep_averaged_follow(
     }
 }
 
-HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak)
-{
-    const hsep_real resolved = hsep_disturbances_resolved(hsep_averaged_disturbances(self), peak);
-    const hsep_real step = resolved / self->T_s * self->T_s; /* as that of the window is computed */
-    self->early_step = hsep_fmax(hsep_fmax(self->learned.largest_step, self->forecast_step), step);
-    self->settled = 1;
-    if (self->followed + 1 != self->Np || !(self->early_square > 0.0)) {
-        return;
-    }
-    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
-        hsep_solution *solution = hsep_averaged_solution(self, i);
-        hsep_real scales[HSEP_AVERAGED_MOST];
-        if (solution != NULL && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL &&
-            hsep_averaged_expert(self, i)->variance > 0.0) {
-            (void)hsep_averaged_begun(self, i);
-            hsep_averaged_priors(self, i, scales);
-            hsep_expert_complete(hsep_averaged_expert(self, i), scales);
-        }
-    }
-}
-
 /* Update the weights of the stack with the accepted samples that were published. */
 static void averaged_judge_stack(hsep_averaged *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted);
-    const hsep_real *stacked = hsep_at(self, self->stacked) + (self->n - self->Np);
-    const hsep_int first = self->late < self->Np ? self->late : 0;
-    hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
-    for (hsep_int j = 0; j < self->Np - first; j++) {
-        hsep_real of_sample[HSEP_N_EXPERTS + 1];
-        if (!(accepted[j] > 0.0)) {
-            continue;
+    const hsep_real *accepted = hsep_at(self, self->accepted), *signals[HSEP_N_EXPERTS + 1];
+    const hsep_int count = self->Np - (self->late < self->Np ? self->late : 0);
+    hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0, *counted = hsep_at(self, self->x);
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        signals[i] = hsep_at(self, self->stacked) + (self->n - self->Np) + i * self->n;
+    }
+    signals[HSEP_N_EXPERTS] = e;
+    for (hsep_int j = 0; j < count; j++) {
+        n += accepted[j];
+    }
+    for (hsep_int i = 0; i <= HSEP_N_EXPERTS; i++) {
+        for (hsep_int j = 0; j < count; j++) {
+            counted[j] = accepted[j] * signals[i][j];
         }
-        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
-            of_sample[i] = stacked[i * self->n + j];
+        for (hsep_int l = i; l <= HSEP_N_EXPERTS; l++) {
+            products[i][l] = hsep_dot(counted, signals[l], count);
         }
-        of_sample[HSEP_N_EXPERTS] = e[j];
-        for (int i = 0; i <= HSEP_N_EXPERTS; i++) {
-            for (int l = i; l <= HSEP_N_EXPERTS; l++) {
-                products[i][l] += of_sample[i] * of_sample[l];
-            }
-        }
-        n += 1.0;
     }
     if (n > 0.0) {
         hsep_stack_update(&self->learned.stack, products, n, self->least_variance);

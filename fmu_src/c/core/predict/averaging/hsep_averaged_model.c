@@ -150,8 +150,6 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
     *doubting = (hsep_expert_errors){0.0, 1.0};
     self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
     self->reach.farthest = 0.0;
-    self->settled = 0;
-    self->early_square = 0.0;
     hsep_stack_forget(&learned->stack, HSEP_FRESH_START);
     if (hsep_averaged_doubts(self)) {
         *doubting = learned->errors[self->leading - HSEP_REGRESSIONS];

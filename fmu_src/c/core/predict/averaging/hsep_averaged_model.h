@@ -57,8 +57,6 @@ typedef struct {
     /* Of the window that is predicted */
     hsep_real forecast_scale;           /* m/s, velocity scale with it, */
     hsep_real forecast_step;            /* m, and largest change of the command, */
-    hsep_int settled;                   /* whether a predictor has taken early_step, */
-    hsep_real early_step;               /* m, the same before the last command of the window came */
     hsep_real bound;                    /* m, on what is predicted, */
     hsep_real growth;                   /* how much larger the command's bound may be, as its largest step is */
     hsep_int predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
@@ -66,10 +64,9 @@ typedef struct {
     hsep_real others[HSEP_N_EXPERTS];   /* weights of the others where it does not, */
     hsep_real shares[HSEP_N_EXPERTS];   /* and of all as they count */
     /* Of the window that is measured */
-    hsep_int followed;      /* samples that were judged and, as far as they are believed, learned */
-    hsep_int known;         /* samples up to the last one that is believed */
-    hsep_real n_accepted;   /* samples that are */
-    hsep_real early_square; /* m2, largest mean square of the command's residual, before the last sample; 0: none yet */
+    hsep_int followed;    /* samples that were judged and, as far as they are believed, learned */
+    hsep_int known;       /* samples up to the last one that is believed */
+    hsep_real n_accepted; /* samples that are */
     /* Offsets in words from the beginning of the struct */
     hsep_int forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
     hsep_int x;                /* (n,) m, position */
@@ -92,7 +89,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, HSEP_LEARNED_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    39 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
+    36 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */
@@ -132,9 +129,6 @@ HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int exp
 /* The same, which begins now if it has not yet. */
 HSEP_API hsep_solution *hsep_averaged_begun(hsep_averaged *self, hsep_int expert);
 
-/* Prior standard deviations of the weights of an expert's features without lags, at most HSEP_AVERAGED_MOST. */
-HSEP_API void hsep_averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scales[]);
-
 /* Prepare the solutions, with variances of the noise as they are known now. scales: (HSEP_N_RESIDUALS,) of the
  * residuals so far; errors: (HSEP_N_REGRESSIONS,) of the regressions. */
 HSEP_API void hsep_averaged_prepare_solutions(
@@ -151,10 +145,6 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self);
 HSEP_API void hsep_averaged_forecast(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path,
     hsep_real e[], hsep_int last);
-
-/* Complete the solutions of the command's expert, one sample before a window that a predictor begins: peak is the
- * largest change of its commands, m, as far as they are known. */
-HSEP_API void hsep_averaged_settle(hsep_averaged *self, hsep_real peak);
 
 /* Predict samples first ... last - 1, too, where the last call ended; apart: as hsep_expert_predict's. */
 HSEP_API void hsep_averaged_go_on(

@@ -73,26 +73,14 @@ HSEP_API void hsep_expert_prepare(
     hsep_solution_reset(solution);
 }
 
-static void expert_penalise(hsep_expert *self, const hsep_real scales[])
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[])
 {
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *penalties = hsep_at(solution, solution->penalties);
     for (hsep_int i = 0; i < self->n_static; i++) {
         penalties[i] = self->variance / (scales[i] * scales[i]);
     }
-}
-
-HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[])
-{
-    expert_penalise(self, scales);
-    hsep_solution_complete(hsep_expert_solution(self));
-}
-
-HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[], int apart)
-{
-    hsep_solution *solution = hsep_expert_solution(self);
-    expert_penalise(self, scales);
-    const hsep_real square = hsep_solution_finish(solution, apart);
+    const hsep_real square = hsep_solution_finish(solution);
     self->rows_variance = hsep_fmax(square, expert_resolved(solution->square)) / n_rows;
 }
 

@@ -79,12 +79,9 @@ HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least);
 
-/* Complete the factor with the penalties of the features without lags, before the last row comes; scales: as below. */
-HSEP_API void hsep_expert_complete(hsep_expert *self, const hsep_real scales[]);
-
 /* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
- * without lags; apart: as hsep_solution_finish has it, which it costs. */
-HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[], int apart);
+ * without lags. Cost: a hsep_solution_finish. */
+HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[]);
 
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);

@@ -54,12 +54,10 @@ static void recall_compare(hsep_recall *self, hsep_int first, hsep_int last, int
         recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
         begin += count;
     }
-    hsep_real least = distances[lag - 1];
-    for (hsep_int i = first > self->n ? first : self->n + 1; is_last && i < last && i < self->size; i++) {
-        if (distances[i - 1] < least) { /* the shortest one of equals */
-            least = distances[i - 1];
-            lag = i;
-        }
+    const hsep_int begin = first > self->n ? first - 1 : self->n, end = (last < self->size ? last : self->size) - 1;
+    if (is_last && begin < end) { /* the shortest lag of equals */
+        const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin);
+        lag = distances[found] < distances[lag - 1] ? found + 1 : lag;
     }
     self->lag = lag;
 }
