@@ -1,6 +1,6 @@
 """A published machine tool: a circle in a tilted plane, four passes, from the numbers of its printed table.
 
-    python -m benchmarks.outside.xiao [--picture FILE]      (three minutes)
+    python -m benchmarks.outside.xiao [--picture FILE] [--noise SEED]      (three minutes)
 
 Q. Xiao, M. Wan, X. Qin, "Pre-compensation of friction for CNC machine tools through constructing a nonlinear model
 predictive scheme", Chinese Journal of Mechanical Engineering 36:119 (2023): Table 1 has inertia, gains and Stribeck
@@ -208,14 +208,14 @@ def noisy(x: Array, seed: int) -> Array:
     return Encoder(NOISE_STD, 3 + seed).measure_all(x)
 
 
-def passes(name: str, duration: float) -> dict[str, Array]:
+def passes(name: str, duration: float, noise: int) -> dict[str, Array]:
     """Return the true positions of an axis over all passes by the way it is compensated, (n,) each, m."""
     axis, found = AXES[name], fitted(name, duration)
     r = circle()[0][:, "XYZ".index(name)]
 
     def run(machine: Machine, compensate: str, trained: HybridPredictor | None = None) -> Array:
         controller = Controller(machine, compensate, trained)
-        return cosimulate(controller, XiaoDrive(axis), np.tile(r, PASSES), encoder=Encoder(NOISE_STD, 2)).x
+        return cosimulate(controller, XiaoDrive(axis), np.tile(r, PASSES), encoder=Encoder(NOISE_STD, noise)).x
 
     gains, of_fit = (one.changed("predictor", {"recall": 2 * len(r)}) for one in (of_gains(name), found.machine))
     learning = learned_commands(axis.model(), T_S, "foh", XiaoDrive(axis), r, PASSES, noisy, cut_off=120.0)
@@ -235,10 +235,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--picture", type=Path, help="file for a picture of the last passes' contour errors")
     parser.add_argument("--log", type=float, default=20.0, metavar="S", help="duration of the logs that fit gets")
+    parser.add_argument("--noise", type=int, default=2, metavar="SEED", help="of the measurements in the passes")
     options = parser.parse_args(arguments)
     points, judged = circle()
     with ProcessPoolExecutor(2) as pool:
-        axes = list(pool.map(partial(passes, duration=options.log), AXES))
+        axes = list(pool.map(partial(passes, duration=options.log, noise=options.noise), AXES))
     print(f"{'contour error, largest / RMS, µm':34}" + "".join(f"{f'pass {i + 1}':>16}" for i in range(PASSES)))
     reached = {way: np.stack([axis[way] for axis in axes], axis=1).reshape(PASSES, -1, 3) for way in axes[0]}
     for way, each in reached.items():
