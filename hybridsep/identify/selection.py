@@ -177,9 +177,7 @@ def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: floa
     """
     split = motion_split(segments, 1.0 - HELD_OUT)
     for fit in shorter_delays(split, T_s, chosen.fit):
-        error = _held_out_error(fit, split, T_s)
-        shorter = Candidate(fit, error - error.mean(), "")
-        if not _objection(fit, split, T_s) and _together(shorter, chosen) <= 1 + _EXCESS_MAX:
+        if (shorter := _in_place_of(chosen, fit, split, T_s)) is not None:
             return shorter
     return chosen
 
@@ -195,14 +193,16 @@ def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> C
         return chosen
     split, start = motion_split(segments, 1.0 - HELD_OUT), np.array([fit.theta[0], np.log(_DAMPED)])
     fit = fit_structure(split, T_s, replace(structure, zero=True, zeta=_DAMPED), fit.delay, [start], fit.slowest)
+    return _in_place_of(chosen, fit, split, T_s) or chosen
+
+
+def _in_place_of(chosen: Candidate, fit: Fit, split: Sequence[Segment], T_s: float) -> Candidate | None:
+    """Return the candidate of a fit if it is plausible, and as good as the chosen one on both parts together."""
     error = _held_out_error(fit, split, T_s)
-    damped = Candidate(fit, error - error.mean(), "")
-    return chosen if _objection(fit, split, T_s) or _together(damped, chosen) > 1 + _EXCESS_MAX else damped
-
-
-def _together(candidate: Candidate, other: Candidate) -> float:
-    """Return the product of the ratios of their errors, on the fitted and on the held-out part."""
-    return float(candidate.fit.rms / other.fit.rms * np.std(candidate.held_out) / np.std(other.held_out))
+    together = fit.rms / chosen.fit.rms * np.std(error) / np.std(chosen.held_out)
+    if _objection(fit, split, T_s) or together > 1 + _EXCESS_MAX:
+        return None
+    return Candidate(fit, error - error.mean(), "")
 
 
 def _held_out_error(fit: Fit, split: Sequence[Segment], T_s: float) -> Array:
