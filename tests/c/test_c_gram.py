@@ -265,16 +265,6 @@ def test_rows_of_others_are_added_with_their_weight() -> None:
     assert_same(CSolution(gram, penalties), library, penalties, rows)
 
 
-def test_discounted_rows_weigh_as_in_the_library() -> None:
-    gram, library, rows, target = both(9, 40, 5)
-    for weight in (0.5, 1e-3, 1.0):
-        gram.discount(weight)
-        gram.fold(rows[:7], target[:7])
-        library = library.discount(weight).update(rows[:7], target[:7])
-        penalties = 1e-2 * np.abs(rows).max(axis=0) ** 2
-        assert_same(CSolution(gram, penalties), library, penalties, rows)
-
-
 def test_rows_may_be_forgotten_altogether() -> None:
     gram, _, rows, target = both(9, 40, 5)
     for weight in (1e-200, 1e-300, 0.0):

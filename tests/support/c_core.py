@@ -146,8 +146,7 @@ def library(name: str) -> ctypes.CDLL:
 
     loaded = ctypes.CDLL(str(built_once(_shared() / f"{name}_{key}.so", build)))
     loaded.test_table.restype = ctypes.POINTER(Context)
-    for function in ("physics", "regression"):
-        getattr(loaded, f"hsep_{function}_size").restype = ctypes.c_double
+    loaded.hsep_regression_size.restype = ctypes.c_double
     loaded.hsep_encoder_measure.restype = ctypes.c_double
     loaded.hsep_regression_row.restype = ctypes.POINTER(ctypes.c_double)
     return loaded

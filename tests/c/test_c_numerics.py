@@ -1,10 +1,10 @@
-"""The C core's regression against the direct solution in extended precision. Each test states its tolerance."""
+"""The C core's discretised modes and its regression against extended precision. Each test states its tolerance."""
 
 import ctypes
-import math
 from typing import Any
 
 import c_core
+import mpmath
 import numpy as np
 import oracle
 import pytest
@@ -13,6 +13,53 @@ from c_core import TS
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
+
+MODES = {
+    "under-damped": (25.0, 0.05, 24674.0, 15.7),
+    "lightly damped": (37.0, 0.01, 102687.3, 8.83),
+    "critical": (19.0, 1.0, 14412.0, 0.0),
+    "nearly critical": (19.0, 1.0 + 1e-9, 14412.0, 30.0),
+    "over-damped": (30.0, 4.0, 35530.0, 10.0),
+    "stiff": (300.0, 50.0, 3.5e6, 100.0),
+    "slow": (1e-3, 0.7, 3.9e-5, 0.0),
+    "near the sampling rate": (480.0, 0.1, 9.1e6, 0.0),
+}
+
+
+class DiscreteMode(ctypes.Structure):
+    """hsep_discrete_mode."""
+
+    _fields_ = tuple((name, ctypes.c_double * n) for name, n in (("A", 4), ("b", 2), ("c", 2), ("d", 1), ("s", 2)))
+
+
+def exact_matrices(f_n: float, zeta: float, alpha: float, beta: float, hold: str) -> dict[str, Array]:
+    """Return A, b, c, d of one mode between samples, eq. (15), from forty digits."""
+    with mpmath.workdps(40):
+        w = 2 * mpmath.pi * mpmath.mpf(f_n)
+        M = mpmath.zeros(4)
+        M[0, 1], M[1, 0], M[1, 1] = w * TS, -w * TS, -2 * mpmath.mpf(zeta) * w * TS
+        M[1, 2], M[2, 3] = w * TS, 1
+        exponential = mpmath.expm(M)
+        A, g1, g2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
+        c = mpmath.matrix([[mpmath.mpf(alpha) / w**2, mpmath.mpf(beta) / w]])
+        b, d = (g1, mpmath.zeros(1)) if hold == "zoh" else (A * g2 + g1 - g2, c * g2)
+        parts = {"A": A, "b": b, "c": c, "d": d}
+        return {name: np.array([float(x) for x in part]) for name, part in parts.items()}
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+@pytest.mark.parametrize("damping", list(MODES))
+def test_a_mode_is_discretised_to_the_last_digits(damping: str, hold: str) -> None:
+    # Against forty digits: each matrix to 1e-14 of its largest entry, the entries that are not tiny to 1e-13 of
+    # themselves.
+    mode = DiscreteMode()
+    c_core.library("predictor").hsep_discretise(
+        ctypes.byref(mode), (ctypes.c_double * 4)(*MODES[damping]), ctypes.c_double(TS), ctypes.c_int(hold == "foh")
+    )
+    for name, entries in exact_matrices(*MODES[damping], hold).items():
+        got, atol = np.array(getattr(mode, name)), 1e-14 * np.max(np.abs(entries))
+        np.testing.assert_allclose(got, entries, rtol=1e-13, atol=atol, err_msg=name)
+    np.testing.assert_array_equal(np.array(mode.s), 0.0)
 
 
 class CRegression:
@@ -38,26 +85,6 @@ class CRegression:
         self.library.hsep_regression_solve(self._block, w.ctypes.data_as(ctypes.c_void_p))
         return w
 
-    @property
-    def n_rows(self) -> float:
-        return float(self.block[1])
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 16, 23])
-@pytest.mark.parametrize("lam", [1e-12, 1e-3, 10.0])
-def test_weights_of_random_rows_are_those_of_the_direct_solution(n: int, lam: float) -> None:
-    # 1e-11 relative against long double; from one row, less than features, to many.
-    rng = np.random.default_rng(n)
-    rows = rng.normal(size=(200, n))
-    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=200)
-    regression, done = CRegression(n, lam), 0
-    for m in (0, 1, 2, 30, 200):
-        regression.fold(rows[done:m], target[done:m])
-        done = m
-        exact = oracle.ridge_extended(rows[:m], target[:m], lam).astype(float)
-        scale = 1e-11 * max(float(np.linalg.norm(exact)), 1e-300)
-        np.testing.assert_allclose(regression.weights, exact, rtol=0, atol=max(scale, 1e-14 / math.sqrt(lam) * (m < n)))
-
 
 def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
     # Each row a million times the one before and nearly parallel to it: rotations with a cosine near 0, where the
@@ -74,14 +101,12 @@ def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
 
 
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
-    """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
+    """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase."""
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)
     x_pb, _ = discrete.forced_response(discrete.rest(), staircase.commanded())
     e_pb = staircase.measured(0) - x_pb
-    first = 200  # the lags before it are there
-    columns = [np.ones(n)] + [x_pb[first - i : first - i + n] for i in range(q + 1)]
-    columns += [e_pb[first - i : first - i + n] for i in range(1, p + 1)]
-    return np.column_stack(columns), e_pb[first : first + n]
+    rows = range(200, 200 + n)  # the lags before them are there
+    return np.array([oracle.features(x_pb, e_pb, k, p, q) for k in rows]), e_pb[rows]
 
 
 @pytest.mark.slow
