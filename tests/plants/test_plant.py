@@ -2,20 +2,24 @@
 
 import math
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
 from c_core import STAGE_DRIVE, STAGE_MODES, CModel
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
 from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import Array
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.plants.stage_drive import StageDrive, velocity_under_friction
 from hybridsep.plants.trajectory import spiral, staircase
 
 TS = 1e-3
+V_FRICTION = PARAMETERS["v_friction"].default
 
 
 def tight(slope: object, z: Array, commands: Array, position: object) -> Array:
@@ -66,6 +70,44 @@ def test_the_stage_is_integrated_to_less_than_a_nanometre(axis: str) -> None:
     assert np.max(np.abs(simulate(stage, x_d, TS) - truth)) < 1e-9
 
 
+@pytest.mark.parametrize("gain", [-0.06, -2e-3, -1e-3, 0.0, 1e-3, 0.5, 1e9])
+def test_the_velocity_solves_its_equation(gain: float) -> None:
+    for w, last in product([-10.0, -0.05, -1e-3, -1e-9, 1e-12, 1e-3, 0.02, 0.07, 3.0], [-0.1, 0.0, 0.1]):
+        v = velocity_under_friction(w, gain, V_FRICTION, last)
+        assert v + gain * math.tanh(v / V_FRICTION) == pytest.approx(w, rel=1e-9, abs=1e-15 * abs(gain))
+        assert v == -velocity_under_friction(-w, gain, V_FRICTION, -last)
+        # stable: more velocity would meet more resistance
+        assert 1.0 + gain / V_FRICTION * (1.0 - math.tanh(v / V_FRICTION) ** 2) > -1e-3
+
+
+def test_the_direction_is_kept_until_its_solution_ends() -> None:
+    gain, v, found = -0.06, 0.1, []
+    for w in np.linspace(0.1, -0.1, 2001):
+        v = velocity_under_friction(w, gain, V_FRICTION, v)
+        found.append(v)
+    turned = int(np.argmax(np.array(found) < 0.0))
+    turn = V_FRICTION * math.acosh(math.sqrt(-gain / V_FRICTION))
+    assert 0.1 - 1e-4 * turned == pytest.approx(turn + gain * math.tanh(turn / V_FRICTION), abs=2e-4)
+
+
+def test_the_motion_is_integrated_to_a_nanometre() -> None:
+    modes = [Mode(25.0, 0.3, (2 * math.pi * 25.0) ** 2, 20.0)]
+    f, beta = 1e-5, sum(mode.beta for mode in modes)
+    x_d = staircase()[:250]
+
+    def slope(t: float, z: Array, k: int, r: float) -> list[float]:
+        mode = modes[0]
+        free = r - 2 * mode.zeta * mode.omega * z[1] - mode.omega**2 * z[0]
+        w, gain = mode.alpha * z[1] + beta * free, beta * f
+        v = brentq(lambda v: v + gain * math.tanh(v / V_FRICTION) - w, w - gain, w + gain, xtol=1e-18)
+        return [z[1], free - f * math.tanh(v / V_FRICTION)]
+
+    truth = tight(slope, np.zeros(2), x_d, lambda z: modes[0].alpha * z[0] + beta * z[1])
+    x = simulate(StageDrive(ModalModel(modes), f, T_s=TS, friction_on="motion"), x_d, TS)
+    assert np.max(np.abs(x - simulate(StageDrive(ModalModel(modes), f, T_s=TS), x_d, TS))) > 1e-6
+    assert np.max(np.abs(x - truth)) < 1e-9
+
+
 def test_without_nonlinearity_the_plants_are_their_models() -> None:
     x_d = staircase()[:1500]
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
@@ -78,8 +120,11 @@ def test_without_nonlinearity_the_plants_are_their_models() -> None:
     np.testing.assert_allclose(simulate(StageDrive(modal), x_d, TS), x_pb, atol=1e-10)
 
 
-@pytest.mark.parametrize(("hold", "dead_time"), [("zoh", 1), ("zoh", 3), ("foh", 0), ("foh", 1), ("foh", 3)])
-def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time: int) -> None:
+@pytest.mark.parametrize(
+    ("hold", "dead_time", "friction_on"),
+    [("zoh", 1, "command"), ("zoh", 3, "motion"), ("foh", 0, "command"), ("foh", 1, "motion"), ("foh", 3, "command")],
+)
+def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time: int, friction_on: str) -> None:
     x_d = staircase()[:600] + 0.1
     model = ModalModel([Mode(**mode) for mode in STAGE_MODES], dead_time)
     discrete = model.discretise(TS, hold)
@@ -91,15 +136,20 @@ def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time:
     assert np.max(np.abs(x - x_pb)) < (0.25 * held if (hold, dead_time) == ("foh", 0) else 1e-9)
     assert np.max(np.abs(x - x_d)) > 1e-5
     values = {**STAGE_DRIVE, "f": 8e-6, "v_friction": 5e-3, "noise_std": 0.0, "dead_time": dead_time}
-    core = CModel("stage_drive", {**values, "input_hold": ["zoh", "foh"].index(hold)})
+    chosen = {"input_hold": ["zoh", "foh"].index(hold), "friction_on": ["command", "motion"].index(friction_on)}
+    core = CModel("stage_drive", {**values, **chosen})
     core["x_d"] = x_d[0]
     core.start_values()
     core.initialise(0.0)
-    plant = StageDrive(model, 8e-6, values["kappa"], TS, v_friction=5e-3, input_hold=hold)
+
+    def rubbed() -> StageDrive:
+        return StageDrive(model, 8e-6, values["kappa"], TS, friction_on, v_friction=5e-3, input_hold=hold)
+
+    plant = rubbed()
     plant.reset(float(x_d[0]))
     for k, command in enumerate(x_d[:300].tolist()):
         if k == 150:
-            other = StageDrive(model, 8e-6, values["kappa"], TS, v_friction=5e-3, input_hold=hold)
+            other = rubbed()
             other.restore(plant.state())
             plant = other
         core["x_d"] = command
